@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+"""The one error family: every message names the field, what was received and what is accepted."""
+
+
+class InputError(ValueError):
+    """Input that was refused.
+
+    The command line prints ``str(error)`` as its one line on stderr and exits with status 2; the node keeps the old
+    value in force and returns the same text.
+    """
+
+    def __init__(self, field: str, received: object, accepted: str) -> None:
+        self.field = field
+        self.received = received
+        self.accepted = accepted
+        super().__init__(f"{field}: got {received!r}; accepted: {accepted}")
+
+
+class MeshError(InputError):
+    """A mesh that can't be read, or whose surface doesn't bound a solid where one is needed."""
+
+
+class TensorError(InputError):
+    """An inertia tensor or mass that no rigid body has."""
+
+
+class CommandRefused(InputError):
+    """A wrench, string or schedule command that was refused; ``reason`` is the diagnostics counter it goes to."""
+
+    def __init__(self, reason: str, field: str, received: object, accepted: str) -> None:
+        self.reason = reason
+        super().__init__(field, received, accepted)
