@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""Mass, centre of mass and inertia of a mesh under each model; every change but the mesh itself is closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_proto_ros.core.errors import InputError, MeshError, TensorError
+from rigid_proto_ros.core.inertia_tensor import check_tensor, tensor_from_six
+from rigid_proto_ros.core.moments import Moments, box_moments, point_moments, solid_moments
+from rigid_proto_ros.core.moments_shell import shell_moments
+
+INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
+"""How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
+box's cuboid, or given numbers."""
+SCALE_LIMITS = (1e-9, 1e9)
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """mass [kg], center_of_mass (3,) [m, mesh axes, after scale], inertia (3, 3) [kg m², about the COM, mesh axes].
+
+    warnings: what the tensor check had to say. center_from_reference (3,) is center_of_mass minus ``reference`` (3,),
+    a point near the bounding box's centre; far from the origin it keeps the digits that center_of_mass can't hold.
+    """
+
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+    warnings: tuple[str, ...] = ()
+    reference: np.ndarray | None = None
+    center_from_reference: np.ndarray | None = None
+
+
+def scale_vector(scale) -> np.ndarray:
+    """One or three numbers as (3,); raises InputError unless each is nonzero with 1e-9 ≤ |s| ≤ 1e9."""
+    s = np.atleast_1d(np.asarray(scale, dtype=np.float64)).ravel()
+    if s.size == 1:
+        s = np.repeat(s, 3)
+    size = np.abs(s)
+    if s.size != 3 or not np.all((size >= SCALE_LIMITS[0]) & (size <= SCALE_LIMITS[1])):
+        raise InputError("scale", np.asarray(scale).tolist(), "one or three numbers, each with 1e-9 <= |s| <= 1e9")
+    return s
+
+
+def _matrix(six) -> np.ndarray:
+    return np.array([[six[0], six[1], six[2]], [six[1], six[3], six[4]], [six[2], six[4], six[5]]])
+
+
+def _tensor_of(second: np.ndarray) -> np.ndarray:
+    """Inertia tr(C) 1 − C of second moments C (3, 3); the diagonal as sums, so that nothing cancels."""
+    inertia = -second
+    for k in range(3):
+        inertia[k, k] = second[(k + 1) % 3, (k + 1) % 3] + second[(k + 2) % 3, (k + 2) % 3]
+    return inertia
+
+
+def _with_ballast(mass, center, second, ballast):
+    """Add point masses (m, position relative to the same reference as ``center``) to mass, COM and second moments."""
+    total = mass + sum(m for m, _ in ballast)
+    moved = (mass * center + sum((m * p for m, p in ballast), np.zeros(3))) / total
+    offset = center - moved
+    second = second + mass * np.outer(offset, offset)
+    for m, p in ballast:
+        second = second + m * np.outer(p - moved, p - moved)
+    return total, moved, second
+
+
+def _checked_ballast(ballast: Iterable) -> list[tuple[float, np.ndarray]]:
+    checked = []
+    for entry in ballast:
+        m, *position = (float(value) for value in entry)
+        if len(position) != 3 or not (0.0 <= m < math.inf) or not np.all(np.isfinite(position)):
+            raise InputError("ballast", list(entry), "mass >= 0 [kg] and x, y, z, all finite")
+        if m > 0.0:
+            checked.append((m, np.array(position)))
+    return checked
+
+
+class MeshMoments:
+    """A mesh's moments at unit density, each model's computed when first asked for and never again.
+
+    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``closed``
+    False says that the surface bounds no solid: the solid model, and a density, are then refused with
+    ``closed_reason``. A surface wound inward throughout is turned; ``turned`` says so.
+    """
+
+    def __init__(
+        self,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        polygon_starts: np.ndarray | None = None,
+        *,
+        closed: bool = True,
+        closed_reason: str = "an open surface",
+        name: str = "mesh",
+    ) -> None:
+        self.vertices = vertices
+        self.triangles = triangles
+        self.polygon_starts = polygon_starts
+        self.closed = closed
+        self.closed_reason = closed_reason
+        self.name = name
+        self._moments: dict[tuple, Moments] = {}
+
+    @property
+    def turned(self) -> bool:
+        """The file's surface is wound inward throughout; results are those of the outward one."""
+        return self.solid_raw().measure < 0.0
+
+    def solid_raw(self) -> Moments:
+        """The solid's signed moments as the file winds it; raises MeshError when the surface isn't closed."""
+        if not self.closed:
+            remedy = "a closed, consistently wound surface; --repair (mesh_repair), --fallback hull|box (mesh_fallback)"
+            raise MeshError(self.name, self.closed_reason, f"{remedy}, or another model with --mass (mass)")
+        return self._get(("solid",), lambda: solid_moments(self.vertices, self.triangles))
+
+    def _get(self, key: tuple, compute) -> Moments:
+        if key not in self._moments:
+            self._moments[key] = compute()
+        return self._moments[key]
+
+    def moments(self, model: str, scale=(1.0, 1.0, 1.0)) -> Moments:
+        """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for the shell alone.
+
+        A shell's area elements stretch by direction, so a non-uniform scale takes a new pass over the surface; it is
+        kept per ratio of the components. Its moments are then those of the shape stretched by scale/|scale_x|.
+        """
+        if model == "solid":
+            raw = self.solid_raw()
+            sign = math.copysign(1.0, raw.measure)
+            return Moments(sign * raw.measure, raw.reference, raw.center, raw.center_low, sign * raw.second, raw.path)
+        if model == "points":
+            return self._get(("points",), lambda: point_moments(self.vertices, self.triangles))
+        if model == "bounding_box":
+            return self._get(("bounding_box",), lambda: box_moments(self.vertices, self.triangles))
+        if model == "shell":
+            stretch = np.abs(scale_vector(scale))
+            stretch = stretch / stretch[0]
+            key = ("shell", *stretch.tolist())
+            return self._get(key, lambda: shell_moments(self.vertices * stretch, self.triangles, self.polygon_starts))
+        raise InputError("inertia_model", model, ", ".join(INERTIA_MODELS))
+
+    def body_mass(self, *, scale=(1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:
+        """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models."""
+        if not (0.0 <= mass < math.inf):
+            raise InputError("mass", mass, "a finite number >= 0 (0: density decides) [kg]")
+        if mass > 0.0:
+            return float(mass)
+        if not (0.0 < density < math.inf):
+            raise InputError("density", density, "a finite number > 0 [kg/m^3]")
+        body = float(density) * self.moments("solid").measure * float(np.prod(np.abs(scale_vector(scale))))
+        if not (1e-300 < body < math.inf):
+            raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
+        return body
+
+    def mass_properties(
+        self,
+        model: str = "solid",
+        *,
+        scale=(1.0, 1.0, 1.0),
+        mass: float = 0.0,
+        density: float = 1000.0,
+        ballast: Iterable = (),
+    ) -> MassProperties:
+        """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form on its ten numbers.
+
+        scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries
+        (m [kg], x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's.
+        Raises InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
+        """
+        if model not in INERTIA_MODELS or model == "explicit":
+            raise InputError("inertia_model", model, ", ".join(m for m in INERTIA_MODELS if m != "explicit"))
+        s = scale_vector(scale)
+        points = _checked_ballast(ballast)
+        moments = self.moments(model, s)
+        own = self.body_mass(scale=s, mass=mass, density=density)
+        # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
+        left = np.copysign(abs(s[0]), s) if model == "shell" else s
+        center = left * moments.center
+        second = _matrix(moments.second) * np.outer(left, left) * (own / moments.measure)
+        reference = left * moments.reference + 0.0  # no -0
+        total = own
+        if points:
+            points = [(m, s * (p - moments.reference * (left / s))) for m, p in points]
+            total, center, second = _with_ballast(own, center, second, points)
+        inertia = _tensor_of(second)
+        try:
+            warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
+        except TensorError as error:
+            raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
+        low = left * moments.center_low if not points else 0.0
+        return MassProperties(total, reference + (center + low), inertia, warnings, reference, center)
+
+
+def explicit_mass_properties(
+    mass: float, center_of_mass, tensor6, ballast: Iterable = (), scale=(1.0, 1.0, 1.0)
+) -> MassProperties:
+    """Given numbers as they are: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz, iyy, iyz,
+    izz) [kg m², about the COM]. ``scale`` moves the COM and the ballast with the picture; mass and tensor are final.
+    """
+    s = scale_vector(scale)
+    if not (0.0 < float(mass) < math.inf):
+        raise TensorError("explicit_inertia.mass", mass, "a finite number > 0 [kg]")
+    center = np.asarray(center_of_mass, dtype=np.float64)
+    if center.shape != (3,) or not np.all(np.isfinite(center)):
+        raise TensorError("explicit_inertia.center_of_mass", center.tolist(), "three finite numbers [mesh coordinates]")
+    if len(tuple(tensor6)) != 6:
+        raise TensorError("explicit_inertia.tensor", list(tensor6), "six numbers: ixx ixy ixz iyy iyz izz [kg m^2]")
+    inertia = tensor_from_six(tensor6)
+    warnings = check_tensor(inertia, source="explicit_inertia.tensor")
+    points = _checked_ballast(ballast)
+    if not points:
+        return MassProperties(float(mass), s * center, inertia, warnings, s * center, np.zeros(3))
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    points = [(m, s * (p - center)) for m, p in points]
+    total, moved, second = _with_ballast(float(mass), np.zeros(3), second, points)
+    inertia = _tensor_of(second)
+    warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
+    return MassProperties(total, s * center + moved, inertia, warnings, s * center, moved)
