@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""Integrators by name.
+
+An integrator takes the variables of a segment (core/motion.py) forward in time under the segment's problem
+(core/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone, and
+``advance`` commits only steps at full length, so that looking at the motion never changes it.
+"""
+
+from __future__ import annotations
+
+from ..errors import InputError
+from .integrator import Integrator
+from .rk4 import RK4
+
+INTEGRATORS: dict[str, Integrator] = {integrator.name: integrator for integrator in (RK4,)}
+
+
+def integrator_named(name: str) -> Integrator:
+    """The integrator of this name; raises InputError listing the names that exist."""
+    if name not in INTEGRATORS:
+        raise InputError("integrator", name, ", ".join(INTEGRATORS))
+    return INTEGRATORS[name]

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""Forces and torques on the body, and their sum as an integrator takes it.
+
+Three kinds of load differ on a turning body: a torque fixed in the world, a world force at a point of the body, and a force
+that turns with the body. Any number of each sums to the same few vectors, because the torque of world forces Fᵢ at body
+points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial vector of M R.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .body import Body
+from .errors import CommandRefused
+from .frames import Frame
+from .state import State
+from .surface import Surface
+
+MAX_ACCELERATION = 1e15
+"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it would leave no digits."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """One command's wrench, its point settled on the body.
+
+    axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,): the
+    inward normal there, for ``normal``. force [N, or N s for an impulse], torque about the point [N m, or N m s].
+    """
+
+    axes: str
+    mesh_point: tuple[float, float, float] | None
+    force: tuple[float, float, float]
+    torque: tuple[float, float, float]
+    mesh_normal: tuple[float, float, float] | None = None
+
+    @property
+    def is_zero(self) -> bool:
+        return not (any(self.force) or any(self.torque))
+
+    def arm(self, body: Body) -> np.ndarray:
+        """From the COM to the point of attack (3,) [m, body axes]."""
+        return np.zeros(3) if self.mesh_point is None else body.point(self.mesh_point)
+
+    def force_body(self, body: Body, state: State) -> np.ndarray:
+        """The force (3,) in body axes at this state."""
+        if self.axes == "world":
+            return _transposed_times(state.rotation, np.asarray(self.force))
+        return self._body_force(body)
+
+    def _body_force(self, body: Body) -> np.ndarray:
+        if self.axes == "normal":
+            return self.force[0] * body.normal(self.mesh_normal)
+        return np.asarray(self.force, dtype=float)
+
+    def check_magnitude(self, body: Body) -> None:
+        """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION.
+
+        A world wrench is judged over all attitudes: by |r||F| and the smallest principal moment.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            force = np.abs(self.force).max() * np.sqrt(3.0)
+            arm = np.abs(self.arm(body)).max() * np.sqrt(3.0)
+            torque = np.abs(self.torque).max() * np.sqrt(3.0) + arm * force
+            linear, angular = force / body.mass, torque / body.principal_moments[0]
+        # Negated, so that an overflow to NaN is refused too.
+        if not (linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION):
+            raise CommandRefused(
+                "magnitude",
+                "wrench",
+                f"{linear:.3g} m/s2 and {angular:.3g} rad/s2",
+                f"at most {MAX_ACCELERATION:g} of each for a body of {body.mass:g} kg",
+            )
+
+
+@dataclass
+class LoadSum:
+    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F world)."""
+
+    force_world: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    force_body: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    torque_world: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    torque_body: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    moment: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def add(self, load: Load, body: Body) -> None:
+        arm = load.arm(body)
+        if load.axes == "world":
+            force = np.asarray(load.force)
+            self.force_world += force
+            self.torque_world += load.torque
+            if load.mesh_point is not None:
+                self.moment += arm[:, None] * force
+        else:
+            force = load._body_force(body)
+            self.force_body += force
+            self.torque_body += load.torque
+            if load.mesh_point is not None:
+                self.torque_body += cross(arm, force)
+
+
+def apply_impulse(load: Load, body: Body, state: State) -> State:
+    """The state right after an impulse: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
+    R = state.rotation
+    if load.axes == "world":
+        impulse_world = np.asarray(load.force)
+        impulse_body, angular_body = _transposed_times(R, impulse_world), _transposed_times(R, np.asarray(load.torque))
+    else:
+        impulse_body, angular_body = load._body_force(body), np.asarray(load.torque)
+        impulse_world = (R * impulse_body).sum(axis=1)
+    if load.mesh_point is not None:
+        angular_body = angular_body + cross(load.arm(body), impulse_body)
+    row = state.row.copy()
+    if impulse_world.any():
+        row[7:10] += impulse_world / body.mass
+    if angular_body.any():
+        row[10:13] += body.angular_acceleration(angular_body)
+    return replace(state, row=row)
+
+
+def settle(
+    frame: Frame, force, torque, body: Body, surface: Surface | None, contacts: dict, state: State | None
+) -> Load:
+    """Settle a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
+
+    state None leaves a ray unsettled: it is checked again when it takes effect.
+    """
+    force, torque = tuple(float(f) for f in force), tuple(float(t) for t in torque)
+    if not np.isfinite([*force, *torque]).all():
+        raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
+    if frame.axes == "normal" and (any(force[1:]) or any(torque)):
+        raise CommandRefused("frame", "wrench", [*force, *torque], "force.x alone in normal axes")
+    mesh_point = _mesh_point(frame, body, surface, contacts, state)
+    mesh_normal = None
+    if frame.axes == "normal" and mesh_point is not None:
+        if surface is None:
+            raise CommandRefused("frame", "frame_id", frame.text, "normal axes only on a body with a mesh")
+        normal = surface.inward_normal(mesh_point)
+        if not normal.any():
+            raise CommandRefused("frame", "frame_id", frame.text, "a point where the surface has a normal")
+        mesh_normal = tuple(float(n) for n in normal)
+    return Load(frame.axes, mesh_point, force, torque, mesh_normal)
+
+
+def _mesh_point(frame, body, surface, contacts, state):
+    word, *values = frame.point
+    if word == "com":
+        return None
+    if word == "origin":
+        return (0.0, 0.0, 0.0)
+    if word == "contact":
+        return tuple(float(x) for x in contacts[values[0]])
+    if word == "point":
+        return values[0]
+    if surface is None:
+        raise CommandRefused("frame", "frame_id", frame.text, "this point only on a body with a mesh")
+    if word == "vertex":
+        if values[0] >= len(surface.vertices):
+            raise CommandRefused("frame", "frame_id", frame.text, f"vertex/0 to vertex/{len(surface.vertices) - 1}")
+        return tuple(float(x) for x in surface.vertices[values[0]])
+    if state is None:
+        return None
+    R = state.rotation
+    origin = body.mesh_point(_transposed_times(R, np.asarray(values[0]) - state.position))
+    direction = _transposed_times(R, np.asarray(values[1]) / np.abs(values[1]).max()) / body.scale
+    hit = surface.ray_hit(origin, direction)
+    if hit is None:
+        raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
+    return tuple(float(x) for x in hit[0])
+
+
+def cross(a, b) -> np.ndarray:
+    """a × b of two (3,) arrays."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _transposed_times(R, v) -> np.ndarray:
+    return R[0] * v[0] + R[1] * v[1] + R[2] * v[2]

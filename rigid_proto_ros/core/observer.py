@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""What a running simulation tells to whoever watches it: a viewer, a recorder, a test.
+
+The producer calls these methods from the thread that steps the body; an implementation buffers and returns at once.
+``Observer`` itself is the null object: a run that nobody watches calls nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+STATE_FIELDS = (
+    *("position.x", "position.y", "position.z"),
+    *("orientation.x", "orientation.y", "orientation.z", "orientation.w"),
+    *("linear_velocity.x", "linear_velocity.y", "linear_velocity.z"),
+    *("angular_velocity_body.x", "angular_velocity_body.y", "angular_velocity_body.z"),
+)
+"""Order of a state row: COM position [m, world], attitude xyzw (body to world), COM velocity [m/s, world], angular
+velocity [rad/s, body axes]."""
+
+
+@dataclass(frozen=True)
+class BodySnapshot:
+    """The body as it is from some simulated time on.
+
+    mass [kg], center_of_mass (3,) [m, mesh axes, after ``scale``], inertia (3, 3) [kg m², about the COM, body axes],
+    scale (3,), gravity (3,) [m/s², world], inertia_model by name, integrator by name, gyroscopic as configured.
+    """
+
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+    scale: np.ndarray
+    gravity: np.ndarray
+    inertia_model: str
+    integrator: str
+    gyroscopic: bool = True
+
+
+@dataclass(frozen=True)
+class ShownLoad:
+    """One command as it acts: ``kind`` is ``wrench``, ``poke`` or ``impulse``.
+
+    point (3,) [m, body axes from the COM] is where the force attacks; force [N or N s] and torque about that point
+    [N m or N m s] are in ``axes``, ``world`` or ``body``.
+    """
+
+    kind: str
+    axes: str
+    point: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+
+
+class Observer:
+    """Null object, and the interface: override what is of interest."""
+
+    def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
+        """A run begins: the scene as parameter-file text; vertices (n, 3) [mesh coordinates], triangles (m, 3)."""
+
+    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
+        """The body is this one from ``time_ns`` on; called once at the start and again at every change."""
+
+    def state(self, time_ns: int, row: np.ndarray) -> None:
+        """One published state; ``row`` (13,) float64 in STATE_FIELDS order is reused by the caller: copy it."""
+
+    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
+        """A wrench or poke begins to act; an impulse acts at this instant and has no end."""
+
+    def load_ended(self, time_ns: int, load_id: int) -> None:
+        """The load with this id acts no longer."""
+
+    def event(self, time_ns: int, line: str) -> None:
+        """One JSON line of the event log (command, parameter change, service), as applied."""
+
+    def refused(self, time_ns: int, reason: str, message: str) -> None:
+        """A command was refused."""
+
+    def reset(self) -> None:
+        """Simulated time starts again at 0."""
+
+    def close(self) -> None:
+        """No more calls follow; whatever is buffered goes out."""
+
+
+class Observers(Observer):
+    """Several observers as one."""
+
+    def __init__(self, *observers: Observer) -> None:
+        self.observers = observers
+
+
+def _forward(name: str):
+    def call(self, *args):
+        for observer in self.observers:
+            getattr(observer, name)(*args)
+
+    call.__name__ = name
+    call.__doc__ = getattr(Observer, name).__doc__
+    return call
+
+
+for _name in [n for n in vars(Observer) if not n.startswith("_")]:
+    setattr(Observers, _name, _forward(_name))

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""Unit quaternions, xyzw (scalar last), taking body axes to world axes: v_world = q v_body q*.
+
+Products and the matrix form follow Diebel, "Representing Attitude" (2006), section 6, with the scalar moved last.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from .errors import InputError
+
+
+@njit(cache=True)
+def multiply(ax, ay, az, aw, bx, by, bz, bw):
+    """Hamilton product a ⊗ b: first the rotation b, then a."""
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+@njit(cache=True)
+def rotate(qx, qy, qz, qw, vx, vy, vz):
+    """Turn v from body into world axes: v + 2w(u × v) + 2u × (u × v), u the vector part."""
+    tx = 2.0 * (qy * vz - qz * vy)
+    ty = 2.0 * (qz * vx - qx * vz)
+    tz = 2.0 * (qx * vy - qy * vx)
+    return (
+        vx + qw * tx + (qy * tz - qz * ty),
+        vy + qw * ty + (qz * tx - qx * tz),
+        vz + qw * tz + (qx * ty - qy * tx),
+    )
+
+
+@njit(cache=True)
+def rotate_inverse(qx, qy, qz, qw, vx, vy, vz):
+    """Turn v from world into body axes."""
+    return rotate(-qx, -qy, -qz, qw, vx, vy, vz)
+
+
+@njit(cache=True)
+def normalize(qx, qy, qz, qw):
+    """Scale to unit length."""
+    scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+    return qx * scale, qy * scale, qz * scale, qw * scale
+
+
+def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix (3, 3), body to world, of a unit quaternion q (4,) xyzw, or (n, 3, 3) of (n, 4)."""
+    x, y, z, w = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion (4,) xyzw of a proper rotation matrix (3, 3).
+
+    The largest of the four squared components is taken as the divisor (Shepperd 1978), so that no digits cancel.
+    """
+    R = np.asarray(R, dtype=float)
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    k = int(np.argmax([R[0, 0], R[1, 1], R[2, 2], trace]))
+    q = np.empty(4)
+    if k == 3:
+        q[:] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace
+    else:
+        i, j, m = k, (k + 1) % 3, (k + 2) % 3
+        q[i] = 1.0 + R[i, i] - R[j, j] - R[m, m]
+        q[j] = R[j, i] + R[i, j]
+        q[m] = R[m, i] + R[i, m]
+        q[3] = R[m, j] - R[j, m]
+    return np.array(normalize(q[0], q[1], q[2], q[3]))
+
+
+def unit_quaternion(q, field: str) -> np.ndarray:
+    """A given quaternion scaled to unit length; raises InputError when it has none.
+
+    One that is unit already, to rounding, is kept bit for bit, so that a dumped state is read back as it was.
+    """
+    q = np.asarray(q, dtype=float)
+    largest = np.abs(q).max() if q.shape == (4,) else math.nan
+    if not (math.isfinite(largest) and largest > 0.0):
+        raise InputError(field, q.tolist(), "four finite numbers x, y, z, w, not all zero")
+    if abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) <= 1e-15:
+        return q.copy()
+    q = q / largest
+    return np.array(normalize(q[0], q[1], q[2], q[3]))

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""Everything that parameters decide about the motion, already checked and in the core's own types."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .body import Body
+from .integrators.integrator import Integrator
+from .surface import Surface
+
+
+@dataclass(frozen=True)
+class Setup:
+    """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the mesh.
+    contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m s].
+    wrench_timeout_ns 0 holds for ever. initial (13,): the state row at time 0.
+    """
+
+    body: Body
+    inertia_model: str
+    surface: Surface | None
+    geometry: tuple
+    contacts: Mapping[str, tuple[float, float, float]]
+    gravity: np.ndarray
+    linear_damping: float
+    angular_damping: float
+    gyroscopic: bool
+    integrator: Integrator
+    step_ns: int
+    wrench_timeout_ns: int
+    poke_duration_ns: int
+    initial: np.ndarray
+    world_frame: str = "world"
+    body_frame: str = "body"

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: MIT
+"""The simulation: commands in, motion out.
+
+Simulated time is an integer number of nanoseconds. Commands cut it into segments (core/segment.py); within one, commands are
+constant and an integrator carries the body. ``advance`` is the whole story.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .observer import BodySnapshot, Observer, ShownLoad
+from .commands import Change, ClearWrench, Command, Pending, WrenchCommand
+from .errors import CommandRefused, InputError
+from .event_log import EventLog
+from .loads import Load, LoadSum, apply_impulse, cross, settle
+from .problem import make_problem
+from .segment import IntegrationFailed, Segment
+from .setup import Setup
+from .state import State
+
+NEVER = 1 << 63
+"""Later than any simulated time [ns]."""
+
+
+@dataclass
+class _Acting:
+    """A load that acts from begin_ns until end_ns."""
+
+    load: Load
+    begin_ns: int
+    end_ns: int
+    load_id: int
+
+
+class Simulation:
+    """One body under commands.
+
+    Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
+    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty.
+    """
+
+    def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
+        self.setup = setup
+        self.observer = observer or Observer()
+        self.events = EventLog()
+        self.refused: Counter[str] = Counter()
+        self._arrivals = 0
+        self._load_ids = 0
+        self._start_over()
+
+    # What a caller may ask
+
+    @property
+    def steps(self) -> int:
+        """Steps committed since start or reset; looking takes none."""
+        return self._finished_steps + self._segment.steps
+
+    @property
+    def force_evaluations(self) -> int:
+        """Evaluations of the equations of motion in those steps."""
+        return self.steps * self.setup.integrator.evaluations
+
+    @property
+    def potential_energy(self) -> float:
+        """−m g·x [J]."""
+        return -self.setup.body.mass * float((self.setup.gravity * self.state.position).sum())
+
+    @property
+    def kinetic_energy(self) -> float:
+        """½ m|v|² + ½ ωᵀIω [J]."""
+        return self.state.kinetic_energy(self.setup.body.mass, self.setup.body.inertia)
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """R I ω about the COM (3,) [N m s, world]."""
+        return self.state.angular_momentum(self.setup.body.inertia)
+
+    @property
+    def has_pending(self) -> bool:
+        """Commands wait for their time."""
+        return bool(self._pending)
+
+    @property
+    def at_rest(self) -> bool:
+        """Nothing moves, acts or is about to."""
+        row = self.state.row
+        still = not (row[7:].any() or self.setup.gravity.any())
+        return still and self._held is None and not self._pulses and not self._pending
+
+    # The way of a command
+
+    def submit(self, command: Command, at_ns: int | None = None) -> int:
+        """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
+
+        Raises CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
+        """
+        when_ns = self.time_ns if at_ns is None else max(at_ns, self.time_ns)
+        load = None
+        if isinstance(command, WrenchCommand):
+            load = self._settled(command, None)
+        self._arrivals += 1
+        pending = Pending(when_ns, command.rank, command.message, self._arrivals, command)
+        pending.load = None if load is None or command.frame.point[0] == "ray" else (load, self.setup.surface)
+        heapq.heappush(self._pending, pending)
+        return when_ns
+
+    def refuse(self, error: CommandRefused) -> None:
+        """Count a refusal and tell the observer."""
+        self.refused[error.reason] += 1
+        self.observer.refused(self.time_ns, error.reason, str(error))
+
+    def log(self, kind: str, content: dict) -> str:
+        """Append an event that doesn't touch the motion, such as a pause; returns its line."""
+        line = self.events.append(self.time_ns, kind, content)
+        self.observer.event(self.time_ns, line)
+        return line
+
+    def reset(self) -> None:
+        """Time 0, the initial state, no held wrench, no pulses, nothing scheduled; counters stay."""
+        for acting in self._acting():
+            self.observer.load_ended(self.time_ns, acting.load_id)
+        self.observer.reset()
+        self.events.reset()
+        self._start_over()
+        self.log("reset", {})
+
+    def announce(self) -> None:
+        """Tell the observer about the body as it is now."""
+        self.observer.body_changed(self.time_ns, self._snapshot())
+
+    def advance(self, until_ns: int) -> State:
+        """Carry the body to ``until_ns`` and return its state there, before what acts at that very time.
+
+        Running away (|x|, |v| or |ω| past 1e100) stops at the last good state and sets ``failure``.
+        """
+        if until_ns < self.time_ns:
+            raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
+        try:
+            # 1. Until the next command event: full steps, then one shorter step that ends exactly there.
+            while (event_ns := self._next_event_ns()) < until_ns:
+                self._segment.advance(event_ns)
+                # 2. Commands act; with new loads a new segment begins.
+                self._act(event_ns, self._segment.look(event_ns))
+            # 3. Full steps up to the time asked for, and a look at it that leaves no trace.
+            self._segment.advance(until_ns)
+            self.state = self._segment.look(until_ns)
+            self.time_ns = until_ns
+        except IntegrationFailed as failed:
+            self._stop_in_last_good_state(failed)
+        return self.state
+
+    # What happens at an event
+
+    def _next_event_ns(self) -> int:
+        event_ns = self._pending[0].time_ns if self._pending else NEVER
+        for acting in self._acting():
+            event_ns = min(event_ns, acting.end_ns)
+        return event_ns
+
+    def _acting(self) -> list[_Acting]:
+        return [*([self._held] if self._held else []), *self._pulses]
+
+    def _act(self, now_ns: int, state: State) -> None:
+        """Everything that ends or begins at ``now_ns``; a new segment if anything did."""
+        self.time_ns, self.state = now_ns, state
+        changed = self._end_loads(lambda acting: acting.end_ns <= now_ns)
+        while self._pending and self._pending[0].time_ns == now_ns:
+            pending = heapq.heappop(self._pending)
+            try:
+                self._apply(pending)
+                changed = True
+            except CommandRefused as refusal:
+                self.refuse(refusal)
+            except InputError as error:
+                self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
+        if changed:
+            self._segment.cut(now_ns)
+            self._finished_steps += self._segment.steps
+            self._segment = self._new_segment(self.state)
+
+    def _apply(self, pending: Pending) -> None:
+        command = pending.command
+        if isinstance(command, WrenchCommand):
+            self._begin_load(command, self._load_of(pending))
+        elif isinstance(command, ClearWrench):
+            self._end_loads(lambda acting: True)
+        elif isinstance(command, Change):
+            self._change(command.apply())
+        self.log(command.kind, command.content)
+
+    def _load_of(self, pending: Pending) -> Load:
+        """The load settled at submission, or settled anew when it was a ray or the mesh has changed since."""
+        if pending.load is not None and pending.load[1] is self.setup.surface:
+            pending.load[0].check_magnitude(self.setup.body)
+            return pending.load[0]
+        return self._settled(pending.command, self.state)
+
+    def _settled(self, command: WrenchCommand, state: State | None) -> Load:
+        setup = self.setup
+        load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
+        load.check_magnitude(setup.body)
+        return load
+
+    def _begin_load(self, command: WrenchCommand, load: Load) -> None:
+        self._load_ids += 1
+        if command.frame.impulse:
+            self.state = apply_impulse(load, self.setup.body, self.state)
+            self.observer.load_began(self.time_ns, self._load_ids, self._shown("impulse", load))
+            return
+        if command.held:
+            self._end_loads(lambda acting: acting is self._held)
+            if not load.is_zero:
+                self._held = _Acting(load, self.time_ns, NEVER, self._load_ids)
+                self._set_held_end()
+        else:
+            duration_s = command.frame.duration_s
+            duration_ns = self.setup.poke_duration_ns if duration_s is None else round(duration_s * 1e9)
+            self._pulses.append(_Acting(load, self.time_ns, self.time_ns + duration_ns, self._load_ids))
+        if not load.is_zero or not command.held:
+            self.observer.load_began(self.time_ns, self._load_ids, self._shown(command.kind, load))
+
+    def _set_held_end(self) -> None:
+        timeout_ns = self.setup.wrench_timeout_ns
+        self._held.end_ns = max(self._held.begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
+
+    def _end_loads(self, ends) -> bool:
+        ended = [acting for acting in self._acting() if ends(acting)]
+        for acting in ended:
+            self.observer.load_ended(self.time_ns, acting.load_id)
+            if acting is self._held:
+                self._held = None
+            else:
+                self._pulses.remove(acting)
+        return bool(ended)
+
+    def _change(self, new: Setup) -> None:
+        """Take another setup in flight. The same mesh at the same size stays where it is, so a COM that moves within it
+        takes position and velocity along; another mesh or size keeps the COM and its motion.
+        """
+        old, self.setup = self.setup, new
+        moved = new.body.center_of_mass - old.body.center_of_mass
+        if new.geometry == old.geometry and moved.any():
+            R = self.state.rotation
+            shift = (R * moved).sum(axis=1)
+            row = self.state.row.copy()
+            row[0:3] += shift
+            row[7:10] += cross(self.state.angular_velocity, shift)
+            self.state = replace(self.state, row=row)
+        if self._held is not None:
+            self._set_held_end()
+        self.announce()
+
+    # Segments
+
+    def _new_segment(self, start: State) -> Segment:
+        setup = self.setup
+        loads = LoadSum()
+        for acting in self._acting():
+            loads.add(acting.load, setup.body)
+        problem = make_problem(
+            setup.body,
+            loads,
+            setup.gravity,
+            setup.linear_damping,
+            setup.angular_damping,
+            setup.gyroscopic,
+            start,
+        )
+        return Segment(start, problem, setup.integrator, setup.step_ns)
+
+    def _start_over(self) -> None:
+        self._pending: list[Pending] = []
+        self._held: _Acting | None = None
+        self._pulses: list[_Acting] = []
+        self._finished_steps = 0
+        self.failure = ""
+        self.time_ns = 0
+        self.state = State(0, self.setup.initial.copy())
+        self._segment = self._new_segment(self.state)
+
+    def _stop_in_last_good_state(self, failed: IntegrationFailed) -> None:
+        if np.isfinite(failed.last_good.row).all() and failed.last_good.time_ns >= self.time_ns:
+            self.state = failed.last_good
+        self.time_ns = self.state.time_ns
+        self.failure = str(failed)
+        self._finished_steps += self._segment.steps
+        self._segment = self._new_segment(self.state)
+
+    # What observers are told
+
+    def _shown(self, kind: str, load: Load) -> ShownLoad:
+        body = self.setup.body
+        axes = "world" if load.axes == "world" else "body"
+        force = np.asarray(load.force) if axes == "world" else load.force_body(body, self.state)
+        return ShownLoad(kind, axes, load.arm(body), force, np.asarray(load.torque))
+
+    def _snapshot(self) -> BodySnapshot:
+        setup, body = self.setup, self.setup.body
+        return BodySnapshot(
+            body.mass,
+            body.center_of_mass,
+            body.inertia,
+            body.scale,
+            setup.gravity,
+            setup.inertia_model,
+            setup.integrator.name,
+            setup.gyroscopic,
+        )
