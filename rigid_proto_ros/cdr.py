@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Messages as bytes: little-endian CDR, as every ROS 2 middleware sends them, packed by ``struct`` alone.
+
+Packing bytes costs a tenth of filling a message object and serializing it. The layout (OMG DDS-XTYPES, plain CDR): a
+header 00 01 00 00; strings as length with their NUL, then the bytes; doubles aligned to 8 from the end of the header.
+"""
+
+from __future__ import annotations
+
+import struct
+
+_HEADER = b"\x00\x01\x00\x00"
+
+
+def _stamp_and_frame(stamp_ns: int, frame_id: str) -> bytes:
+    frame = frame_id.encode() + b"\0"
+    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    return struct.pack(f"<iII{len(frame)}s", seconds, nanoseconds, len(frame), frame)
+
+
+def _aligned(body: bytes, to: int) -> bytes:
+    return body + b"\0" * (-len(body) % to)
+
+
+def stamped_doubles(stamp_ns: int, frame_id: str, doubles) -> bytes:
+    """PoseStamped (7: x y z, x y z w), TwistStamped (6) or WrenchStamped (6): a header and doubles."""
+    body = _aligned(_stamp_and_frame(stamp_ns, frame_id), 8)
+    return _HEADER + body + struct.pack(f"<{len(doubles)}d", *doubles)
+
+
+def wrench_stamped(stamp_ns: int, frame_id: str, force, torque) -> bytes:
+    """A geometry_msgs/WrenchStamped."""
+    return stamped_doubles(stamp_ns, frame_id, (*force, *torque))
+
+
+def string(text: str) -> bytes:
+    """A std_msgs/String."""
+    data = text.encode() + b"\0"
+    return _HEADER + struct.pack(f"<I{len(data)}s", len(data), data)
+
+
+class StampedTemplate:
+    """One message kept as a buffer: only its stamp and its doubles are written anew.
+
+    count doubles follow the header (and, for nav_msgs/Odometry, a second frame id); zeros fill the gaps between ``parts``.
+    """
+
+    def __init__(self, frame_id: str, count: int, child_frame_id: str | None = None) -> None:
+        body = _stamp_and_frame(0, frame_id)
+        if child_frame_id is not None:
+            child = child_frame_id.encode() + b"\0"
+            body = _aligned(body, 4) + struct.pack(f"<I{len(child)}s", len(child), child)
+        body = _aligned(body, 8)
+        self._doubles_at = len(_HEADER) + len(body)
+        self.buffer = bytearray(_HEADER + body + bytes(8 * count))
+        self._stamp = struct.Struct("<iI")
+
+    def pack(self, stamp_ns: int, doubles, at: int = 0) -> bytearray:
+        """Write the stamp and doubles from number ``at`` on; returns the buffer, valid until the next call."""
+        self._stamp.pack_into(self.buffer, len(_HEADER), *divmod(stamp_ns, 1_000_000_000))
+        struct.pack_into(f"<{len(doubles)}d", self.buffer, self._doubles_at + 8 * at, *doubles)
+        return self.buffer
+
+
+ODOMETRY_TWIST_AT = 7 + 36
+"""Number of the double where an Odometry's twist begins: after the pose and its covariance."""
+
+ODOMETRY_DOUBLES = 7 + 36 + 6 + 36

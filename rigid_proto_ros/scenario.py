@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""From parameters to a body in motion: the one place where a scene becomes the core's Setup.
+
+The node, the offline run and replay all come through here, so that one scene means one motion.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import parameters
+from .core.body import make_body
+from .core.errors import InputError, MeshError
+from .core.inertia_tensor import check_tensor
+from .core.integrators import integrator_named
+from .core.mass_properties import MeshMoments, explicit_mass_properties, scale_vector
+from .core.mesh_topology_verdict import judge_surface
+from .core.rotation import matrix_from_quaternion, unit_quaternion
+from .core.setup import Setup
+from .core.state import state_row
+from .core.surface import Surface
+from .mesh_io import Mesh, load_mesh
+
+_MESH_PARAMETERS = ("mesh", "mesh_repair", "mesh_fallback")
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """A mesh with what is computed from it once: its moments, and its surface wound outward."""
+
+    mesh: Mesh
+    moments: MeshMoments
+    surface: Surface
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A complete, checked set of parameter values and what follows from them; immutable.
+
+    values: every parameter by name, in its own type. body_mesh: None without a mesh. warnings: one line each.
+    """
+
+    values: Mapping[str, object]
+    body_mesh: BodyMesh | None
+    setup: Setup
+    warnings: tuple[str, ...] = ()
+
+    def with_changes(self, changes: Mapping[str, object]) -> Scenario:
+        """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is."""
+        changes = parameters.convert_all(changes)
+        values = {**self.values, **changes}
+        if "density" in changes and "mass" not in changes:
+            values["mass"] = 0.0
+        reuse = all(values[name] == self.values[name] for name in _MESH_PARAMETERS)
+        return _build(values, self.body_mesh if reuse else _load(values))
+
+    @property
+    def text(self) -> str:
+        """The scenario as a parameter file that starts the same simulation."""
+        lines = [f"    {name}: {_yaml(value)}" for name, value in sorted(self.values.items())]
+        return "\n".join(["rigid_body:", "  ros__parameters:", *lines, ""])
+
+
+def make_scenario(values: Mapping[str, object]) -> Scenario:
+    """A scenario from some parameters, the others at their defaults; raises InputError or one of its family."""
+    complete = {**parameters.defaults(), **parameters.convert_all(values)}
+    return _build(complete, _load(complete))
+
+
+def _load(values) -> BodyMesh | None:
+    if values["mesh"] == "":
+        if values["inertia_model"] != "explicit":
+            raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
+        return None
+    mesh = load_mesh(values["mesh"])
+    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    if not verdict.usable:
+        raise MeshError("mesh", values["mesh"], verdict.reason)
+    moments = MeshMoments(
+        mesh.vertices,
+        mesh.triangles,
+        mesh.polygon_starts,
+        closed=verdict.closed,
+        closed_reason=verdict.reason,
+        name=mesh.name,
+    )
+    triangles = mesh.triangles[:, [0, 2, 1]] if verdict.inward else mesh.triangles
+    return BodyMesh(mesh, moments, Surface(mesh.vertices, np.ascontiguousarray(triangles)))
+
+
+def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:
+    scale = scale_vector(values["scale"])
+    properties = _mass_properties(values, body_mesh, scale)
+    check_tensor(properties.inertia)
+    body = make_body(properties.mass, properties.center_of_mass, properties.inertia, scale)
+    quaternion = unit_quaternion(values["initial.orientation_xyzw"], "initial.orientation_xyzw")
+    R = matrix_from_quaternion(quaternion)
+    w = np.asarray(values["initial.angular_velocity"])
+    omega_body = R[0] * w[0] + R[1] * w[1] + R[2] * w[2]
+    setup = Setup(
+        body=body,
+        inertia_model=values["inertia_model"],
+        surface=body_mesh.surface if body_mesh else None,
+        geometry=(body_mesh.mesh.sha256 if body_mesh else "", *scale.tolist()),
+        contacts={n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")},
+        gravity=np.asarray(values["gravity"]),
+        linear_damping=values["linear_damping"],
+        angular_damping=values["angular_damping"],
+        gyroscopic=values["gyroscopic"],
+        integrator=integrator_named(values["integrator"]),
+        step_ns=max(1, nanoseconds(values["step"])),
+        wrench_timeout_ns=nanoseconds(values["wrench_timeout"]),
+        poke_duration_ns=max(1, nanoseconds(values["poke_duration"])),
+        initial=state_row(values["initial.position"], quaternion, values["initial.linear_velocity"], omega_body),
+    )
+    return Scenario(values, body_mesh, setup, tuple(properties.warnings))
+
+
+def _mass_properties(values, body_mesh, scale):
+    ballast = [tuple(v) for n, v in sorted(values.items()) if n.startswith("ballast.")]
+    if values["inertia_model"] == "explicit":
+        given = (values[f"explicit_inertia.{part}"] for part in ("mass", "center_of_mass", "tensor"))
+        return explicit_mass_properties(*given, ballast=ballast, scale=scale)
+    if body_mesh is None:
+        raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
+    return body_mesh.moments.mass_properties(
+        values["inertia_model"], scale=scale, mass=values["mass"], density=values["density"], ballast=ballast
+    )
+
+
+def nanoseconds(seconds: float) -> int:
+    """Seconds to whole nanoseconds, to the nearest."""
+    return round(seconds * 1e9)
+
+
+def publication_ns(k: int, publish_rate: float) -> int:
+    """Simulated time of publication k: round(k·1e9/publish_rate), in integer arithmetic on the rate's exact value."""
+    numerator, denominator = publish_rate.as_integer_ratio()
+    return (2 * k * 1_000_000_000 * denominator + numerator) // (2 * numerator)
+
+
+def _yaml(value: object) -> str:
+    # JSON is YAML; repr keeps all digits, and a double keeps its point so that it is read back as one.
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return _double(value)
+    if isinstance(value, list):
+        return "[" + ", ".join(_double(v) for v in value) + "]"
+    return json.dumps(value)
+
+
+def _double(value: float) -> str:
+    text = repr(value)
+    return text if any(c in text for c in ".n") else text.replace("e", ".0e")

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Scene files: ROS parameter files, read without ROS and typed as rcl types them.
+
+A scene is the same file that starts the node with ``--params-file``. Plain scalars are a bool, an integer (also 0x10
+and 010), a double (also 1e-3, .inf, nan) or else text; quoted ones are text; a list must hold one type, as rcl wants it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+
+from .core.errors import InputError
+
+_TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
+_FALSE = {"N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
+_INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
+_DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
+_SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
+_HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\Z")
+
+MAX_BYTES = 16 << 20
+"""Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
+
+
+@dataclass
+class SceneFile:
+    """values: parameters by name for the node; wildcard: names that only ``/**`` sections gave."""
+
+    values: dict[str, object] = field(default_factory=dict)
+    wildcard: set[str] = field(default_factory=set)
+
+
+def scalar(text: str):
+    """A plain YAML scalar as rcl types it."""
+    if text in _TRUE:
+        return True
+    if text in _FALSE:
+        return False
+    if _INTEGER.match(text):
+        digits = text.lstrip("+-")
+        base = 16 if digits[:2] in ("0x", "0X") else 8 if digits[0] == "0" and len(digits) > 1 else 10
+        try:
+            value = int(digits, base) * (-1 if text[0] == "-" else 1)
+        except ValueError:  # 09 is no octal number; strtod then reads it as 9.0
+            return float(text)
+        return value if -(1 << 63) <= value < 1 << 63 else float(value)
+    if _DOUBLE.match(text):
+        return float(text)
+    if _SPECIAL.match(text):
+        return float(text.replace(".", ""))
+    if _HEX_DOUBLE.match(text):
+        try:
+            return float.fromhex(text)
+        except ValueError:
+            return text
+    return text
+
+
+def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
+    """Read the sections for this node, later ones winning; raises InputError naming file, line and remedy."""
+    path = Path(path)
+    root = compose_yaml(path)
+    scene = SceneFile()
+    if root is None:
+        return scene
+    if not isinstance(root, yaml.MappingNode):
+        raise _refused(path, root, "a mapping such as rigid_body: {ros__parameters: {...}}")
+    sections = {"/**", node_name, f"/{node_name}", f"/**/{node_name}"}
+    named: set[str] = set()
+    for key, section in root.value:
+        if not isinstance(section, yaml.MappingNode):
+            raise _refused(path, section, "a section such as rigid_body: {ros__parameters: {...}}")
+        for inner, parameters in section.value:
+            if inner.value != "ros__parameters":
+                if isinstance(parameters, yaml.MappingNode):
+                    continue  # a node in a namespace: not this one
+                raise _refused(path, inner, "ros__parameters: under the node's name")
+            values: dict[str, object] = {}
+            _collect(path, parameters, "", values)
+            if key.value not in sections:
+                continue
+            scene.values.update(values)
+            if key.value != "/**":
+                named |= values.keys()
+    scene.wildcard = scene.values.keys() - named
+    return scene
+
+
+def compose_yaml(path: Path) -> yaml.Node | None:
+    """The YAML tree of a file, with lines; raises InputError when it can't be read."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(str(path), f"{path.stat().st_size} bytes", f"a YAML file of at most {MAX_BYTES} bytes")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), error.strerror, "a readable YAML file") from None
+    except UnicodeDecodeError:
+        raise InputError(str(path), "bytes that aren't UTF-8", "a YAML file") from None
+    return compose_text(text, str(path))
+
+
+def compose_text(text: str, name: str) -> yaml.Node | None:
+    """The YAML tree of a text; ``name`` stands in errors."""
+    try:
+        return yaml.compose(text, Loader=yaml.SafeLoader)
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        where = f"{name}, line {mark.line + 1}" if mark else name
+        raise InputError(where, problem, "valid YAML") from None
+
+
+def _collect(path, node, prefix, values) -> None:
+    if not isinstance(node, yaml.MappingNode):
+        raise _refused(path, node, "name: value lines under ros__parameters")
+    for key, value in node.value:
+        name = f"{prefix}{key.value}"
+        if isinstance(value, yaml.MappingNode):
+            _collect(path, value, f"{name}.", values)
+        elif isinstance(value, yaml.SequenceNode):
+            values[name] = _sequence(path, value)
+        elif value.style is None and value.value == "":
+            raise _refused(path, key, f"a value behind {name}:")
+        else:
+            values[name] = _typed(value)
+
+
+def _typed(node: yaml.ScalarNode):
+    return scalar(node.value) if node.style is None else node.value
+
+
+def _sequence(path, node) -> list:
+    items = []
+    for item in node.value:
+        if isinstance(item, yaml.MappingNode):
+            raise _refused(path, item, "a list of plain values")
+        # rcl reads nested lists as one long list.
+        items.extend(_sequence(path, item) if isinstance(item, yaml.SequenceNode) else [_typed(item)])
+    if len({type(item) for item in items}) > 1:
+        raise _refused(path, node, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]")
+    return items
+
+
+def _refused(path, node, accepted) -> InputError:
+    received = node.value if isinstance(node, yaml.ScalarNode) else node.tag.rsplit(":", 1)[-1]
+    return InputError(f"{path}, line {node.start_mark.line + 1}", received, accepted)
