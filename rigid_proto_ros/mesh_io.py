@@ -5,17 +5,33 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numba import njit
 
+from rigid_proto_ros import mesh_cache
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_obj import read_obj
+from rigid_proto_ros.mesh_off import read_off
+from rigid_proto_ros.mesh_ply import read_ply
+from rigid_proto_ros.mesh_stl import is_ascii_stl, read_stl
 
 BODIES = Path(__file__).parent / "bodies"
 """Folder of the bundled meshes."""
+OWN_FORMATS = ("obj", "off", "ply", "stl")
+"""Formats read here: trimesh 5.2 misreads some of them (interleaved negative .obj indices, tab-separated .obj, quad
+.off, strips in .ply), joins polygons' triangles, and takes several times as long."""
+FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
+"""All readable formats; those beyond OWN_FORMATS go through trimesh, which may ask for further packages."""
+MAX_TRIANGLES = 20_000_000
+"""Default limit: about 1.5 GB of arrays."""
+BYTES_PER_TRIANGLE = 400
+"""A file larger than this a triangle of the limit is refused unread; .obj text with normals takes about 150."""
+CACHED_SIZE = 1_000_000
+"""Files from this many bytes on are kept parsed: below, parsing takes a few milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +92,7 @@ def resolve_mesh(name: str) -> Path:
             if path.is_file():
                 return path.resolve()
         raise MeshError("mesh", name, f"a file in the package; there is no {candidates[0]}")
-    if name.startswith("file://"):
-        name = name[len("file://") :]
+    name = name.removeprefix("file://")
     path = Path(name).expanduser()
     if path.is_file():
         return path.resolve()
@@ -124,20 +139,90 @@ def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, n
     return triangles, polygon_starts
 
 
-def load_mesh(name: str) -> Mesh:
+def _sniff(data: bytes) -> str:
+    """The format that a file's first bytes betray: ``ply``, ``off``, ``stl``, ``glb``, ``zip``, or "" for unknown."""
+    head = data[:400].lstrip()
+    if head.startswith(b"ply") and data[3:4] in (b"\n", b"\r"):
+        return "ply"
+    if re.match(rb"(ST)?C?N?4?n?OFF\b", head):
+        return "off"
+    if head.startswith(b"glTF"):
+        return "glb"
+    if head.startswith(b"PK\x03\x04"):
+        return "zip"
+    if is_ascii_stl(data):
+        return "stl"
+    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return "stl"
+    return ""
+
+
+def _read(data: bytes, path: Path, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Vertices, triangles and polygon starts of a file's bytes, by its extension."""
+    suffix = path.suffix.lower().lstrip(".")
+    if suffix not in FORMATS:
+        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}")
+    if not data.strip():
+        raise MeshError("mesh", path.name, "a mesh; the file is empty")
+    found = _sniff(data)
+    if found and found != suffix and suffix in OWN_FORMATS:
+        raise MeshError("mesh", path.name, f"a .{suffix} file; its content looks like .{found}, so rename it")
+    if suffix == "stl":
+        vertices, triangles = read_stl(data, path.name, max_triangles)
+        return vertices, triangles, None
+    if suffix not in OWN_FORMATS:
+        return *_read_with_trimesh(path, max_triangles), None
+    reader = {"obj": read_obj, "off": read_off, "ply": read_ply}[suffix]
+    vertices, corners, starts = reader(data, path.name, max_triangles)
+    if len(corners) - 2 * (len(starts) - 1) > max_triangles:
+        count = len(corners) - 2 * (len(starts) - 1)
+        raise MeshError(path.name, f"{count} triangles", f"at most {max_triangles}; --max-triangles raises the limit")
+    return vertices, *fan_polygons(corners, starts)
+
+
+def _read_with_trimesh(path: Path, max_triangles: int) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of the scene in a file that trimesh reads, its nodes' transforms applied."""
+    import trimesh
+
+    try:
+        mesh = trimesh.load(path, process=False, maintain_order=True, skip_materials=True, force="mesh")
+        vertices = np.array(mesh.vertices, dtype=np.float64)
+        triangles = np.array(mesh.faces, dtype=np.int64)
+    except Exception as error:  # a foreign reader fails in as many ways as files are broken
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise MeshError("mesh", path.name, f"a file that trimesh {trimesh.__version__} reads ({reason})") from None
+    if len(triangles) > max_triangles:
+        raise MeshError(
+            path.name, f"{len(triangles)} triangles", f"at most {max_triangles}; --max-triangles raises the limit"
+        )
+    return vertices, triangles
+
+
+def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES) -> Mesh:
     """The mesh that ``name`` stands for, exactly as the file has it.
 
-    Raises MeshError naming the file and what is wrong with it.
+    ``max_triangles`` guards against files that would fill the memory. A large file is parsed once and then read from
+    the cache by its content's hash. Raises MeshError naming the file and what is wrong with it.
     """
     path = resolve_mesh(name)
     try:
+        size = path.stat().st_size
+        if size > BYTES_PER_TRIANGLE * max_triangles:
+            limit = f"at most {BYTES_PER_TRIANGLE * max_triangles}, enough for {max_triangles} triangles"
+            raise MeshError("mesh", f"{path.name}: {size} bytes", f"{limit}; --max-triangles raises the limit")
         data = path.read_bytes()
     except OSError as error:
         raise MeshError("mesh", str(path), f"a readable file ({error.strerror})") from None
-    if path.suffix.lower() != ".obj":
-        raise MeshError("mesh", path.name, "a .obj file")
-    vertices, corners, starts = read_obj(data, path.name)
-    if len(corners) == 0:
+    sha256 = hashlib.sha256(data).hexdigest()
+    key = f"{sha256}-{path.suffix.lower().lstrip('.')}"
+    kept = mesh_cache.load_arrays(key) if len(data) >= CACHED_SIZE else None
+    if kept is not None and len(kept["triangles"]) <= max_triangles:
+        vertices, triangles, polygon_starts = kept["vertices"], kept["triangles"], kept.get("polygon_starts")
+    else:
+        vertices, triangles, polygon_starts = _read(data, path, max_triangles)
+        if len(data) >= CACHED_SIZE:
+            polygons = {} if polygon_starts is None else {"polygon_starts": polygon_starts}
+            mesh_cache.store_arrays(key, vertices=vertices, triangles=triangles, **polygons)
+    if len(triangles) == 0:
         raise MeshError(path.name, "no faces", "a surface: at least one face")
-    triangles, polygon_starts = fan_polygons(corners, starts)
-    return Mesh(path.stem, str(path), vertices, triangles, polygon_starts, hashlib.sha256(data).hexdigest())
+    return Mesh(path.stem, str(path), vertices, triangles, polygon_starts, sha256)

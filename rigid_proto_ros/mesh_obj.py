@@ -110,17 +110,21 @@ def _read(buffer, vertices, corners, starts, slow):
     return _OK, 0, vertex, polygon, slow_count
 
 
-def read_obj(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices (n, 3) float64, polygon corners (c,) int64 and their starts (p + 1,) of the file's bytes.
 
     Raises MeshError with the file's name and line.
     """
+    if b"\0" in data[:4096]:
+        raise MeshError(name, "binary content", "an .obj file, which is text")
     if b"\\\n" in data or b"\\\r\n" in data:
         data = data.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
     if b"\n" not in data and b"\r" in data:
         data = data.replace(b"\r", b"\n")
     buffer = np.frombuffer(data, dtype=np.uint8)
     n, p, c = _count(buffer)
+    if c - 2 * p > max_triangles:
+        raise MeshError(name, f"{c - 2 * p} triangles", f"at most {max_triangles}; --max-triangles raises the limit")
     vertices = np.empty((n, 3))
     corners = np.empty(c, np.int64)
     starts = np.empty(p + 1, np.int64)

@@ -103,3 +103,50 @@ def float_of(token: bytes) -> float | None:
 def line_of(data: bytes, position: int) -> int:
     """1-based number of the line that holds byte ``position``."""
     return data.count(b"\n", 0, position) + 1
+
+
+@njit(cache=True, nogil=True)
+def _numbers(buffer, i, values, slow):
+    """Read blank or newline separated numbers from i until ``values`` is full; returns (read, slow tokens, end)."""
+    end = buffer.shape[0]
+    count = slow_count = 0
+    while count < values.shape[0]:
+        while i < end and (is_blank(buffer[i]) or buffer[i] == 10):
+            i += 1
+        first = i
+        value, i, status = read_number(buffer, i, end)
+        if status == MISSING:
+            break
+        if status == NEEDS_FLOAT:
+            if slow_count == slow.shape[0]:
+                grown = np.empty((2 * slow.shape[0], 3), np.int64)
+                grown[:slow_count] = slow
+                slow = grown
+            slow[slow_count, 0] = count
+            slow[slow_count, 1] = first
+            slow[slow_count, 2] = i
+            slow_count += 1
+        values[count] = value
+        count += 1
+    return count, slow[:slow_count], i
+
+
+def read_numbers(data: bytes, start: int, limit: int) -> tuple[np.ndarray, int | None]:
+    """Up to ``limit`` numbers (k,) float64 from byte ``start`` on, and the position of the first token that is none.
+
+    The position is None when all tokens read are numbers; the values from a bad token on are to be ignored.
+    """
+    values = np.empty(max(0, min(limit, (len(data) - start + 1) // 2)))
+    count, slow, _ = _numbers(np.frombuffer(data, np.uint8), start, values, np.empty((1024, 3), np.int64))
+    for index, first, stop in slow.tolist():
+        value = float_of(data[first:stop])
+        if value is None:
+            return values[:index], first
+        values[index] = value
+    return values[:count], None
+
+
+def excerpt(data: bytes, position: int) -> str:
+    """The rest of the line at ``position`` for a message: at most 40 printable characters."""
+    text = data[position : position + 40].split(b"\n")[0].decode("ascii", "replace").strip()
+    return "".join(c if c.isprintable() else "?" for c in text)
