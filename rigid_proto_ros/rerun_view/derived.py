@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Energies and angular momentum of many states at once, for plots.
+
+States are rows (n, 13) in ``core.observer.STATE_FIELDS`` order: COM position, attitude xyzw, COM velocity (world), angular
+velocity (body axes).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_proto_ros.core.observer import BodySnapshot
+
+
+@dataclass(frozen=True)
+class Derived:
+    """Per state, all float64: energies (n, 4) [J] translational, rotational, potential, total;
+    angular_momentum (n, 3) [kg m²/s, world, about the COM]."""
+
+    energies: np.ndarray
+    angular_momentum: np.ndarray
+
+
+def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """R (n, 3, 3), body to world, of unit quaternions xyzw (n, 4)."""
+    x, y, z, w = quaternions.T
+    R = np.empty((len(quaternions), 3, 3))
+    R[:, 0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    R[:, 0, 1] = 2.0 * (x * y - w * z)
+    R[:, 0, 2] = 2.0 * (x * z + w * y)
+    R[:, 1, 0] = 2.0 * (x * y + w * z)
+    R[:, 1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    R[:, 1, 2] = 2.0 * (y * z - w * x)
+    R[:, 2, 0] = 2.0 * (x * z - w * y)
+    R[:, 2, 1] = 2.0 * (y * z + w * x)
+    R[:, 2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    return R
+
+
+def to_world(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """R (n, 3, 3) applied to body vectors (n, 3) or (3,)."""
+    return np.einsum("nij,j->ni" if vectors.ndim == 1 else "nij,nj->ni", R, vectors)
+
+
+def derive(rows: np.ndarray, body: BodySnapshot) -> Derived:
+    """Energies and angular momentum of states (n, 13) of one body."""
+    position, quaternion, velocity, w = rows[:, 0:3], rows[:, 3:7], rows[:, 7:10], rows[:, 10:13]
+    L_body = np.einsum("ij,nj->ni", body.inertia, w)
+    translational = 0.5 * body.mass * np.einsum("ni,ni->n", velocity, velocity)
+    rotational = 0.5 * np.einsum("ni,ni->n", w, L_body)
+    potential = -body.mass * np.einsum("i,ni->n", body.gravity, position)
+    energies = np.column_stack(
+        [translational, rotational, potential, translational + rotational + potential],
+    )
+    return Derived(energies, to_world(rotation_matrices(quaternion), L_body))
+
+
+def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Angle [rad] between reference (3,) and vectors (n, 3), accurate near 0 and π; 0 where either vanishes."""
+    return np.arctan2(np.linalg.norm(np.cross(reference, vectors), axis=1), vectors @ reference)
+
+
+def carried_along(row: np.ndarray, seconds: float) -> np.ndarray:
+    """The state (13,) a short time after ``row``, its twist held: for pictures between two published states."""
+    later = row.copy()
+    later[0:3] += seconds * row[7:10]
+    turn = 0.5 * seconds * row[10:13]
+    angle = float(np.linalg.norm(turn))
+    axis_part = turn * (np.sin(angle) / angle if angle > 0.0 else 1.0)
+    x, y, z, w = row[3:7]
+    a, b, c, d = *axis_part, np.cos(angle)
+    later[3:7] = (
+        w * a + x * d + y * c - z * b,
+        w * b - x * c + y * d + z * a,
+        w * c + x * b - y * a + z * d,
+        w * d - x * a - y * b - z * c,
+    )
+    return later

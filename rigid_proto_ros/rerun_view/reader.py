@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Reading a recording back: exact states, event lines, scene and mesh."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.recorded_session import RecordedSession
+from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.rrd_file import whole_bytes, whole_part
+
+STATES = "Scalars:scalars"
+TEXT = "TextLog:text"
+
+
+def read_session(path: str | Path) -> RecordedSession:
+    """Everything needed to look at a recorded run again or compute it anew.
+
+    Files that were never finished or were cut are read as far as they are whole. Raises InputError for a file that
+    isn't there, isn't an .rrd, holds nothing whole, or was damaged inside.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        kept, complete = whole_bytes(path)
+    except OSError as error:
+        raise InputError("session", str(path), f"a recording that can be read ({error.strerror})") from error
+    session = RecordedSession(complete=complete, readable_bytes=size if complete else kept, file_bytes=size)
+    try:
+        _read(path, session)
+    except RuntimeError:
+        # Also a file whose index was cut: all frames are whole, but the reader wants none of it.
+        session = RecordedSession(complete=False, readable_bytes=kept, file_bytes=size)
+        with whole_part(path) as whole:
+            try:
+                _read(whole, session)
+            except RuntimeError as error:
+                reason = (str(error).splitlines() or [""])[-1].replace(str(whole), str(path))
+                raise InputError("session", str(path), f"an undamaged recording ({reason})") from error
+    return session
+
+
+def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:
+    """(entity, static, pyarrow record batch) of every chunk of the newest recording in the file."""
+    from rerun.chunk import RrdReader
+
+    with warnings.catch_warnings():
+        # The missing index of an unfinished file is our concern, not the reader's.
+        warnings.simplefilter("ignore")
+        reader = RrdReader(path)
+        recordings = reader.recordings()
+        if not recordings:
+            return
+        for chunk in reader.stream(store=recordings[-1]):
+            yield chunk.entity_path.lstrip("/"), chunk.is_static, chunk.to_record_batch()
+
+
+def _read(path: Path, session: RecordedSession) -> None:
+    times, rows = [], []
+    events: list[tuple[int, str]] = []
+    refusals: list[tuple[int, str]] = []
+    for entity, _, batch in record_batches(path):
+        if entity == e.STATE:
+            times.append(_sim_times(batch))
+            rows.append(_flat(batch, STATES).reshape(-1, 13))
+        elif entity in (e.EVENTS, e.REFUSAL_LOG):
+            target = events if entity == e.EVENTS else refusals
+            texts = [cell[0] for cell in batch.column(TEXT).to_pylist()]
+            target.extend(zip(_sim_times(batch).tolist(), texts, strict=True))
+        elif entity == e.SCENE:
+            session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
+        elif entity == e.BODY_MESH and "Mesh3D:vertex_positions" in batch.schema.names:
+            session.mesh_chunks += 1
+        elif entity == e.SESSION_MESH:
+            session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
+            session.vertices = _flat(batch, "vertices").reshape(-1, 3)
+            session.triangles = _flat(batch, "triangles").reshape(-1, 3)
+    session.events, session.refusals = events, refusals
+    if times:
+        session.times, session.rows = np.concatenate(times), np.concatenate(rows)
+
+
+def _sim_times(batch: Any) -> np.ndarray:
+    return batch.column(e.SIM_TIME).to_numpy(zero_copy_only=False).astype("timedelta64[ns]").astype(np.int64)
+
+
+def _flat(batch: Any, column: str) -> np.ndarray:
+    """All values of a column of lists, in order."""
+    return batch.column(column).flatten().to_numpy(zero_copy_only=False)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of a recorded flight without a display."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.recorded_session import RecordedSession
+from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.rerun_view.rrd_file import whole_part
+from rigid_proto_ros.rerun_view.viewers import ViewerProcess, open_headless
+
+START_TIMEOUT_S = 60.0
+LOAD_TIMEOUT_S = 120.0
+DRAWN_STEADY_S = 10.0
+"""How long a picture may keep changing (plots load, the camera settles) before it is taken as it is."""
+
+DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
+
+
+def take_picture(
+    session_path: str | Path, at_s: float, picture: str | Path, view: str = "", size: tuple[int, int] = (1600, 900)
+) -> None:
+    """Write a .png of the recording at simulated time ``at_s``: the whole layout, or the view of this name.
+
+    Raises InputError for a time that wasn't recorded, a view that isn't there, a picture that can't be written, and a
+    machine without the drivers.
+    """
+    session_path, picture = Path(session_path), Path(picture).absolute()
+    session = read_session(session_path)
+    check_time(session, at_s)
+    if not picture.parent.is_dir() or picture.suffix.lower() != ".png":
+        raise InputError("-o", str(picture), "the path of a .png file in an existing folder")
+    with ExitStack() as stack:
+        readable = session_path.absolute() if session.complete else stack.enter_context(whole_part(session_path))
+        client = stack.enter_context(headless_viewer(*size))
+        show(client, readable)
+        client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
+        view_id = _view_id(client, view) if view else None
+        pixels = _settled(client, view_id)
+        if view_id is not None:
+            # A single view would come without its surroundings' background; the same pixels are all that's needed.
+            pixels = client.take_screenshot(view_id)
+        if is_blank(pixels):
+            raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
+        try:
+            picture.write_bytes(pixels)
+        except OSError as error:
+            raise InputError("-o", str(picture), f"a path that can be written ({error.strerror})") from error
+
+
+def check_time(session: RecordedSession, at_s: float) -> None:
+    """Raise InputError unless the session has states around ``at_s``."""
+    if not len(session.times):
+        raise InputError("session", "no states", "a recording that holds states")
+    begin, end = 1e-9 * int(session.times[0]), 1e-9 * session.end_ns
+    if not (np.isfinite(at_s) and begin <= at_s <= end):
+        raise InputError("--at", at_s, f"a time within the recording, {begin:g} to {end:g} s")
+
+
+@contextmanager
+def headless_viewer(width: int, height: int) -> Iterator[Any]:
+    """A viewer without a window, on loopback, ended on leaving; yields its ``ViewerClient``."""
+    from rerun.experimental import ViewerClient
+
+    port = any_free_port()
+    with tempfile.TemporaryFile() as log:
+        try:
+            process = open_headless(port, width, height, log.fileno())
+        except FileNotFoundError as error:
+            raise InputError("snapshot", "no viewer", str(error)) from error
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
+            _wait_until_up(client, process, log)
+            yield client
+        finally:
+            process.stop()
+
+
+def _wait_until_up(client: Any, process: ViewerProcess, log: Any) -> None:
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while process.running and time.monotonic() < deadline:
+        try:
+            client.get_state()
+            return
+        except Exception:
+            # Not listening yet; the client raises errors of several kinds.
+            time.sleep(0.1)
+    log.seek(0)
+    words = log.read().decode(errors="replace")
+    if "graphics adapter" in words or "adapter" in words.lower():
+        raise InputError("snapshot", "no graphics adapter", DRIVERS)
+    last = (words.strip().splitlines() or ["no message"])[-1]
+    raise InputError("snapshot", last, f"a viewer that starts; if it is the drivers: {DRIVERS}")
+
+
+def show(client: Any, recording: Path) -> None:
+    """Open a recording in the viewer and wait until it is loaded."""
+    client.open(str(recording.absolute()))
+    deadline = time.monotonic() + LOAD_TIMEOUT_S
+    while time.monotonic() < deadline:
+        state = client.get_state()
+        loaded = any(timeline.name == e.SIM_TIME for r in state.recordings for timeline in r.timelines)
+        if loaded and not state.loading and state.views:
+            return
+        time.sleep(0.1)
+    raise InputError("session", str(recording), f"a recording that the viewer loads within {LOAD_TIMEOUT_S:g} s")
+
+
+def view_errors(client: Any) -> list[str]:
+    """What the views shown at present report as failed."""
+    return [
+        f"{view.name}: {report.severity}: {report.summary}"
+        for view in client.get_state().views
+        for report in view.reports
+    ]
+
+
+def _view_id(client: Any, name: str) -> str:
+    views = {view.name: view.view_id for view in client.get_state().views}
+    for known, view_id in views.items():
+        if known.lower() == name.lower():
+            return view_id
+    raise InputError("--view", name, "one of " + ", ".join(sorted(views)))
+
+
+def _settled(client: Any, view_id: str | None) -> bytes:
+    """A screenshot of the whole window once two in a row are alike (the first ones still load)."""
+    deadline = time.monotonic() + DRAWN_STEADY_S
+    before = client.take_screenshot()
+    while True:
+        time.sleep(0.3)
+        after = client.take_screenshot()
+        if after == before and not is_blank(after) or time.monotonic() > deadline:
+            return after
+        before = after
+
+
+def is_blank(png: bytes) -> bool:
+    """Whether a picture is one colour all over, give or take."""
+    import io
+
+    from PIL import Image
+
+    with Image.open(io.BytesIO(png)) as image:
+        pixels = np.asarray(image.convert("RGB").resize((128, 128)), dtype=float)
+    return float(pixels.std(axis=(0, 1)).max()) < 1.0

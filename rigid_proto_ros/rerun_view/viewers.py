@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Viewer processes: the web viewer's server and the native window. Missing ones are a warning, not an error."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import quote
+
+from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+
+STOP_TIMEOUT_S = 1.0
+
+
+def viewer_program() -> str | None:
+    """Path of the ``rerun`` program: the one that came with the library, else the one on PATH."""
+    found = importlib.util.find_spec("rerun_cli")
+    for folder in (found.submodule_search_locations or []) if found else []:
+        program = Path(folder) / ("rerun.exe" if sys.platform == "win32" else "rerun")
+        if program.is_file():
+            return str(program)
+    return shutil.which("rerun")
+
+
+def has_display() -> bool:
+    """Whether a window could open."""
+    return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+class ViewerProcess:
+    """A viewer that was started here, and that ends with ``stop``."""
+
+    def __init__(self, *arguments: str, log: int = subprocess.DEVNULL) -> None:
+        program = viewer_program()
+        if program is None:
+            raise FileNotFoundError("the rerun viewer program is not installed (pip install rerun-sdk)")
+        # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture.
+        environment = {**os.environ, "RERUN_APP_ONLY": "true"}
+        self.process = subprocess.Popen(
+            [program, *arguments], stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment
+        )
+
+    @property
+    def running(self) -> bool:
+        """Whether the process hasn't ended."""
+        return self.process.poll() is None
+
+    def stop(self) -> None:
+        """End the process, kindly and then not."""
+        if not self.running:
+            return
+        self.process.terminate()
+        try:
+            self.process.wait(STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+def serve_web(web_port: int, stream_address: str) -> tuple[ViewerProcess, str]:
+    """Serve the web viewer on loopback; returns its process and the address to open, which shows the stream.
+
+    A process of its own because the library's server inside this one would listen on all interfaces.
+    """
+    process = ViewerProcess(
+        *("--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(web_port)),
+        *("--port", str(any_free_port()), stream_address),
+    )
+    return process, f"http://{LOOPBACK}:{web_port}/?url={quote(stream_address, safe='')}"
+
+
+def open_native(stream_address: str) -> ViewerProcess:
+    """Open the native viewer's window on the stream."""
+    return ViewerProcess("--bind", LOOPBACK, "--port", str(any_free_port()), "--connect", stream_address)
+
+
+def open_headless(port: int, width: int, height: int, log: int = subprocess.DEVNULL) -> ViewerProcess:
+    """A viewer without a window that is driven through ``port`` on loopback."""
+    return ViewerProcess(
+        *("--headless", "--bind", LOOPBACK, "--port", str(port), "--window-size", f"{width}x{height}"),
+        "--hide-welcome-screen",
+        log=log,
+    )
