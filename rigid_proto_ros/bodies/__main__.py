@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""Write the bundled bodies as .obj files: ``python -m rigid_proto_ros.bodies [--into FOLDER] [NAME ...]``. Needs manifold3d."""
+
+import argparse
+from pathlib import Path
+
+from rigid_proto_ros.bodies.catalogue import BODIES
+from rigid_proto_ros.bodies.surfaces import Surface
+
+
+def obj_text(name: str, surface: Surface) -> str:
+    """The surface as a Wavefront .obj text; coordinates in metres to 10 nm, the grid on which they were welded."""
+    vertices, triangles = surface
+    lines = [
+        f"# {name}: SPDX-License-Identifier: MIT",
+        f"# metres; {len(vertices)} vertices, {len(triangles)} triangles",
+        f"o {name}",
+    ]
+    lines += ["v " + " ".join(_coordinate(c) for c in vertex) for vertex in vertices]
+    lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
+    return "\n".join(lines) + "\n"
+
+
+def _coordinate(value: float) -> str:
+    text = f"{value:.8f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def main() -> None:
+    """Generate the named bodies, or all."""
+    parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.bodies", description=__doc__)
+    parser.add_argument("--into", type=Path, default=Path(__file__).parent, help="folder (default: beside this file)")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BODIES))
+    arguments = parser.parse_args()
+    for name in arguments.names or BODIES:
+        surface = BODIES[name]()
+        path = arguments.into / f"{name}.obj"
+        path.write_text(obj_text(name, surface), encoding="utf-8")
+        print(f"{path}: {len(surface[0])} vertices, {len(surface[1])} triangles")
+
+
+if __name__ == "__main__":
+    main()
