@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
+from rigid_proto_ros import mesh_cache
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.mass_properties import MeshMoments
-from rigid_proto_ros.core.mesh_topology_verdict import Verdict, judge_surface
+from rigid_proto_ros.core.mesh_topology_hull import box_surface, convex_hull
+from rigid_proto_ros.core.mesh_topology_repair import repair_surface
+from rigid_proto_ros.core.mesh_topology_verdict import WARNING, Finding, Verdict, judge_surface
+from rigid_proto_ros.core.moments import Moments, referenced_vertices
 from rigid_proto_ros.mesh_io import Mesh, load_mesh
 
 FALLBACKS = ("", "hull", "box")
@@ -47,13 +52,70 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> 
         raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
-    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    verdict, known = _judged(mesh)
+    vertices, triangles, polygon_starts = mesh.vertices, mesh.triangles, mesh.polygon_starts
+    if repair and verdict.usable and _wants_repair(verdict):
+        triangles, polygon_starts, done = repair_surface(vertices, triangles, polygon_starts)
+        known, remember = {}, None
+        if done:
+            verdict, _ = judge_surface(vertices, triangles, polygon_starts)
+            verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
+    else:
+
+        def remember(moments: dict[str, Moments]) -> None:
+            _keep(mesh, verdict, moments)
+
+    stand_in = None
+    if fallback and verdict.usable and not verdict.closed:
+        stand_in = _stand_in(vertices, triangles, fallback)
+        shape = "convex hull" if fallback == "hull" else "bounding box"
+        message = f"its {shape} stands in for the solid"
+        verdict.findings.append(Finding("fallback", WARNING, message))
     moments = MeshMoments(
-        mesh.vertices,
-        mesh.triangles,
-        mesh.polygon_starts,
+        vertices,
+        triangles,
+        polygon_starts,
         closed=verdict.closed,
         closed_reason=verdict.reason,
         name=mesh.name,
+        stand_in=stand_in,
+        remedy=("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)",
+        known=known,
+        remember=remember,
     )
     return MeshBody(mesh, verdict, moments)
+
+
+def _wants_repair(verdict: Verdict) -> bool:
+    return not verdict.closed or any(finding.code == "nested_components" for finding in verdict.findings)
+
+
+def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tuple[np.ndarray, np.ndarray]:
+    points = referenced_vertices(vertices, triangles)
+    if fallback == "hull":
+        return points, convex_hull(points)
+    return box_surface(points.min(axis=0), points.max(axis=0))
+
+
+def _key(mesh: Mesh) -> str:
+    return f"{mesh.sha256}-{mesh.path.rpartition('.')[2].lower()}-body"
+
+
+def _judged(mesh: Mesh) -> tuple[Verdict, dict[str, Moments]]:
+    """The verdict on the mesh and what is known of its moments, from the cache or anew."""
+    kept = mesh_cache.load_json(_key(mesh))
+    if kept is not None:
+        try:
+            findings = [Finding(**finding) for finding in kept["verdict"].pop("findings")]
+            moments = {name: Moments.from_dict(value) for name, value in kept["moments"].items()}
+            return Verdict(findings=findings, **kept["verdict"]), moments
+        except (KeyError, TypeError, ValueError, AttributeError):
+            pass
+    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    _keep(mesh, verdict, {})
+    return verdict, {}
+
+
+def _keep(mesh: Mesh, verdict: Verdict, moments: dict[str, Moments]) -> None:
+    known = {name: value.as_dict() for name, value in moments.items()}
+    mesh_cache.store_json(_key(mesh), {"verdict": dataclasses.asdict(verdict), "moments": known})

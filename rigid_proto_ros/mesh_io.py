@@ -188,7 +188,7 @@ def _read_with_trimesh(path: Path, max_triangles: int) -> tuple[np.ndarray, np.n
         mesh = trimesh.load(path, process=False, maintain_order=True, skip_materials=True, force="mesh")
         vertices = np.array(mesh.vertices, dtype=np.float64)
         triangles = np.array(mesh.faces, dtype=np.int64)
-    except Exception as error:  # a foreign reader fails in as many ways as files are broken
+    except Exception as error:  # noqa: BLE001 - a foreign reader fails in as many ways as files are broken
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise MeshError("mesh", path.name, f"a file that trimesh {trimesh.__version__} reads ({reason})") from None
     if len(triangles) > max_triangles:

@@ -11,11 +11,29 @@ from numba import njit
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_text import excerpt, line_of, read_numbers
 
-_TYPES = {
-    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
-    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
-    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8"},
-}
+_TYPES = dict(
+    pair.split(":")
+    for pair in [
+        "char:i1",
+        "uchar:u1",
+        "short:i2",
+        "ushort:u2",
+        "int:i4",
+        "uint:u4",
+        "float:f4",
+        "double:f8",
+        "int8:i1",
+        "uint8:u1",
+        "int16:i2",
+        "uint16:u2",
+        "int32:i4",
+        "uint32:u4",
+        "float32:f4",
+        "float64:f8",
+        "int64:i8",
+        "uint64:u8",
+    ]
+)
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 
 

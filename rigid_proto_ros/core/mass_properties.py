@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,7 +86,9 @@ class MeshMoments:
 
     vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``closed``
     False says that the surface bounds no solid: the solid model, and a density, are then refused with
-    ``closed_reason``. A surface wound inward throughout is turned; ``turned`` says so.
+    ``closed_reason`` and ``remedy``, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is then taken
+    instead. A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed earlier, by
+    model; ``remember`` is called with all of them whenever another one has been computed.
     """
 
     def __init__(
@@ -97,15 +99,22 @@ class MeshMoments:
         *,
         closed: bool = True,
         closed_reason: str = "an open surface",
+        remedy: str = "--repair (mesh_repair), --fallback hull|box (mesh_fallback)",
         name: str = "mesh",
+        stand_in: tuple[np.ndarray, np.ndarray] | None = None,
+        known: dict[str, Moments] | None = None,
+        remember: Callable[[dict[str, Moments]], None] | None = None,
     ) -> None:
         self.vertices = vertices
         self.triangles = triangles
         self.polygon_starts = polygon_starts
         self.closed = closed
         self.closed_reason = closed_reason
+        self.remedy = remedy
         self.name = name
-        self._moments: dict[tuple, Moments] = {}
+        self.stand_in = stand_in
+        self._remember = remember
+        self._moments: dict[str | tuple, Moments] = dict(known or {})
 
     @property
     def turned(self) -> bool:
@@ -114,14 +123,18 @@ class MeshMoments:
 
     def solid_raw(self) -> Moments:
         """The solid's signed moments as the file winds it; raises MeshError when the surface isn't closed."""
+        if self.stand_in is not None:
+            return self._get(("stand-in",), lambda: solid_moments(*self.stand_in))
         if not self.closed:
-            remedy = "a closed, consistently wound surface; --repair (mesh_repair), --fallback hull|box (mesh_fallback)"
-            raise MeshError(self.name, self.closed_reason, f"{remedy}, or another model with --mass (mass)")
-        return self._get(("solid",), lambda: solid_moments(self.vertices, self.triangles))
+            accepted = f"a closed, consistently wound surface; {self.remedy}, or another model with --mass (mass)"
+            raise MeshError(self.name, self.closed_reason, accepted)
+        return self._get("solid", lambda: solid_moments(self.vertices, self.triangles))
 
-    def _get(self, key: tuple, compute) -> Moments:
+    def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:
         if key not in self._moments:
             self._moments[key] = compute()
+            if self._remember is not None and isinstance(key, str):
+                self._remember({name: known for name, known in self._moments.items() if isinstance(name, str)})
         return self._moments[key]
 
     def moments(self, model: str, scale=(1.0, 1.0, 1.0)) -> Moments:
@@ -135,13 +148,13 @@ class MeshMoments:
             sign = math.copysign(1.0, raw.measure)
             return Moments(sign * raw.measure, raw.reference, raw.center, raw.center_low, sign * raw.second, raw.path)
         if model == "points":
-            return self._get(("points",), lambda: point_moments(self.vertices, self.triangles))
+            return self._get("points", lambda: point_moments(self.vertices, self.triangles))
         if model == "bounding_box":
-            return self._get(("bounding_box",), lambda: box_moments(self.vertices, self.triangles))
+            return self._get("bounding_box", lambda: box_moments(self.vertices, self.triangles))
         if model == "shell":
             stretch = np.abs(scale_vector(scale))
             stretch = stretch / stretch[0]
-            key = ("shell", *stretch.tolist())
+            key = "shell" if np.all(stretch == 1.0) else ("shell", *stretch.tolist())
             return self._get(key, lambda: shell_moments(self.vertices * stretch, self.triangles, self.polygon_starts))
         raise InputError("inertia_model", model, ", ".join(INERTIA_MODELS))
 

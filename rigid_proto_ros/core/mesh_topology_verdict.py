@@ -267,12 +267,13 @@ def judge_surface(
         return verdict, topology
     _judge_edges(verdict, topology, vertices, triangles, half)
     if topology.unbalanced == 0:
-        _judge_components(verdict, topology, vertices, triangles)
         volume = component_volumes(vertices, triangles, np.zeros(len(triangles), np.int64), 1)[0][0]
         if abs(volume) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal):
             verdict.add("zero_volume", ERROR, "encloses no volume: flat, or folded onto itself")
-        elif abs(volume) < THIN * diagonal**3:
-            verdict.add("thin", INFO, f"thin: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
+        else:
+            _judge_components(verdict, topology, vertices, triangles)
+            if abs(volume) < THIN * diagonal**3:
+                verdict.add("thin", INFO, f"thin: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
     if polygon_starts is not None:
         deviation, spread = _polygon_planarity(vertices, triangles, polygon_starts, 0.5 * lower + 0.5 * upper)
         if deviation > NONPLANAR * diagonal:

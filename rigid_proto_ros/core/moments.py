@@ -46,6 +46,19 @@ class Moments:
         """Centroid (3,) in mesh coordinates, rounded once."""
         return self.reference + self.center
 
+    def as_dict(self) -> dict:
+        """The moments as a JSON object that ``from_dict`` reads back to the last bit."""
+        arrays = {k: getattr(self, k).tolist() for k in ("reference", "center", "center_low", "second")}
+        return {"measure": self.measure, "path": self.path, **arrays}
+
+    @classmethod
+    def from_dict(cls, value: dict) -> Moments:
+        """The moments of such a JSON object; raises KeyError, TypeError or ValueError when it is none."""
+        arrays = {k: np.array(value[k], dtype=np.float64) for k in ("reference", "center", "center_low", "second")}
+        if arrays["second"].shape != (6,) or any(arrays[k].shape != (3,) for k in arrays if k != "second"):
+            raise ValueError("moments of the wrong length")
+        return cls(measure=float(value["measure"]), path=str(value["path"]), **arrays)
+
 
 @njit(cache=True, nogil=True)
 def _bounds(points):
