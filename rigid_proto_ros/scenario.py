@@ -18,12 +18,12 @@ from .core.errors import InputError, MeshError
 from .core.inertia_tensor import check_tensor
 from .core.integrators import integrator_named
 from .core.mass_properties import MeshMoments, explicit_mass_properties, scale_vector
-from .core.mesh_topology_verdict import judge_surface
 from .core.rotation import matrix_from_quaternion, unit_quaternion
 from .core.setup import Setup
 from .core.state import state_row
 from .core.surface import Surface
-from .mesh_io import Mesh, load_mesh
+from .mesh_body import mesh_body
+from .mesh_io import Mesh
 
 _MESH_PARAMETERS = ("mesh", "mesh_repair", "mesh_fallback")
 
@@ -76,20 +76,11 @@ def _load(values) -> BodyMesh | None:
         if values["inertia_model"] != "explicit":
             raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
         return None
-    mesh = load_mesh(values["mesh"])
-    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
-    if not verdict.usable:
-        raise MeshError("mesh", values["mesh"], verdict.reason)
-    moments = MeshMoments(
-        mesh.vertices,
-        mesh.triangles,
-        mesh.polygon_starts,
-        closed=verdict.closed,
-        closed_reason=verdict.reason,
-        name=mesh.name,
-    )
-    triangles = mesh.triangles[:, [0, 2, 1]] if verdict.inward else mesh.triangles
-    return BodyMesh(mesh, moments, Surface(mesh.vertices, np.ascontiguousarray(triangles)))
+    body = mesh_body(values["mesh"], repair=values["mesh_repair"], fallback=values["mesh_fallback"])
+    if not body.verdict.usable:
+        raise MeshError("mesh", values["mesh"], body.verdict.reason or "a surface with an extent")
+    triangles = body.triangles[:, [0, 2, 1]] if body.verdict.inward else body.triangles
+    return BodyMesh(body.mesh, body.moments, Surface(body.vertices, np.ascontiguousarray(triangles)))
 
 
 def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:

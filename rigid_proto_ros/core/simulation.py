@@ -81,6 +81,17 @@ class Simulation:
         return self.state.angular_momentum(self.setup.body.inertia)
 
     @property
+    def angular_momentum_drift(self) -> float:
+        """|L − L₀|/|L₀| since the present segment began; 0 while something turns the body, or without spin."""
+        loads = self._load_sum()
+        turned = loads.torque_world.any() or loads.torque_body.any() or loads.moment.any()
+        if turned or self.setup.angular_damping or not self.setup.gyroscopic:
+            return 0.0
+        start = self._segment.start.angular_momentum(self.setup.body.inertia)
+        moved, size = self.angular_momentum - start, float((start * start).sum()) ** 0.5
+        return float((moved * moved).sum()) ** 0.5 / size if size > 0.0 else 0.0
+
+    @property
     def has_pending(self) -> bool:
         """Commands wait for their time."""
         return bool(self._pending)
@@ -120,12 +131,15 @@ class Simulation:
         self.observer.event(self.time_ns, line)
         return line
 
-    def reset(self) -> None:
-        """Time 0, the initial state, no held wrench, no pulses, nothing scheduled; counters stay."""
+    def reset(self, setup: Setup | None = None) -> None:
+        """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
+        stay.
+        """
         for acting in self._acting():
             self.observer.load_ended(self.time_ns, acting.load_id)
         self.observer.reset()
         self.events.reset()
+        self.setup = setup or self.setup
         self._start_over()
         self.log("reset", {})
 
@@ -259,12 +273,9 @@ class Simulation:
 
     def _new_segment(self, start: State) -> Segment:
         setup = self.setup
-        loads = LoadSum()
-        for acting in self._acting():
-            loads.add(acting.load, setup.body)
         problem = make_problem(
             setup.body,
-            loads,
+            self._load_sum(),
             setup.gravity,
             setup.linear_damping,
             setup.angular_damping,
@@ -272,6 +283,13 @@ class Simulation:
             start,
         )
         return Segment(start, problem, setup.integrator, setup.step_ns)
+
+    def _load_sum(self) -> LoadSum:
+        """All loads that act, summed afresh in their canonical order."""
+        loads = LoadSum()
+        for acting in self._acting():
+            loads.add(acting.load, self.setup.body)
+        return loads
 
     def _start_over(self) -> None:
         self._pending: list[Pending] = []

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto``: one console command; each of its commands is a module of this folder.
+
+Exit status: 0 done, 1 a check failed, 2 the input was refused (one line on stderr).
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+
+from .. import __version__
+from ..core.errors import InputError
+
+COMMANDS = {
+    "inspect": "mass properties of a mesh, and a verdict on it",
+    "simulate": "the simulation without ROS, as fast as the machine goes",
+    "replay": "show, check or branch a recorded session",
+    "snapshot": "a picture of a recorded session, without a display",
+    "demo": "node, scripted pokes and recording in one go, ending by itself",
+    "up": "node and live view, until Ctrl-C",
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """Usage errors as one line."""
+
+    def error(self, message: str):
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    argv = sys.argv[1:] if argv is None else argv
+    parser = _Parser(prog="rigid_proto", description="Prototype the properties of one rigid body.")
+    parser.add_argument("--version", action="version", version=__version__)
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
+    # Only the command that runs is imported, so that each starts as fast as it can.
+    for name, summary in COMMANDS.items():
+        if argv and argv[0] == name:
+            importlib.import_module(f".{name}", __package__).add_parser(subparsers)
+        else:
+            subparsers.add_parser(name, help=summary)
+    args = parser.parse_args(argv)
+    try:
+        return args.run(args)
+    except InputError as error:
+        print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away, as `| head` does; Python would complain again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
+        return 2
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto simulate``: a scene, and a poke script, without ROS."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+
+from ..core.errors import InputError
+
+
+def add_parser(subparsers) -> None:
+    """Declare the command's arguments."""
+    parser = subparsers.add_parser("simulate", help="the simulation without ROS, as fast as the machine goes")
+    parser.add_argument("scene", metavar="SCENE.yaml", help="a ROS parameter file, or the name of a bundled scene")
+    parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
+    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="simulated seconds (default 10)")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter")
+    parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the scene and print its end."""
+    from ..offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
+    from ..poke_script import read_script
+    from ..scenario import nanoseconds
+
+    if not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
+        raise InputError("--duration", args.duration, "seconds from 0 to 1e9")
+    scenario = read_scene(args.scene, dict(parse_setting(s) for s in args.set), _warn)
+    for warning in scenario.warnings:
+        _warn(warning)
+    script = read_script(args.script, scenario.values["wrench_timeout"]) if args.script else []
+    observer = None
+    record = args.record or scenario.values["record"]
+    if record:
+        from ..rerun_view import RerunObserver
+
+        observer = RerunObserver(record=record)
+    try:
+        flight = OfflineRun(scenario, script, observer)
+        wall_time = run_with_progress(flight, nanoseconds(args.duration))
+        result = summary(flight, wall_time)
+    finally:
+        if observer is not None:
+            observer.close()
+    for reason, count in flight.simulation.refused.items():
+        _warn(f"{count} commands refused: {reason}")
+    if args.json:
+        print(json.dumps(result))
+    else:
+        _print_summary(result, record)
+    if flight.simulation.failure:
+        _warn(f"stopped in the last good state: {flight.simulation.failure}")
+        return 1
+    return 0
+
+
+def _warn(message: str) -> None:
+    print(f"rigid_proto simulate: {message}", file=sys.stderr)
+
+
+def _print_summary(result: dict, record: str) -> None:
+    def vector(name: str) -> str:
+        return "  ".join(f"{x: .9g}" for x in result[name])
+
+    print(f"simulated      {result['time_ns'] / 1e9:.9g} s in {result['wall_time']:.3g} s of wall time")
+    print(f"position       {vector('position')} m")
+    print(f"attitude xyzw  {vector('orientation_xyzw')}")
+    print(f"velocity       {vector('linear_velocity')} m/s")
+    print(f"ω (world)      {vector('angular_velocity')} rad/s")
+    print(f"energy         {result['kinetic_energy']:.9g} J kinetic, {result['potential_energy']:.9g} J potential")
+    print(f"L (world)      {vector('angular_momentum')} N m s")
+    print(f"integrator     {result['integrator']}, {result['steps']} steps")
+    print(f"state hash     {result['state_hash']}")
+    if record:
+        print(f"recorded       {record}; open it with: rerun {record}")

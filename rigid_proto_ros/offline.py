@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""A scene and a script without ROS: the very steps that the node takes, as fast as the machine goes."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from .bundled import scene_names, scene_path
+from .core.errors import CommandRefused, InputError
+from .core.observer import Observer
+from .core.simulation import Simulation
+from .parameters import parameter_named
+from .poke_script import ScriptCommand, core_command
+from .scenario import Scenario, make_scenario, publication_ns
+from .scene_file import read_scene_file, scalar
+
+
+def read_scene(name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print) -> Scenario:
+    """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
+
+    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of.
+    """
+    path = Path(name)
+    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
+        path = scene_path(name.removesuffix(".yaml"))
+    elif not path.exists():
+        raise InputError("scene", name, f"a scene file, or one of the bundled {', '.join(scene_names())}")
+    scene = read_scene_file(path)
+    values: dict[str, object] = {}
+    for parameter, value in scene.values.items():
+        try:
+            parameter_named(parameter)
+        except InputError as error:
+            if parameter not in scene.wildcard:
+                raise InputError(f"{path}, {parameter}", value, error.accepted) from None
+            warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
+            continue
+        values[parameter] = value
+    return make_scenario({**values, **(settings or {})})
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """``name=value`` with the value typed as on a ROS command line."""
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InputError("--set", text, "name=value")
+    return name.strip(), scalar(value.strip())
+
+
+class OfflineRun:
+    """A simulation with its script submitted; ``advance`` carries it from publication to publication."""
+
+    def __init__(self, scenario: Scenario, script: list[ScriptCommand] | None = None, observer: Observer | None = None):
+        self.scenario = scenario
+        self.observer = observer
+        self.simulation = Simulation(scenario.setup, observer)
+        self._next_publication = 0
+        if observer is not None:
+            mesh = scenario.body_mesh
+            surface = mesh.surface if mesh else None
+            observer.started(
+                scenario.text,
+                surface.vertices if surface else None,
+                surface.triangles if surface else None,
+                mesh.mesh.sha256 if mesh else "",
+            )
+            self.simulation.announce()
+        for number, command in enumerate(script or [], 1):
+            try:
+                core = core_command(command, command.t_ns, scenario.setup.contacts, self._apply_changes)
+                if command.kind == "set":
+                    scenario.with_changes(command.changes)
+                self.simulation.submit(core, command.t_ns)
+            except CommandRefused as refusal:
+                raise InputError(
+                    f"script, command {number} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
+                ) from None
+
+    def _apply_changes(self, changes: dict):
+        self.scenario = self.scenario.with_changes(changes)
+        return self.scenario.setup
+
+    def advance(self, until_ns: int) -> bool:
+        """Carry the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
+        if self.observer is not None:
+            rate = self.scenario.values["publish_rate"]
+            while (next_ns := publication_ns(self._next_publication, rate)) <= until_ns:
+                state = self.simulation.advance(next_ns)
+                if self.simulation.failure:
+                    return False
+                self.observer.state(next_ns, state.row)
+                self._next_publication += 1
+        self.simulation.advance(until_ns)
+        return not self.simulation.failure
+
+
+def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
+    """Advance by a hundredth of the duration at a time, with a line on a terminal; returns the wall time [s]."""
+    start = time.perf_counter()
+    shown = start
+    for part in range(1, 101):
+        until_ns = duration_ns * part // 100
+        if not run.advance(until_ns):
+            break
+        now = time.perf_counter()
+        if sys.stderr.isatty() and now - shown > 0.2:
+            shown = now
+            print(f"\r{part:3d} %  {until_ns / 1e9:.3f} s simulated", end="", file=sys.stderr, flush=True)
+    if sys.stderr.isatty() and shown > start:
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+    return time.perf_counter() - start
+
+
+def summary(run: OfflineRun, wall_time: float) -> dict:
+    """What ``simulate --json`` prints: the final state, energies and what the run cost."""
+    simulation = run.simulation
+    state = simulation.state
+    return {
+        "time_ns": state.time_ns,
+        "position": state.position.tolist(),
+        "orientation_xyzw": state.orientation_xyzw.tolist(),
+        "linear_velocity": state.linear_velocity.tolist(),
+        "angular_velocity": state.angular_velocity.tolist(),
+        "angular_velocity_body": state.angular_velocity_body.tolist(),
+        "kinetic_energy": simulation.kinetic_energy,
+        "potential_energy": simulation.potential_energy,
+        "angular_momentum": simulation.angular_momentum.tolist(),
+        "integrator": simulation.setup.integrator.name,
+        "steps": simulation.steps,
+        "force_evaluations": simulation.force_evaluations,
+        "wall_time": wall_time,
+        "state_hash": state.sha256(),
+    }

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""What /diagnostics says of the simulation, once a second."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "schedule")
+
+
+class Diagnostics:
+    """values() gives the keys and values; the level follows from what went wrong since the last report."""
+
+    def __init__(self, node: Node, values) -> None:
+        self._node = node
+        self._values = values
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._troubles_before = 0.0
+        self._timer = node.create_timer(1.0, self._report)
+
+    def _report(self) -> None:
+        values = self._values()
+        troubles = float(values["refused_total"]) + float(values["overruns"]) + float(values["real_time_lost_s"])
+        troubled, self._troubles_before = troubles > self._troubles_before, troubles
+        if self._publisher.get_subscription_count() == 0:
+            return
+        failure = values.pop("failure")
+        status = DiagnosticStatus(
+            name=f"{self._node.get_fully_qualified_name()}: simulation", hardware_id="simulated rigid body"
+        )
+        status.level = DiagnosticStatus.WARN if troubled or failure else DiagnosticStatus.OK
+        status.message = failure or ("refused, lost or late in the last second" if troubled else values["state"])
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_body_node``: start the node and keep it until SIGINT or SIGTERM."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+
+from ..core.errors import InputError
+from ..parameters import PARAMETERS
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the node; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
+    argv = sys.argv if argv is None else argv
+    stop = threading.Event()
+    # Signals end the main thread's wait; the middleware must outlive the physics thread, so rclpy's handlers stay out.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        return _run(argv, stop)
+    except InputError as error:
+        print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def _run(argv: list[str], stop: threading.Event) -> int:
+    from .arguments import check_arguments
+    from .node_name import remapped_node_name
+
+    name = remapped_node_name(argv)
+    check_arguments(argv, name, lambda warning: print(f"rigid_body_node: {warning}", file=sys.stderr))
+
+    import rclpy
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.signals import SignalHandlerOptions
+
+    from .node import RigidBodyNode
+
+    try:
+        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy's own error types differ between versions
+        raise InputError("ROS arguments", " ".join(argv[1:]), " ".join(str(error).split())) from None
+    node = None
+    executor = SingleThreadedExecutor()
+    thread = None
+    try:
+        with _saying_when_slow():
+            node = RigidBodyNode(_make_observer)
+            _warm_up(node)
+        executor.add_node(node)
+
+        def spin() -> None:
+            try:
+                executor.spin()
+            except ExternalShutdownException:
+                pass
+            stop.set()
+
+        thread = threading.Thread(target=spin, name="executor", daemon=True)
+        thread.start()
+        node.start()
+        node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
+        stop.wait()
+    finally:
+        if node is not None:
+            node.stop()
+        executor.shutdown(timeout_sec=0.5)
+        if thread is not None:
+            thread.join(timeout=0.5)
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _make_observer(scenario, node_name: str):
+    """Rerun is imported only when something is to be shown or recorded."""
+    from ..core.observer import Observer
+
+    values = scenario.values
+    if not values["record"] and values["viewer"] == "none":
+        return Observer()
+    from ..rerun_view import RerunObserver
+
+    return RerunObserver(
+        record=values["record"],
+        viewer=values["viewer"],
+        rerun_port=_asked_for(values, "rerun_port"),
+        web_port=_asked_for(values, "web_port"),
+        name=node_name,
+        report=lambda line: print(f"{node_name}: {line}", file=sys.stderr),
+        on_error=lambda line: print(f"{node_name}: {line}", file=sys.stderr),
+    )
+
+
+def _asked_for(values, port: str) -> int | None:
+    """None for a default port, which may move to the next free one."""
+    return None if values[port] == PARAMETERS[port].default else values[port]
+
+
+def _warm_up(node) -> None:
+    """Compile, or load from the cache, what the first wrench would otherwise wait for."""
+    from ..core.commands import WrenchCommand
+    from ..core.frames import parse_frame
+    from ..core.simulation import Simulation
+
+    trial = Simulation(node.physics.scenario.setup)
+    for frame in ("world@point/0,0,0;duration=0.001", "body@point/0,0,0;impulse"):
+        zero = (0.0, 0.0, 0.0)
+        trial.submit(WrenchCommand(False, parse_frame(frame), zero, zero, 0, frame, b""))
+    state = trial.advance(2 * node.physics.scenario.setup.step_ns + 1)
+    node.states.publish(state)
+
+
+class _saying_when_slow:
+    """Says that kernels are being compiled when the start takes longer than it does with cached ones."""
+
+    def __enter__(self):
+        self._started = time.monotonic()
+        self._timer = threading.Timer(
+            2.0, lambda: print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
+        )
+        self._timer.daemon = True
+        self._timer.start()
+
+    def __exit__(self, *_):
+        self._timer.cancel()
+
+
+def _described(node) -> str:
+    scenario = node.physics.scenario
+    mesh = scenario.values["mesh"] or "a body without a mesh"
+    return f"{mesh}: {scenario.setup.body.mass:.6g} kg, integrator {scenario.setup.integrator.name}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

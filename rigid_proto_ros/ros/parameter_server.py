@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""The declared parameters on a ROS node: descriptors, and values converted before rclpy sees them."""
+
+from __future__ import annotations
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from .. import parameters
+from ..core.errors import InputError
+from ..parameters import PARAMETERS, READ_ONLY, Parameter, parameter_named
+from .arguments import _is_ros_parameter
+
+_TYPES = {
+    "double": ParameterType.PARAMETER_DOUBLE,
+    "doubles": ParameterType.PARAMETER_DOUBLE_ARRAY,
+    "integer": ParameterType.PARAMETER_INTEGER,
+    "bool": ParameterType.PARAMETER_BOOL,
+    "string": ParameterType.PARAMETER_STRING,
+}
+_ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
+
+
+def descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """The ROS descriptor of a declared parameter."""
+    when = {READ_ONLY: "Set at start only."}.get(parameter.changes, f"Changes count {parameter.changes}.")
+    if parameter.changes == parameters.LIVE:
+        when = "Can change in flight."
+    result = ParameterDescriptor(
+        name=parameter.name,
+        type=_TYPES[parameter.type],
+        description=f"{parameter.description} {when}",
+        additional_constraints=parameter.accepted,
+        read_only=parameter.changes == READ_ONLY,
+    )
+    bounded = abs(parameter.lower) < float("inf") and abs(parameter.upper) < float("inf")
+    if parameter.type == "double" and bounded:
+        result.floating_point_range = [FloatingPointRange(from_value=parameter.lower, to_value=parameter.upper)]
+    if parameter.type == "integer" and bounded:
+        result.integer_range = [IntegerRange(from_value=int(parameter.lower), to_value=int(parameter.upper), step=1)]
+    return result
+
+
+def declare_parameters(node: Node) -> dict[str, object]:
+    """Declare all parameters on the node and return their values, converted; raises InputError.
+
+    rclpy refuses an integer where a double is declared, so the values given at start are converted before.
+    """
+    overrides = node._parameter_overrides
+    names = list(PARAMETERS)
+    for name in overrides:
+        if _is_ros_parameter(name) or name in PARAMETERS:
+            continue
+        try:
+            parameter_named(name)
+        except InputError:
+            continue  # from a section for all nodes, and warned of already
+        names.append(name)
+    values = {}
+    for name in names:
+        parameter = parameter_named(name)
+        value = parameter.default
+        if name in overrides:
+            value = parameter.convert(overrides[name].value)
+            overrides[name] = ros_parameter(parameter, value)
+        values[name] = value
+        node.declare_parameter(name, value, descriptor(parameter))
+    return values
+
+
+def ros_parameter(parameter: Parameter, value: object) -> RosParameter:
+    """A converted value as rclpy's parameter."""
+    return RosParameter(parameter.name, _ROS_TYPES[parameter.type], value)
+
+
+def converted(changes: list[RosParameter]) -> list[RosParameter]:
+    """Parameters as a client sent them, each in its declared type; raises InputError."""
+    result = []
+    for change in changes:
+        if _is_ros_parameter(change.name):
+            result.append(change)
+            continue
+        parameter = parameter_named(change.name)
+        result.append(ros_parameter(parameter, parameter.convert(change.value)))
+    return result

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: MIT
+"""Quality of service of the node's topics, and which of it users may override by parameter."""
+
+from __future__ import annotations
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+COMMAND_DEPTH = 5000
+"""Commands kept until the next drain; Fast DDS holds no more in its history."""
+
+STATE = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
+COMMAND = QoSProfile(depth=COMMAND_DEPTH, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED = QoSProfile(
+    depth=1,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+OVERRIDABLE = QoSOverridingOptions.with_default_policies()
