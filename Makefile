@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+.DEFAULT_GOAL := help
+.PHONY: help setup run up test lint pictures build bench stress clean pins
+SHELL := /bin/bash
+
+PY := .venv/bin/python
+READY := .venv/.pins
+# What the node says to others stays on this machine, unless the user has chosen otherwise.
+run up: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+
+help: ## this list
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 12
+
+setup: $(READY) ## .venv with all that run, up, test and lint need
+
+$(READY): requirements/base.txt requirements/ros.txt requirements/make_venv.py setup.py
+	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
+	@python3 requirements/make_venv.py
+
+run: setup ## fly a bundled body, or MESH=path/to.obj, for about 10 s; leaves out/session.rrd
+	@.venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
+
+up: setup ## node and viewer; stays until Ctrl-C
+	@.venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)")
+
+test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
+	$(PY) -m pytest -m "not stress and not bench and not soak" $(ARGS)
+
+lint: setup ## ruff and mypy
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+pictures: setup ## draw the README's pictures anew from recordings (needs mesa-vulkan-drivers)
+	$(PY) -m rigid_proto_ros.cli.main snapshot out/session.rrd --at 4 -o docs/flight.png
+
+build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
+	$(PY) -m colcon build --packages-select rigid_proto_ros
+
+bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU and versions
+	@for file in benchmarks/bench_*.py; do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
+
+.venv-bench/.pins: $(READY) benchmarks/requirements.txt
+	.venv/bin/python -m venv .venv-bench
+	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet -r requirements/base.txt $$(test -f requirements/ros.txt && echo -r requirements/ros.txt) -r benchmarks/requirements.txt
+	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
+	@touch $@
+
+stress: setup ## long and hostile tests
+	$(PY) -m pytest -m stress $(ARGS)
+
+clean: ## everything that was made here, the environments included
+	rm -rf .venv .venv-bench build install log out *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip
+pins: setup ## for developers: newest versions into requirements/*.txt
+	$(PY) -m pip install --quiet uv
+	$(PINS) requirements/base.in -o requirements/base.txt
+	$(PINS) requirements/ros.in -c requirements/base.txt -o requirements/ros.txt
+	sed -i '1i # Exact pins, made by `make pins`.' requirements/base.txt requirements/ros.txt

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""What several test files share: real meshes, and a ROS domain of this run's own."""
+
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def meshes() -> Path:
+    """Folder of the real meshes with their truth.json; without RIGID_PROTO_MESHES the test skips and says so."""
+    folder = os.environ.get("RIGID_PROTO_MESHES", "")
+    if not folder:
+        pytest.skip("RIGID_PROTO_MESHES is not set: no real meshes")
+    path = Path(folder)
+    if not path.is_dir():
+        pytest.fail(f"RIGID_PROTO_MESHES: {folder} is not a folder")
+    return path.resolve()
+
+
+@pytest.fixture(scope="session")
+def ros_domain_id() -> Iterator[int]:
+    """A ROS domain in 1..101 that no other test session on this machine holds, whichever checkout it runs from."""
+    # An abstract socket is the lock: the kernel frees it with the process, so a crash leaves nothing behind.
+    first = os.getpid() % 101
+    for k in range(101):
+        domain = 1 + (first + k) % 101
+        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lock.bind(f"\0rigid_proto_ros.domain.{domain}")
+        except OSError:
+            lock.close()
+            continue
+        yield domain
+        lock.close()
+        return
+    pytest.fail("all ROS domains 1..101 are held by other test sessions")
+
+
+@pytest.fixture(scope="session")
+def ros_environment(ros_domain_id: int) -> dict[str, str]:
+    """Environment for child processes of this interpreter: own domain, nothing leaves the machine."""
+    return {**os.environ, "ROS_DOMAIN_ID": str(ros_domain_id), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+@pytest.fixture(scope="session")
+def foreign_environment(ros_environment: dict[str, str]) -> dict[str, str]:
+    """The same for an interpreter of another virtual environment, whose ROS wheels must find their own libraries."""
+    marks = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+    return {key: value for key, value in ros_environment.items() if key not in marks}
