@@ -5,6 +5,8 @@ A surface is a pair ``(vertices (n, 3) float64 in metres, triangles (m, 3) int64
 directly, so that their triangles follow the shape; only joining and drilling use manifold3d, which is imported there.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 Surface = tuple[np.ndarray, np.ndarray]
@@ -71,7 +73,7 @@ def tube(
     return surface if signed_volume(surface) > 0.0 else reverse(surface)
 
 
-def rounded_box(size: np.ndarray, edge_radius: float, arc: int = 3, spans: int = 1) -> Surface:
+def rounded_box(size: Sequence[float], edge_radius: float, arc: int = 3, spans: int = 1) -> Surface:
     """Box about the origin with rounded edges. size: (3,) m; ``arc`` facets per quarter edge, ``spans`` per flat side."""
     half = np.asarray(size, dtype=float) / 2.0 - edge_radius
     slope = np.tan(np.linspace(0.0, np.pi / 4.0, arc + 1))
@@ -105,7 +107,7 @@ def extrude(outline: np.ndarray, height: float) -> Surface:
     return _surface(Manifold.extrude(CrossSection([np.asarray(outline, dtype=float)]), height))
 
 
-def move(surface: Surface, offset: np.ndarray = (0.0, 0.0, 0.0), axes: str = "xyz") -> Surface:
+def move(surface: Surface, offset: Sequence[float] = (0.0, 0.0, 0.0), axes: str = "xyz") -> Surface:
     """Send the surface's x, y, z to the named axes (a cyclic order, so that it stays a rotation), then shift it by ``offset``."""
     if axes not in ("xyz", "yzx", "zxy"):
         raise ValueError(f"axes: got {axes!r}; accepted: xyz, yzx, zxy")
