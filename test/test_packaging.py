@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""The package installs by pip and by colcon, with its executables, bodies, scenes and examples where they are looked for."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import rigid_proto_ros
+from rigid_proto_ros import bundled
+from rigid_proto_ros.core.errors import InputError
+
+SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
+EXECUTABLES = {"rigid_proto", "rigid_body_node", "poke_client"}
+pytestmark = pytest.mark.skipif(not (SOURCE / "setup.py").is_file(), reason="not run from a source tree")
+
+
+@pytest.fixture(scope="module")
+def source_copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what is needed to build, so that nothing is written into the source tree."""
+    copy = tmp_path_factory.mktemp("workspace") / "rigid_proto_ros"
+    copy.mkdir()
+    skipped = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    for name in ("rigid_proto_ros", "config", "msg_examples", "launch", "resource"):
+        if (SOURCE / name).is_dir():
+            shutil.copytree(SOURCE / name, copy / name, ignore=skipped)
+    for name in ("setup.py", "setup.cfg", "package.xml", "pyproject.toml", "LICENSE"):
+        shutil.copy(SOURCE / name, copy / name)
+    return copy
+
+
+def run(*command: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess:
+    """Run a command; a failure shows its whole output."""
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done
+
+
+def installed_bundle(site: Path, cwd: Path, **environment: str) -> list[str]:
+    """What an installed copy finds: the paths of a scene and a body, then the names of all scenes."""
+    code = (
+        "from rigid_proto_ros import bundled as b; "
+        "print(b.scene_path('t_handle')); print(b.body_path('t_handle')); print(*b.scene_names())"
+    )
+    return run(sys.executable, "-c", code, cwd=cwd, PYTHONPATH=str(site), **environment).stdout.split("\n")[:3]
+
+
+@pytest.mark.slow
+def test_pip_installs_executables_bodies_and_scenes(source_copy: Path, tmp_path: Path) -> None:
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+    prefix = tmp_path / "prefix"
+    run(
+        *pip,
+        "--no-build-isolation",
+        "--no-deps",
+        "--no-index",
+        "--ignore-installed",
+        "--prefix",
+        prefix,
+        ".",
+        cwd=source_copy,
+    )
+    assert {path.name for path in (prefix / "bin").iterdir()} >= EXECUTABLES
+    (site,) = prefix.glob("lib/python*/site-packages")
+    _check_installed(prefix, installed_bundle(site, tmp_path))
+
+
+@pytest.mark.slow
+def test_colcon_puts_the_executables_where_ros2_run_looks(source_copy: Path, tmp_path: Path) -> None:
+    pytest.importorskip("colcon_core")
+    if importlib.util.find_spec("colcon_ros") is None:
+        pytest.skip("colcon_ros is not installed")
+    base = tmp_path / "ws"
+    run(
+        *(sys.executable, "-m", "colcon", "--log-base", base / "log", "build", "--base-paths", source_copy),
+        *("--build-base", base / "build", "--install-base", base / "install"),
+        cwd=tmp_path,
+    )
+    prefix = base / "install" / "rigid_proto_ros"
+    # `ros2 run` lists the executable files of lib/<package>.
+    found = {path.name for path in (prefix / "lib" / "rigid_proto_ros").iterdir() if os.access(path, os.X_OK)}
+    assert found == EXECUTABLES
+    (site,) = prefix.glob("lib/python*/site-packages")
+    _check_installed(prefix, installed_bundle(site, tmp_path, AMENT_PREFIX_PATH=str(prefix)))
+
+
+def _check_installed(prefix: Path, found: list[str]) -> None:
+    scene, body, scenes = found
+    assert (prefix / "share/ament_index/resource_index/packages/rigid_proto_ros").is_file()
+    assert (prefix / "share/rigid_proto_ros/package.xml").is_file()
+    assert Path(scene) == prefix / "share/rigid_proto_ros/config/t_handle.yaml"
+    assert Path(body).is_file() and Path(body).is_relative_to(prefix)
+    assert scenes.split() == bundled.scene_names()
+
+
+def test_package_xml_and_the_package_agree_on_version_and_name() -> None:
+    package = ElementTree.parse(SOURCE / "package.xml").getroot()
+    assert package.get("format") == "3"
+    assert package.findtext("name") == "rigid_proto_ros"
+    assert package.findtext("version") == rigid_proto_ros.__version__
+    assert package.findtext("export/build_type") == "ament_python"
+
+
+def test_every_ros_package_that_the_code_imports_is_declared() -> None:
+    declared = {node.text for node in ElementTree.parse(SOURCE / "package.xml").iter("exec_depend")}
+    text = "\n".join(path.read_text(encoding="utf-8") for path in (SOURCE / "rigid_proto_ros").rglob("*.py"))
+    imported = {
+        line.split()[1].split(".")[0] for line in text.splitlines() if line.strip().startswith(("from ", "import "))
+    }
+    used = {name for name in imported if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
+    # tf2_msgs is optional: /tf is published where it is installed. builtin_interfaces comes with every message package.
+    assert used - {"tf2_msgs", "builtin_interfaces"} <= declared
+
+
+def test_every_body_has_a_scene_and_every_scene_a_body() -> None:
+    assert bundled.scene_names() == bundled.body_names()
+    for name in bundled.scene_names():
+        text = bundled.scene_path(name).read_text(encoding="utf-8")
+        (section,) = yaml.safe_load(text).values()
+        assert section["ros__parameters"]["mesh"] == name
+        comment = [line for line in text.splitlines() if line.startswith("#")]
+        assert len(comment) >= 4, "a scene begins by saying what it teaches"
+
+
+def test_contacts_of_the_scenes_lie_on_the_surface() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    for name in bundled.scene_names():
+        (section,) = yaml.safe_load(bundled.scene_path(name).read_text(encoding="utf-8")).values()
+        mesh = trimesh.load(bundled.body_path(name), process=False, force="mesh")
+        for contact, point in section["ros__parameters"]["contacts"].items():
+            points = np.tile(point, (len(mesh.faces), 1))
+            nearest = trimesh.triangles.closest_point(mesh.triangles, points)
+            # Contacts are written to 10 µm.
+            assert np.linalg.norm(nearest - points, axis=1).min() < 2e-5, f"{name}: {contact}"
+
+
+@pytest.mark.parametrize("find", [bundled.scene_path, bundled.body_path, bundled.example_path])
+def test_an_unknown_name_is_refused_with_what_there_is(find) -> None:
+    with pytest.raises(InputError) as refused:
+        find("no_such_thing")
+    assert "no_such_thing" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_pins_are_exact() -> None:
+    for name in ("base.txt", "ros.txt"):
+        lines = (SOURCE / "requirements" / name).read_text(encoding="utf-8").splitlines()
+        pins = [line.split(";")[0].strip() for line in lines if line and not line.startswith("#")]
+        assert pins and all("==" in pin for pin in pins)
