@@ -130,3 +130,21 @@ def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tupl
     if gap > TRIANGLE_SLACK_COMPUTED:
         return (f"{source}: A + B falls short of C by {gap:.1e} C (principal moments {a:.9g}, {b:.9g}, {c:.9g})",)
     return ()
+
+
+def degenerate_pairs(moments: np.ndarray, tolerance: float = 1e-9) -> tuple[bool, bool]:
+    """Whether A and B, and B and C, of ``moments`` (3,) ascending agree to ``tolerance``·C: their axes are then any
+    pair at right angles in the plane (or space) that they span, and carry no meaning of their own."""
+    a, b, c = (float(m) for m in moments)
+    return bool(b - a <= tolerance * c), bool(c - b <= tolerance * c)
+
+
+def equimomental_shapes(mass: float, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sides (3,) of the uniform box and semi-axes (3,) of the uniform ellipsoid with ``mass`` [kg] and principal
+    ``moments`` (3,) [kg m²]; both lengths [m], in the order of the moments.
+
+    side_i² = 6 (I_j + I_k − I_i)/m and semi-axis_i² = 5 (I_j + I_k − I_i)/(2 m).
+    """
+    total = float(np.sum(moments))
+    spread = np.maximum(total - 2.0 * np.asarray(moments), 0.0) / mass
+    return np.sqrt(6.0 * spread), np.sqrt(2.5 * spread)

@@ -53,7 +53,7 @@ def _matrix(six) -> np.ndarray:
 
 def _tensor_of(second: np.ndarray) -> np.ndarray:
     """Inertia tr(C) 1 − C of second moments C (3, 3); the diagonal as sums, so that nothing cancels."""
-    inertia = -second
+    inertia = 0.0 - second  # no -0
     for k in range(3):
         inertia[k, k] = second[(k + 1) % 3, (k + 1) % 3] + second[(k + 2) % 3, (k + 2) % 3]
     return inertia
