@@ -50,6 +50,15 @@ def parse_setting(text: str) -> tuple[str, object]:
     return name.strip(), scalar(value.strip())
 
 
+def tell_start(observer: Observer, scenario: Scenario) -> None:
+    """Tell an observer what flies."""
+    mesh = scenario.body_mesh
+    if mesh is None:
+        observer.started(scenario.text, None, None, "")
+    else:
+        observer.started(scenario.text, mesh.surface.vertices, mesh.surface.triangles, mesh.mesh.sha256)
+
+
 class OfflineRun:
     """A simulation with its script submitted; ``advance`` carries it from publication to publication."""
 
@@ -59,14 +68,7 @@ class OfflineRun:
         self.simulation = Simulation(scenario.setup, observer)
         self._next_publication = 0
         if observer is not None:
-            mesh = scenario.body_mesh
-            surface = mesh.surface if mesh else None
-            observer.started(
-                scenario.text,
-                surface.vertices if surface else None,
-                surface.triangles if surface else None,
-                mesh.mesh.sha256 if mesh else "",
-            )
+            tell_start(observer, scenario)
             self.simulation.announce()
         for number, command in enumerate(script or [], 1):
             try:

@@ -65,18 +65,21 @@ class Scenario:
         return "\n".join(["rigid_body:", "  ros__parameters:", *lines, ""])
 
 
-def make_scenario(values: Mapping[str, object]) -> Scenario:
-    """A scenario from some parameters, the others at their defaults; raises InputError or one of its family."""
+def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
+    """A scenario from some parameters, the others at their defaults; raises InputError or one of its family.
+
+    mesh: a mesh at hand, used instead of loading the one that the parameter names.
+    """
     complete = {**parameters.defaults(), **parameters.convert_all(values)}
-    return _build(complete, _load(complete))
+    return _build(complete, _load(complete, mesh))
 
 
-def _load(values) -> BodyMesh | None:
+def _load(values, mesh: Mesh | None = None) -> BodyMesh | None:
     if values["mesh"] == "":
         if values["inertia_model"] != "explicit":
             raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
         return None
-    body = mesh_body(values["mesh"], repair=values["mesh_repair"], fallback=values["mesh_fallback"])
+    body = mesh_body(mesh or values["mesh"], repair=values["mesh_repair"], fallback=values["mesh_fallback"])
     if not body.verdict.usable:
         raise MeshError("mesh", values["mesh"], body.verdict.reason or "a surface with an extent")
     triangles = body.triangles[:, [0, 2, 1]] if body.verdict.inward else body.triangles

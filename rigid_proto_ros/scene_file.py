@@ -62,8 +62,15 @@ def scalar(text: str):
 
 def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
     """Read the sections for this node, later ones winning; raises InputError naming file, line and remedy."""
-    path = Path(path)
-    root = compose_yaml(path)
+    return _read_sections(compose_yaml(Path(path)), str(path), node_name)
+
+
+def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
+    """As ``read_scene_file``, from text; ``name`` stands in errors."""
+    return _read_sections(compose_text(text, name), name, node_name)
+
+
+def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFile:
     scene = SceneFile()
     if root is None:
         return scene

@@ -21,6 +21,7 @@ from ..core.errors import CommandRefused, InputError
 from ..core.observer import BodySnapshot, Observer, Observers
 from ..core.rotation import rotate
 from ..core.state import State
+from ..offline import tell_start
 from ..parameters import parameter_named
 from ..scenario import Scenario, make_scenario
 from . import qos
@@ -59,20 +60,12 @@ class RigidBodyNode(Node):
         )
         self._scheduled_changes: list[dict] = []
         self._scheduled_guard = self.create_guard_condition(self._store_scheduled_changes)
-        self._services = [
-            self.create_service(Trigger, "~/reset", self._on_reset),
-            self.create_service(Trigger, "~/step", self._on_step),
-            self.create_service(Trigger, "~/clear_wrench", self._on_clear_wrench),
-            self.create_service(SetBool, "~/pause", self._on_pause),
-        ]
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(Trigger, "~/step", self._on_step)
+        self.create_service(Trigger, "~/clear_wrench", self._on_clear_wrench)
+        self.create_service(SetBool, "~/pause", self._on_pause)
         self._diagnostics = Diagnostics(self, self._diagnostic_values)
-        mesh = scenario.body_mesh
-        self.observer.started(
-            scenario.text,
-            mesh.surface.vertices if mesh else None,
-            mesh.surface.triangles if mesh else None,
-            mesh.mesh.sha256 if mesh else "",
-        )
+        tell_start(self.observer, scenario)
         self.physics.simulation.announce()
 
     def start(self) -> None:

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""``poke_client``: send a poke script, or one command, to a running node.
+
+    poke_client SCRIPT.yaml [--reset] [--lead S] [--node NAME]
+    poke_client poke --at tip --push 5
+    poke_client wrench --force 1 0 0 --for 2
+
+Exit status: 0 all sent, 1 something came late or was refused, 2 the input was refused or no node was found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+
+from ..core.errors import InputError
+from ..poke_script import MAX_TIME_S, ScriptCommand, parse_script, read_script
+
+_ONE_LINE_COMMANDS = ("poke", "wrench")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Send what the arguments say; returns the exit status."""
+    argv = sys.argv[1:] if argv is None else argv
+    # Python's own handler: the middleware's would end the context under the clean-up.
+    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
+    try:
+        args = _arguments(own)
+        script = _script(args)
+        return _send(script, args, argv)
+    except InputError as error:
+        print(f"poke_client: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("poke_client: stopped; commands already sent still act", file=sys.stderr)
+        return 0
+
+
+def _arguments(argv: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="poke_client",
+        description="Send a poke script, or one command, to a running rigid_body node.",
+        usage="poke_client (SCRIPT.yaml | poke ... | wrench ...) [--reset] [--lead S] [--node NAME]",
+    )
+    parser.error = lambda message: parser.exit(2, f"poke_client: {message} (see poke_client --help)\n")
+    parser.add_argument("what", metavar="SCRIPT.yaml | poke | wrench", help="a script, or one command from the line")
+    parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
+    parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
+    parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="added to every t (default 0.2)")
+    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node")
+    line = parser.add_argument_group("one command from the line")
+    line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
+    line.add_argument("--force", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N")
+    line.add_argument("--push", type=float, metavar="N", help="N along the inward normal")
+    line.add_argument("--impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N s, at once (poke only)")
+    line.add_argument("--torque", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m")
+    line.add_argument("--angular-impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m s (poke only)")
+    line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
+    line.add_argument("--for", dest="duration", type=float, metavar="S", help="seconds that it lasts")
+    args = parser.parse_args(argv)
+    for name, value, upper in (("--lead", args.lead, 3600.0), ("--timeout", args.timeout, MAX_TIME_S)):
+        if not 0.0 <= value <= upper:
+            raise InputError(name, value, f"seconds from 0 to {upper:g}")
+    return args
+
+
+def _script(args: argparse.Namespace) -> list[ScriptCommand]:
+    if args.what not in _ONE_LINE_COMMANDS:
+        return read_script(args.what)
+    import yaml
+
+    given = {
+        key: value
+        for key in ("force", "push", "impulse", "torque", "angular_impulse", "axes", "duration")
+        if (value := getattr(args, key)) is not None
+    }
+    given["at"] = _point(args.at)
+    entry = {"t": 0.0, **given} if args.what == "poke" else {"t": 0.0, "wrench": given}
+    return parse_script(yaml.safe_dump([entry]), args.what)
+
+
+def _point(text: str):
+    """A point as a frame writes it, as a script entry writes it."""
+    word, _, values = text.partition("/")
+
+    def triple(part: str) -> list[float]:
+        try:
+            return [float(x) for x in part.split(",")]
+        except ValueError:
+            raise InputError("--at", text, "numbers x,y,z without blanks") from None
+
+    if word == "vertex" and values.isdigit():
+        return {"vertex": int(values)}
+    if word == "point" and values:
+        return {"point": triple(values)}
+    if word == "ray" and values.count("/") == 1:
+        origin, direction = values.split("/")
+        return {"ray": {"origin": triple(origin), "direction": triple(direction)}}
+    return text
+
+
+def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]) -> int:
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
+    from .script_sender import ScriptSender
+
+    rclpy.init(args=[sys.argv[0], *argv], signal_handler_options=SignalHandlerOptions.NO)
+    sender = None
+    try:
+        sender = ScriptSender(args.node, args.timeout)
+        report = sender.send(script, reset=args.reset, lead_s=args.lead)
+    finally:
+        if sender is not None:
+            sender.destroy_node()
+        rclpy.try_shutdown()
+    print(report.text)
+    return 0 if report.all_in_time else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""Sending an expanded script: stamped ahead, never faster than the node confirms, and counted at the end."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from ..core.errors import InputError
+from ..poke_script import ScriptCommand
+from ..scenario import nanoseconds
+from . import qos
+
+MAX_UNCONFIRMED = 500
+"""Commands sent beyond what the node has reported as received: far below what its queues hold."""
+
+SEND_AHEAD_NS = 60 * 1_000_000_000
+"""Commands go out at most this far ahead of simulated time; the node's default horizon is an hour."""
+
+STALLED_S = 15.0
+"""A node that confirms nothing for this long is gone, or receives nothing."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """sent: messages by topic. late, refused: what the node's counters rose by meanwhile."""
+
+    sent: dict[str, int]
+    late: int
+    refused: int
+    last_ns: int
+
+    @property
+    def all_in_time(self) -> bool:
+        return self.late == 0 and self.refused == 0
+
+    @property
+    def text(self) -> str:
+        """One line for the terminal."""
+        parts = ", ".join(f"{count} {topic}" for topic, count in self.sent.items() if count) or "nothing"
+        return f"sent {parts}; {self.late} late, {self.refused} refused; the last acts at {self.last_ns / 1e9:.6g} s"
+
+
+class ScriptSender(Node):
+    """A client of the node with this name. Raises InputError when it doesn't answer within timeout_s."""
+
+    def __init__(self, node_name: str, timeout_s: float) -> None:
+        super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
+        self.target = node_name if node_name.startswith("/") else f"/{node_name}"
+        self._counters: dict[str, str] = {}
+        self._simulated_ns: int | None = None
+        self._expected = 0
+        publisher = self.create_publisher
+        self._topics = {
+            "wrench": publisher(WrenchStamped, f"{self.target}/wrench", qos.COMMAND),
+            "poke": publisher(WrenchStamped, f"{self.target}/poke", qos.COMMAND),
+            "schedule": publisher(String, f"{self.target}/schedule", qos.COMMAND),
+        }
+        self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
+        self._pause_client = self.create_client(SetBool, f"{self.target}/pause")
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+        self._wait_for_node(timeout_s)
+
+    def send(self, script: list[ScriptCommand], reset: bool = False, lead_s: float = 0.2) -> Report:
+        """Send all commands, each stamped with the simulated time at which it acts."""
+        before = dict(self._counters)
+        self._received_before = int(before["commands_received"])
+        if reset:
+            self._call(self._pause_client, SetBool.Request(data=True))
+            self._call(self._reset_client, Trigger.Request())
+            start_ns = 0
+        else:
+            start_ns = self._now_ns() + nanoseconds(lead_s)
+        sent = dict.fromkeys(self._topics, 0)
+        paused = reset
+        for number, command in enumerate(script):
+            stamp_ns = start_ns + command.t_ns
+            if paused and stamp_ns > SEND_AHEAD_NS:
+                self._confirm(number)
+                self._call(self._pause_client, SetBool.Request(data=False))
+                paused = False
+            self._hold_back(number, stamp_ns)
+            topic = command.kind if command.kind in ("wrench", "poke") else "schedule"
+            self._topics[topic].publish(command.message(stamp_ns))
+            sent[topic] += 1
+            self._show(f"sent {number + 1} of {len(script)}")
+        self._confirm(len(script))
+        if paused:
+            self._call(self._pause_client, SetBool.Request(data=False))
+        self._show("")
+        # The counters of the same report that confirmed the last command.
+        late, refused = (int(self._counters[k]) - int(before[k]) for k in ("late", "refused_total"))
+        return Report(sent, late, refused, start_ns + (script[-1].t_ns if script else 0))
+
+    def _wait_for_node(self, timeout_s: float) -> None:
+        deadline = time.monotonic() + timeout_s
+        ready = False
+        while not ready:
+            if time.monotonic() > deadline:
+                raise InputError("--node", self.target, f"a running rigid_body node within {timeout_s:g} s")
+            rclpy.spin_once(self, timeout_sec=0.1)
+            self._show(f"waiting for {self.target}")
+            ready = (
+                bool(self._counters)
+                and self._reset_client.service_is_ready()
+                and self._pause_client.service_is_ready()
+                and all(p.get_subscription_count() for p in self._topics.values())
+            )
+        self._show("")
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == f"{self.target}: simulation":
+                self._counters = {v.key: v.value for v in status.values}
+
+    def _now_ns(self) -> int:
+        """Simulated time of a state published from now on."""
+        self._simulated_ns = None
+
+        def on_pose(message: PoseStamped) -> None:
+            stamp = message.header.stamp
+            self._simulated_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+
+        subscription = self.create_subscription(PoseStamped, f"{self.target}/pose", on_pose, 1)
+        self._spin_until(lambda: self._simulated_ns is not None, f"a state on {self.target}/pose")
+        self.destroy_subscription(subscription)
+        return self._simulated_ns
+
+    def _hold_back(self, number: int, stamp_ns: int) -> None:
+        """Wait while too much is unconfirmed, or the command lies too far ahead to be sent."""
+        if number - self._confirmed() >= MAX_UNCONFIRMED:
+            self._confirm(number - MAX_UNCONFIRMED + 1)
+        while stamp_ns > int(self._counters["sim_time_ns"]) + SEND_AHEAD_NS:
+            rclpy.spin_once(self, timeout_sec=0.5)
+            self._show(f"sent {number}, waiting for simulated time")
+
+    def _confirmed(self) -> int:
+        return int(self._counters["commands_received"]) - self._received_before
+
+    def _confirm(self, count: int) -> None:
+        if count:
+            self._spin_until(lambda: self._confirmed() >= count, f"{self.target} to confirm {count} commands")
+
+    def _call(self, client, request) -> None:
+        future = client.call_async(request)
+        self._spin_until(future.done, f"an answer of {client.srv_name}")
+        answer = future.result()
+        if not answer.success:
+            raise InputError(client.srv_name, answer.message, "success")
+
+    def _spin_until(self, condition, what: str) -> None:
+        deadline = time.monotonic() + STALLED_S
+        while not condition():
+            if time.monotonic() > deadline:
+                raise InputError("--node", self.target, f"{what} within {STALLED_S:g} s")
+            rclpy.spin_once(self, timeout_sec=0.05)
+
+    def _show(self, text: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
