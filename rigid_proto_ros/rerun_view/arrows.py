@@ -127,5 +127,10 @@ def arrows_of(load: ShownLoad, scale: ArrowScale, R: np.ndarray) -> tuple[Arrow 
             continue
         body_value = value if load.axes == "body" else R.T @ value
         pushes = len(arrows) == 0 and float(point @ body_value) < 0.0
-        arrows.append(Arrow(point, value * (length / magnitude), load.axes, pushes, f"{magnitude:.3g} {unit}"))
+        arrows.append(Arrow(point, value * (length / magnitude), load.axes, pushes, f"{_short(magnitude)} {unit}"))
     return arrows[0], arrows[1]
+
+
+def _short(value: float) -> str:
+    """Three figures, without an exponent where people wouldn't write one."""
+    return f"{value:.0f}" if 1e3 <= value < 1e5 else f"{value:.3g}"

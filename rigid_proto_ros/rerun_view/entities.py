@@ -13,6 +13,9 @@ WORLD = "world"
 BODY = "world/body"
 BODY_MESH = "world/body/mesh"
 BODY_AXES = "world/body/axes"
+CENTRE = "world/centre"
+"""The COM with world axes: the place from which views follow the body without turning with it."""
+
 LOADS = "world/loads"
 TRAIL = "world/trail"
 

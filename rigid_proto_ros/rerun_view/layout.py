@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import Any
 
-
 import rerun.blueprint as rrb
 
 from rigid_proto_ros.rerun_view import entities as e
@@ -22,7 +21,7 @@ def layout(size: float) -> Any:
         rrb.Horizontal(
             rrb.Vertical(
                 flight_view(size),
-                rrb.TextLogView(origin="log", name="Commands"),
+                command_view(),
                 row_shares=[5, 1],
             ),
             rrb.Vertical(
@@ -43,17 +42,16 @@ def layout(size: float) -> Any:
 def flight_view(size: float) -> Any:
     """The body in the world, followed by the camera, with its trail."""
     return rrb.Spatial3DView(
-        origin="/" + e.WORLD,
-        contents="$origin/**",
+        origin="/" + e.CENTRE,
+        contents=f"/{e.WORLD}/**",
         name="Flight",
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=[1.45 * size, -1.15 * size, 0.8 * size],
+            position=[0.95 * size, -0.75 * size, 0.5 * size],
             look_target=[0.0, 0.0, 0.0],
             eye_up=[0.0, 0.0, 1.0],
-            tracking_entity="/" + e.BODY,
         ),
         overrides={
             "/" + e.TRAIL: [
@@ -76,11 +74,16 @@ def flight_view(size: float) -> Any:
     )
 
 
-def plot(entity: str, name: str) -> Any:
-    """Scalars of one entity over time."""
-    return rrb.TimeSeriesView(
-        origin="/" + entity, name=name, plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftBottom)
+def command_view() -> Any:
+    """Commands as applied and refusals, by simulated time."""
+    return rrb.TextLogView(
+        origin="log",
+        name="Commands",
+        columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["loglevel", "body"]),
     )
 
 
-
+def plot(entity: str, name: str) -> Any:
+    """Scalars of one entity over time."""
+    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(e.SERIES[entity]) > 1)
+    return rrb.TimeSeriesView(origin="/" + entity, name=name, plot_legend=legend)

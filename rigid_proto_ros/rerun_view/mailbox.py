@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+_wall_ns = time.time_ns
+
 BLOCK_ROWS = 4096
 BLOCKS_WAITING_MAX = 16
 """Full blocks that may wait. Beyond these (65 000 rows: a minute at 1 kHz) the producer waits for the flusher, which
@@ -43,7 +45,9 @@ class Mailbox:
     """One producer, one consumer. ``put`` copies a row in about a microsecond."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
+        # The plain lock itself on the hot path: a Condition's own enter and exit cost more than the copy.
+        self._lock = threading.Lock()
+        self._changed = threading.Condition(self._lock)
         self._filling = Block()
         self._waiting: deque[Block] = deque()
         self._spare: list[Block] = []
@@ -52,11 +56,11 @@ class Mailbox:
 
     def put(self, time_ns: int, row: np.ndarray) -> None:
         """Copy one state row (13,)."""
-        with self._changed:
+        with self._lock:
             block = self._filling
             i = block.count
             block.times[i] = time_ns
-            block.walls[i] = time.time_ns()
+            block.walls[i] = _wall_ns()
             block.rows[i] = row
             block.count = i + 1
             if i + 1 == BLOCK_ROWS:
@@ -65,7 +69,7 @@ class Mailbox:
     def mark(self, time_ns: int, kind: str, *content: Any) -> None:
         """Note what happened after the rows put so far; ``time_ns`` −1 means no time of its own."""
         with self._changed:
-            self._filling.marks.append(Mark(self._filling.count, time_ns, time.time_ns(), kind, content))
+            self._filling.marks.append(Mark(self._filling.count, time_ns, _wall_ns(), kind, content))
 
     def _hand_over(self) -> None:
         while len(self._waiting) >= BLOCKS_WAITING_MAX and not self._closed:

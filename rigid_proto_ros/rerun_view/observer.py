@@ -22,7 +22,7 @@ import numpy as np
 
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.observer import BodySnapshot, Observer, ShownLoad
-from rigid_proto_ros.rerun_view.mailbox import Mailbox, Mark
+from rigid_proto_ros.rerun_view.mailbox import BLOCK_ROWS, Mailbox, Mark
 from rigid_proto_ros.rerun_view.ports import choose_port
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ class RerunObserver(Observer):
         self._processes: list[ViewerProcess] = []
         self._thread: threading.Thread | None = None
         self._remembered: list[tuple[Any, ...]] = []
+        self._passed: list[threading.Event] = []
         self._closed = False
         if viewer != "none":
             self._open_server(viewer, rerun_port, web_port, live_memory_limit)
@@ -167,12 +168,19 @@ class RerunObserver(Observer):
         if self._file is None:
             return
         self._file = None
-        finished = threading.Event()
-        self._mark(-1, "record", None, finished)
-        self._mailbox.wake()
-        finished.wait(CLOSE_TIMEOUT_S)
+        self._wait_for("record", None)
 
     # Inside
+
+    def _flush_now(self) -> None:
+        """Return when everything so far was handed to the file and the viewers."""
+        self._wait_for("pass", None)
+
+    def _wait_for(self, kind: str, content: Any) -> None:
+        done = threading.Event()
+        self._mark(-1, kind, content, done)
+        self._mailbox.wake()
+        done.wait(CLOSE_TIMEOUT_S)
 
     @property
     def _run_name(self) -> str:
@@ -237,7 +245,7 @@ class RerunObserver(Observer):
             closing = mailbox.closed
             try:
                 self._flush()
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
                 self._lost(f"recording stopped: {type(error).__name__}: {error}")
                 self._writer.streams.clear()
@@ -249,11 +257,13 @@ class RerunObserver(Observer):
             self._server.close()
 
     def _flush(self) -> None:
-        """Send everything that waits."""
-        while True:
+        """Send the full blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
+        full = True
+        while full:
             block, waiting = self._mailbox.take()
             if block is None:
                 break
+            full = block.count == BLOCK_ROWS
             self._writer.write(block, self._on_mark, skip_live=waiting > 1)
             self._mailbox.give_back(block)
         for stream in list(self._writer.streams):
@@ -261,6 +271,8 @@ class RerunObserver(Observer):
                 stream.flush()
             except OSError as error:
                 self._give_up_file(error)
+        while self._passed:
+            self._passed.pop().set()
 
     def _on_mark(self, mark: Mark) -> None:
         if mark.kind == "reset":
@@ -271,6 +283,8 @@ class RerunObserver(Observer):
             if file is not None:
                 self._writer.attach(file)
             finished.set()
+        elif mark.kind == "pass":
+            self._passed.append(mark.content[1])
         elif mark.kind == "live":
             self._writer.attach(*mark.content)
 

@@ -47,7 +47,9 @@ def whole_bytes(path: Path) -> tuple[int, bool]:
                 break
             at += FRAME_HEAD.size + length
     if at == HEADER_BYTES:
-        raise InputError("session", str(path), "a recording with something in it; this one was cut before its first piece")
+        raise InputError(
+            "session", str(path), "a recording with something in it; this one was cut before its first piece"
+        )
     return at, False
 
 
@@ -75,6 +77,7 @@ def repair(path: Path, repaired: Path) -> None:
             capture_output=True,
             text=True,
             timeout=REPAIR_TIMEOUT_S,
+            check=False,
             env={**os.environ, "RERUN_APP_ONLY": "true", "NO_COLOR": "1"},
         )
     if done.returncode != 0:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 import time
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.recorded_session import RecordedSession
@@ -24,6 +26,9 @@ START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0
 DRAWN_STEADY_S = 10.0
 """How long a picture may keep changing (plots load, the camera settles) before it is taken as it is."""
+
+NOTICE_GONE_S = 6.0
+"""After this the viewer's note that it runs without a window has left the corner of the window."""
 
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
@@ -43,14 +48,16 @@ def take_picture(
         raise InputError("-o", str(picture), "the path of a .png file in an existing folder")
     with ExitStack() as stack:
         readable = session_path.absolute() if session.complete else stack.enter_context(whole_part(session_path))
+        started = time.monotonic()
         client = stack.enter_context(headless_viewer(*size))
         show(client, readable)
         client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
-        view_id = _view_id(client, view) if view else None
-        pixels = _settled(client, view_id)
-        if view_id is not None:
-            # A single view would come without its surroundings' background; the same pixels are all that's needed.
-            pixels = client.take_screenshot(view_id)
+        if view:
+            pixels = _settled(client, _view_id(client, view))
+        else:
+            client.run_command("ui.toggle_top_panel")
+            time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
+            pixels = _without_empty_top(_settled(client, None))
         if is_blank(pixels):
             raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
         try:
@@ -71,8 +78,6 @@ def check_time(session: RecordedSession, at_s: float) -> None:
 @contextmanager
 def headless_viewer(width: int, height: int) -> Iterator[Any]:
     """A viewer without a window, on loopback, ended on leaving; yields its ``ViewerClient``."""
-    from rerun.experimental import ViewerClient
-
     port = any_free_port()
     with tempfile.TemporaryFile() as log:
         try:
@@ -80,20 +85,21 @@ def headless_viewer(width: int, height: int) -> Iterator[Any]:
         except FileNotFoundError as error:
             raise InputError("snapshot", "no viewer", str(error)) from error
         try:
-            client = ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
-            _wait_until_up(client, process, log)
-            yield client
+            yield _connected(f"rerun+http://{LOOPBACK}:{port}/proxy", process, log)
         finally:
             process.stop()
 
 
-def _wait_until_up(client: Any, process: ViewerProcess, log: Any) -> None:
+def _connected(address: str, process: ViewerProcess, log: Any) -> Any:
+    from rerun.experimental import ViewerClient
+
     deadline = time.monotonic() + START_TIMEOUT_S
     while process.running and time.monotonic() < deadline:
         try:
+            client = ViewerClient.connect(address)
             client.get_state()
-            return
-        except Exception:
+            return client
+        except Exception:  # noqa: BLE001
             # Not listening yet; the client raises errors of several kinds.
             time.sleep(0.1)
     log.seek(0)
@@ -135,23 +141,33 @@ def _view_id(client: Any, name: str) -> str:
 
 
 def _settled(client: Any, view_id: str | None) -> bytes:
-    """A screenshot of the whole window once two in a row are alike (the first ones still load)."""
+    """A screenshot of the view, or the window, once two in a row are alike (the first ones still load)."""
     deadline = time.monotonic() + DRAWN_STEADY_S
-    before = client.take_screenshot()
+    before = client.take_screenshot(view_id)
     while True:
         time.sleep(0.3)
-        after = client.take_screenshot()
+        after = client.take_screenshot(view_id)
         if after == before and not is_blank(after) or time.monotonic() > deadline:
             return after
         before = after
 
 
+def _without_empty_top(png: bytes) -> bytes:
+    """The picture without the rows of one colour at its top, where the viewer's menu was."""
+    with Image.open(io.BytesIO(png)) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=int)
+        inner = pixels[:, 8:-8]
+        busy = np.flatnonzero((np.abs(inner - inner[:, :1]) > 12).any(axis=(1, 2)))
+        # The window's own border is the first few rows.
+        busy = busy[busy > 4]
+        top = int(busy[0]) if len(busy) else 0
+        kept = io.BytesIO()
+        image.crop((0, max(0, top - 8), image.width, image.height)).save(kept, format="png")
+    return kept.getvalue()
+
+
 def is_blank(png: bytes) -> bool:
     """Whether a picture is one colour all over, give or take."""
-    import io
-
-    from PIL import Image
-
     with Image.open(io.BytesIO(png)) as image:
         pixels = np.asarray(image.convert("RGB").resize((128, 128)), dtype=float)
     return float(pixels.std(axis=(0, 1)).max()) < 1.0

@@ -20,9 +20,10 @@ from rigid_proto_ros.rerun_view.layout import layout
 from rigid_proto_ros.rerun_view.mailbox import Block, Mark
 from rigid_proto_ros.rerun_view.streams import Stream
 from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
+from rigid_proto_ros.rerun_view.trail import Trail
 
-TRAIL_RATE = 100.0
-"""[points per simulated second] of the trail; it is a picture, so it needn't have every state."""
+TRAIL_RADIUS = 0.004
+"""In body sizes."""
 
 
 class SceneWriter:
@@ -52,7 +53,7 @@ class SceneWriter:
         self._last_row: np.ndarray | None = None
         self._last_row_ns = 0
         self._momentum_at_start: np.ndarray | None = None
-        self._next_trail_ns = 0
+        self._trail = Trail()
         self._acting: dict[int, tuple[str, Arrow | None, Arrow | None]] = {}
         self._not_placed: dict[int, ShownLoad] = {}
         self._impulses_end: deque[tuple[int, int]] = deque()
@@ -128,14 +129,17 @@ class SceneWriter:
             e.BODY_AXES,
             rr.Arrows3D(vectors=axes, colors=[e.RED, e.GREEN, e.BLUE], radii=0.006 * size),
         )
+        stream.log_static(e.TRAIL, rr.Points3D.from_fields(colors=e.TRAIL_COLOUR, radii=TRAIL_RADIUS * size))
+        for kind, part in self._arrows:
+            colour = e.LOAD_COLOURS[kind] if part == "force" else e.TORQUE_COLOUR
+            style = rr.Arrows3D.from_fields(colors=colour, radii=0.012 * size)
+            stream.log_static(f"{e.LOADS}/{kind}/{part}", style)
         stream.send_blueprint(layout(size))
 
     def _send_body(self, stream: Stream, time_ns: int, wall_ns: int) -> None:
         body = self._body
         times = _times(np.array([time_ns]), np.array([wall_ns]))
-        stream.send(
-            e.BODY_MESH, times, rr.Transform3D.columns(translation=[-body.center_of_mass], scale=[body.scale])
-        )
+        stream.send(e.BODY_MESH, times, rr.Transform3D.columns(translation=[-body.center_of_mass], scale=[body.scale]))
         values = {
             "mass": [float(body.mass)],
             "center_of_mass": np.asarray(body.center_of_mass, dtype=np.float64),
@@ -193,11 +197,11 @@ class SceneWriter:
         self._send_texts(texts)
 
     def _change_body(self, mark: Mark) -> None:
-        first = self._body is None
+        size_before = self.size if self._body is not None else None
         (self._body,) = mark.content
         self._scale = ArrowScale.of(self._body.mass, self.size)
         for stream in self.streams:
-            if first:
+            if self.size != size_before:
                 self._send_styles(stream)
             self._send_body(stream, mark.time_ns, mark.wall_ns)
 
@@ -212,6 +216,7 @@ class SceneWriter:
             self._send_rows(e.STATE, times, rr.Scalars.columns(scalars=rows.ravel()).partition([13] * n))
             pose = rr.Transform3D.columns(translation=rows[:, 0:3], quaternion=rows[:, 3:7])
             self._send_rows(e.BODY, times, pose)
+            self._send_rows(e.CENTRE, times, rr.Transform3D.columns(translation=rows[:, 0:3]))
             if self._body is not None:
                 self._write_plots(times, rows)
                 self._write_trail(times_ns, walls, rows)
@@ -234,27 +239,17 @@ class SceneWriter:
             self._send_rows(entity, times, columns)
 
     def _write_trail(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
-        """Points that the body's farthest vertex passed through."""
+        """Points along the path of the body's farthest vertex, close enough to look like a line."""
         if self._vertices is None or not len(self._vertices):
             return
-        spacing = round(1e9 / TRAIL_RATE)
-        chosen = np.flatnonzero(np.diff(times_ns // spacing, prepend=self._next_trail_ns // spacing - 1) > 0)
+        chosen = self._trail.choose(times_ns)
         if not len(chosen):
             return
-        self._next_trail_ns = (int(times_ns[chosen[-1]]) // spacing + 1) * spacing
         at = self._vertices * self._body.scale - self._body.center_of_mass
         tip = at[np.argmax(np.einsum("ij,ij->i", at, at))]
-        R = rotation_matrices(rows[chosen, 3:7])
-        points = rows[chosen, 0:3] + np.einsum("nij,j->ni", R, tip)
-        self._send(
-            e.TRAIL,
-            _times(times_ns[chosen], walls[chosen]),
-            rr.Points3D.columns(
-                positions=points,
-                colors=[e.TRAIL_COLOUR] * len(points),
-                radii=[0.006 * self.size] * len(points),
-            ),
-        )
+        points, counts = self._trail.between(times_ns[chosen], rows[chosen], tip, spacing=1.5 * TRAIL_RADIUS * self.size)
+        columns = rr.Points3D.columns(positions=points).partition(counts)
+        self._send_rows(e.TRAIL, _times(times_ns[chosen], walls[chosen]), columns)
 
     # Loads
 
@@ -263,16 +258,16 @@ class SceneWriter:
         self._not_placed[load_id] = load
         if load.kind == "impulse":
             self._impulses_end.append((mark.time_ns + IMPULSE_SHOWN_NS, load_id))
-        self._sample_arrows(mark.time_ns, mark.wall_ns)
+        self._sample_arrows(mark.time_ns, mark.wall_ns, load.kind)
 
     def _load_ended(self, mark: Mark, _: list) -> None:
         (load_id,) = mark.content
-        self._forget_load(load_id)
-        self._sample_arrows(mark.time_ns, mark.wall_ns)
+        self._sample_arrows(mark.time_ns, mark.wall_ns, self._forget_load(load_id))
 
-    def _forget_load(self, load_id: int) -> None:
-        self._acting.pop(load_id, None)
-        self._not_placed.pop(load_id, None)
+    def _forget_load(self, load_id: int) -> str:
+        """Returns its kind, "" if it isn't known."""
+        shown, load = self._acting.pop(load_id, None), self._not_placed.pop(load_id, None)
+        return shown[0] if shown else load.kind if load else ""
 
     def _show_arrows(self, block: Block, begin: int, end: int) -> None:
         """Arrows of the loads that act, at rows begin..end, between which no load begins or ends but impulses fade."""
@@ -284,20 +279,21 @@ class SceneWriter:
             self._add_arrows(block.times[begin:upto], block.walls[begin:upto], block.rows[begin:upto])
             if upto < end:
                 self._impulses_end.popleft()
-                self._forget_load(load_id)
-                self._add_arrows(np.array([ends_ns]), block.walls[upto : upto + 1], block.rows[upto : upto + 1])
+                faded = self._forget_load(load_id)
+                at = slice(upto, upto + 1)
+                self._add_arrows(np.array([ends_ns]), block.walls[at], block.rows[at], faded)
             begin = upto
         if end:
             self._last_row, self._last_row_ns = block.rows[end - 1].copy(), int(block.times[end - 1])
 
-    def _sample_arrows(self, time_ns: int, wall_ns: int) -> None:
-        """Arrows at a time between two states, the body carried along from the state before."""
+    def _sample_arrows(self, time_ns: int, wall_ns: int, kind: str) -> None:
+        """Arrows of one kind at a time between two states, the body carried along from the state before."""
         if self._last_row is None:
             return
         row = carried_along(self._last_row, 1e-9 * (time_ns - self._last_row_ns))
-        self._add_arrows(np.array([time_ns]), np.array([wall_ns]), row[np.newaxis])
+        self._add_arrows(np.array([time_ns]), np.array([wall_ns]), row[np.newaxis], kind)
 
-    def _add_arrows(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
+    def _add_arrows(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, only: str = "") -> None:
         if not len(times_ns) or self._body is None:
             return
         if self._not_placed:
@@ -306,7 +302,7 @@ class SceneWriter:
                 self._acting[load_id] = (load.kind, *arrows_of(load, self._scale, R))
             self._not_placed.clear()
         for (kind, part), samples in self._arrows.items():
-            if not self._acting and not samples.showing:
+            if (not self._acting and not samples.showing) or only not in ("", kind):
                 continue
             index = 1 if part == "force" else 2
             arrows = [shown[index] for shown in self._acting.values() if shown[0] == kind and shown[index] is not None]
@@ -318,12 +314,9 @@ class SceneWriter:
                 continue
             counts = np.concatenate(samples.counts)
             total = int(counts.sum())
-            colour = e.LOAD_COLOURS[kind] if part == "force" else e.TORQUE_COLOUR
             columns = rr.Arrows3D.columns(
                 vectors=np.concatenate(samples.vectors) if total else np.empty((0, 3)),
                 origins=np.concatenate(samples.origins) if total else np.empty((0, 3)),
-                colors=[colour] * total,
-                radii=[0.012 * self.size] * total,
                 labels=samples.labels,
             ).partition(counts)
             times = _times(np.concatenate(samples.times), np.concatenate(samples.walls))

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""The path of one body point as points so close that they look like a line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_proto_ros.rerun_view.derived import rotation_matrices, to_world
+
+RATE = 200
+"""[1/s, simulated] At most so many pieces: a picture needn't have every state."""
+
+POINTS_PER_PIECE_MAX = 32
+
+
+class Trail:
+    """Remembers where the path has got to."""
+
+    def __init__(self) -> None:
+        self._last_tick: int | None = None
+        self._last: tuple[int, np.ndarray, np.ndarray] | None = None
+
+    def choose(self, times_ns: np.ndarray) -> np.ndarray:
+        """Indices of the states (n,) that end a piece of the trail."""
+        ticks = times_ns // (1_000_000_000 // RATE)
+        before = int(ticks[0]) - 1 if self._last_tick is None else self._last_tick
+        chosen = np.flatnonzero(np.diff(ticks, prepend=before) > 0)
+        self._last_tick = int(ticks[-1])
+        return chosen
+
+    def between(
+        self, times_ns: np.ndarray, rows: np.ndarray, point: np.ndarray, spacing: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points (p, 3) [world] on the path from the state before to each of rows (n, 13), and their counts (n,).
+
+        The body point (3,) moves between two states on the cubic that has its position and velocity at both.
+        """
+        R = rotation_matrices(rows[:, 3:7])
+        at = rows[:, 0:3] + to_world(R, point)
+        velocity = rows[:, 7:10] + to_world(R, np.cross(rows[:, 10:13], point))
+        if self._last is None:
+            self._last = (int(times_ns[0]), at[0], velocity[0])
+        first_ns, first_at, first_velocity = self._last
+        h = 1e-9 * np.diff(times_ns, prepend=first_ns)
+        start = np.vstack([first_at, at[:-1]])
+        start_slope = np.vstack([first_velocity, velocity[:-1]]) * h[:, np.newaxis]
+        end_slope = velocity * h[:, np.newaxis]
+        self._last = (int(times_ns[-1]), at[-1].copy(), velocity[-1].copy())
+
+        length = np.linalg.norm(at - start, axis=1)
+        counts = np.clip(np.ceil(length / spacing), 1, POINTS_PER_PIECE_MAX).astype(int)
+        piece = np.repeat(np.arange(len(at)), counts)
+        within = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+        u = (within / counts[piece])[:, np.newaxis]
+        points = (
+            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * start[piece]
+            + u * (1.0 - u) ** 2 * start_slope[piece]
+            + u * u * (3.0 - 2.0 * u) * at[piece]
+            - u * u * (1.0 - u) * end_slope[piece]
+        )
+        return points, counts
