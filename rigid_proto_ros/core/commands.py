@@ -7,12 +7,16 @@ four publishers in any order give one trajectory.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
 from .errors import CommandRefused
 from .frames import Frame
+
+FARTHEST = 1e100
+"""Metres: a place beyond it has no squared distance in a double."""
 
 
 class Rank(IntEnum):
@@ -94,7 +98,72 @@ class Change:
         return self.changes
 
 
-Command = WrenchCommand | ClearWrench | Change
+@dataclass(frozen=True)
+class TieString:
+    """Where on the body the string is, or will be, tied.
+
+    axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto the
+    surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent; message: serialized bytes.
+    """
+
+    axes: str
+    point: tuple[float, float, float]
+    stamp_ns: int = 0
+    frame_id: str = ""
+    message: bytes = b""
+    kind = "string_attach"
+    rank = Rank.STRING
+
+    def __post_init__(self) -> None:
+        if self.axes not in ("mesh", "body", "world"):
+            raise CommandRefused("frame", "frame_id", self.frame_id or self.axes, "axes mesh, body or world")
+        _check_point("string attach", self.point)
+
+    @property
+    def content(self) -> dict:
+        return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
+
+
+@dataclass(frozen=True)
+class MoveString:
+    """Where the string's free end goes, target (3,) [m, world]; the first one ties the string."""
+
+    target: tuple[float, float, float]
+    stamp_ns: int = 0
+    frame_id: str = ""
+    message: bytes = b""
+    kind = "string_target"
+    rank = Rank.STRING
+
+    def __post_init__(self) -> None:
+        _check_point("string target", self.target)
+
+    @property
+    def content(self) -> dict:
+        return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.target)}
+
+
+@dataclass(frozen=True)
+class ReleaseString:
+    """Let the string go."""
+
+    message: bytes = b""
+    kind = "string_release"
+    rank = Rank.CHANGE
+
+    @property
+    def content(self) -> dict:
+        return {}
+
+
+def _check_point(field: str, point) -> None:
+    if not all(math.isfinite(x) for x in point):
+        raise CommandRefused("nonfinite", field, list(point), "three finite numbers")
+    if not all(abs(x) <= FARTHEST for x in point):
+        raise CommandRefused("magnitude", field, list(point), f"at most {FARTHEST:g} m")
+
+
+Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
 @dataclass(order=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from .body import Body
 from .integrators.integrator import Integrator
+from .string import StringSettings
 from .surface import Surface
 
 
@@ -17,7 +18,7 @@ from .surface import Surface
 class Setup:
     """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the mesh.
     contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m s].
-    wrench_timeout_ns 0 holds for ever. initial (13,): the state row at time 0.
+    wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps. initial (13,): the state row at time 0.
     """
 
     body: Body
@@ -36,3 +37,13 @@ class Setup:
     initial: np.ndarray
     world_frame: str = "world"
     body_frame: str = "body"
+    accuracy: float = 1e-9
+    string: StringSettings = StringSettings()
+
+    @property
+    def length(self) -> float:
+        """Half the diagonal of the mesh's box as scaled, by which displacement errors are measured; 1 m without a mesh."""
+        if self.surface is None:
+            return 1.0
+        diagonal = self.surface.extent * self.body.scale
+        return 0.5 * float((diagonal * diagonal).sum()) ** 0.5

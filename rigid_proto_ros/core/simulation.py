@@ -9,19 +9,33 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .observer import BodySnapshot, Observer, ShownLoad
-from .commands import Change, ClearWrench, Command, Pending, WrenchCommand
+from .commands import (
+    Change,
+    ClearWrench,
+    Command,
+    MoveString,
+    Pending,
+    ReleaseString,
+    TieString,
+    WrenchCommand,
+)
 from .errors import CommandRefused, InputError
 from .event_log import EventLog
+from .integrators import check_carried
+from .integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, STRING, needs_of_load
 from .loads import Load, LoadSum, apply_impulse, cross, settle
+from .observer import BodySnapshot, Observer, ShownLoad
 from .problem import make_problem
 from .segment import IntegrationFailed, Segment
 from .setup import Setup
 from .state import State
+from .string import Tied
+from .string_control import StringControl
 
 NEVER = 1 << 63
 """Later than any simulated time [ns]."""
@@ -51,6 +65,7 @@ class Simulation:
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self._load_ids = 0
+        check_carried(setup.integrator, _needs(setup, (), setup.string.attached))
         self._start_over()
 
     # What a caller may ask
@@ -63,12 +78,52 @@ class Simulation:
     @property
     def force_evaluations(self) -> int:
         """Evaluations of the equations of motion in those steps."""
-        return self.steps * self.setup.integrator.evaluations
+        return self._finished_evaluations + self._segment.evaluations
+
+    @property
+    def choice(self) -> str:
+        """Which method carries the body now, and why."""
+        return self._segment.stepper.choice
+
+    @property
+    def floor_binds(self) -> bool:
+        """Rounding, not the accuracy asked for, limits some step of the present segment."""
+        return self._segment.stepper.floor_binds
+
+    @property
+    def too_coarse(self) -> str:
+        """Why the fixed step says nothing here, |ω|h or ω_s h being beyond the integrator's limit; empty when it does."""
+        setup = self.setup
+        limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
+        spin = float((self.state.angular_velocity_body**2).sum()) ** 0.5 * h
+        swing = self.string.frequency * h if self.string else 0.0
+        if spin > limit:
+            return f"{setup.integrator.name}: |w| step = {spin:.3g}, good up to {limit:g}"
+        if swing > limit and not setup.integrator.stiff:
+            return f"{setup.integrator.name}: string frequency times step = {swing:.3g}, good up to {limit:g}"
+        return ""
+
+    @property
+    def string(self) -> Tied | None:
+        """The string as it is tied, or None."""
+        return self._string.tied
+
+    @property
+    def hand_work(self) -> float:
+        """What the hand at the string's free end has worked since start or reset [J]."""
+        return self._finished_work + self._segment.hand_work
+
+    @property
+    def string_heat(self) -> float:
+        """What the string's damper has turned to heat since start or reset [J]."""
+        return self._finished_heat + self._segment.heat
 
     @property
     def potential_energy(self) -> float:
-        """−m g·x [J]."""
-        return -self.setup.body.mass * float((self.setup.gravity * self.state.position).sum())
+        """−m g·x, and the string's [J]."""
+        setup = self.setup
+        energy = -setup.body.mass * float((setup.gravity * self.state.position).sum())
+        return energy + (self.string.potential_energy(setup.body, self.state) if self.string else 0.0)
 
     @property
     def kinetic_energy(self) -> float:
@@ -84,7 +139,7 @@ class Simulation:
     def angular_momentum_drift(self) -> float:
         """|L − L₀|/|L₀| since the present segment began; 0 while something turns the body, or without spin."""
         loads = self._load_sum()
-        turned = loads.torque_world.any() or loads.torque_body.any() or loads.moment.any()
+        turned = self.string is not None or loads.torque_world.any() or loads.torque_body.any() or loads.moment.any()
         if turned or self.setup.angular_damping or not self.setup.gyroscopic:
             return 0.0
         start = self._segment.start.angular_momentum(self.setup.body.inertia)
@@ -101,7 +156,8 @@ class Simulation:
         """Nothing moves, acts or is about to."""
         row = self.state.row
         still = not (row[7:].any() or self.setup.gravity.any())
-        return still and self._held is None and not self._pulses and not self._pending
+        free = self._held is None and self.string is None and not self._pulses
+        return still and free and not self._pending
 
     # The way of a command
 
@@ -114,6 +170,8 @@ class Simulation:
         load = None
         if isinstance(command, WrenchCommand):
             load = self._settled(command, None)
+        elif isinstance(command, MoveString):
+            check_carried(self.setup.integrator, frozenset({STRING}))
         self._arrivals += 1
         pending = Pending(when_ns, command.rank, command.message, self._arrivals, command)
         pending.load = None if load is None or command.frame.point[0] == "ray" else (load, self.setup.surface)
@@ -174,7 +232,7 @@ class Simulation:
         event_ns = self._pending[0].time_ns if self._pending else NEVER
         for acting in self._acting():
             event_ns = min(event_ns, acting.end_ns)
-        return event_ns
+        return min(event_ns, self._string.next_event_ns(self._segment.start.time_ns, NEVER))
 
     def _acting(self) -> list[_Acting]:
         return [*([self._held] if self._held else []), *self._pulses]
@@ -183,6 +241,7 @@ class Simulation:
         """Everything that ends or begins at ``now_ns``; a new segment if anything did."""
         self.time_ns, self.state = now_ns, state
         changed = self._end_loads(lambda acting: acting.end_ns <= now_ns)
+        changed |= self._string.end_due(now_ns)
         while self._pending and self._pending[0].time_ns == now_ns:
             pending = heapq.heappop(self._pending)
             try:
@@ -194,8 +253,7 @@ class Simulation:
                 self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
         if changed:
             self._segment.cut(now_ns)
-            self._finished_steps += self._segment.steps
-            self._segment = self._new_segment(self.state)
+            self._finish_segment()
 
     def _apply(self, pending: Pending) -> None:
         command = pending.command
@@ -205,20 +263,35 @@ class Simulation:
             self._end_loads(lambda acting: True)
         elif isinstance(command, Change):
             self._change(command.apply())
+        elif isinstance(command, TieString):
+            self._string.tie_at(command, self.setup, self.state)
+        elif isinstance(command, MoveString):
+            check_carried(self.setup.integrator, frozenset({STRING}))
+            self._string.move(command, self.setup, self.state)
+        elif isinstance(command, ReleaseString):
+            self._string.release()
         self.log(command.kind, command.content)
 
     def _load_of(self, pending: Pending) -> Load:
         """The load settled at submission, or settled anew when it was a ray or the mesh has changed since."""
         if pending.load is not None and pending.load[1] is self.setup.surface:
-            pending.load[0].check_magnitude(self.setup.body)
-            return pending.load[0]
+            load = pending.load[0]
+            load.check_magnitude(self.setup.body)
+            self._check_carried(pending.command, load)
+            return load
         return self._settled(pending.command, self.state)
 
     def _settled(self, command: WrenchCommand, state: State | None) -> Load:
         setup = self.setup
         load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
         load.check_magnitude(setup.body)
+        self._check_carried(command, load)
         return load
+
+    def _check_carried(self, command: WrenchCommand, load: Load) -> None:
+        # An impulse acts at once: the integrator never sees it.
+        if not command.frame.impulse:
+            check_carried(self.setup.integrator, needs_of_load(load))
 
     def _begin_load(self, command: WrenchCommand, load: Load) -> None:
         self._load_ids += 1
@@ -256,6 +329,8 @@ class Simulation:
         """Take another setup in flight. The same mesh at the same size stays where it is, so a COM that moves within it
         takes position and velocity along; another mesh or size keeps the COM and its motion.
         """
+        tied = self.string is not None if new.string.attached == self.setup.string.attached else new.string.attached
+        check_carried(new.integrator, _needs(new, (acting.load for acting in self._acting()), tied))
         old, self.setup = self.setup, new
         moved = new.body.center_of_mass - old.body.center_of_mass
         if new.geometry == old.geometry and moved.any():
@@ -267,6 +342,7 @@ class Simulation:
             self.state = replace(self.state, row=row)
         if self._held is not None:
             self._set_held_end()
+        self._string.change(old, new, self.state)
         self.announce()
 
     # Segments
@@ -281,8 +357,18 @@ class Simulation:
             setup.angular_damping,
             setup.gyroscopic,
             start,
+            self.string,
+            setup.length,
         )
-        return Segment(start, problem, setup.integrator, setup.step_ns)
+        return Segment(start, problem, setup.integrator, setup.step_ns, setup.accuracy)
+
+    def _finish_segment(self) -> None:
+        """Keep the segment's counts and begin another from the present state."""
+        self._finished_steps += self._segment.steps
+        self._finished_evaluations += self._segment.evaluations
+        self._finished_work += self._segment.hand_work
+        self._finished_heat += self._segment.heat
+        self._segment = self._new_segment(self.state)
 
     def _load_sum(self) -> LoadSum:
         """All loads that act, summed afresh in their canonical order."""
@@ -296,9 +382,13 @@ class Simulation:
         self._held: _Acting | None = None
         self._pulses: list[_Acting] = []
         self._finished_steps = 0
+        self._finished_evaluations = 0
+        self._finished_work = 0.0
+        self._finished_heat = 0.0
         self.failure = ""
         self.time_ns = 0
         self.state = State(0, self.setup.initial.copy())
+        self._string = StringControl(self.setup, self.state)
         self._segment = self._new_segment(self.state)
 
     def _stop_in_last_good_state(self, failed: IntegrationFailed) -> None:
@@ -306,8 +396,7 @@ class Simulation:
             self.state = failed.last_good
         self.time_ns = self.state.time_ns
         self.failure = str(failed)
-        self._finished_steps += self._segment.steps
-        self._segment = self._new_segment(self.state)
+        self._finish_segment()
 
     # What observers are told
 
@@ -329,3 +418,15 @@ class Simulation:
             setup.integrator.name,
             setup.gyroscopic,
         )
+
+
+def _needs(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
+    """What the scene asks of its integrator."""
+    needs = set().union(*(needs_of_load(load) for load in loads))
+    if not setup.gyroscopic:
+        needs.add(NO_GYROSCOPIC_TERM)
+    if setup.angular_damping:
+        needs.add(ANGULAR_DAMPING)
+    if tied:
+        needs.add(STRING)
+    return frozenset(needs)

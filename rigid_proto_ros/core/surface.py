@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -20,6 +21,11 @@ class Surface:
 
     vertices: np.ndarray
     triangles: np.ndarray
+
+    @cached_property
+    def extent(self) -> np.ndarray:
+        """Sides of the bounding box (3,)."""
+        return self.vertices.max(axis=0) - self.vertices.min(axis=0)
 
     def ray_hit(self, origin, direction) -> tuple[np.ndarray, int] | None:
         """First point (3,) where the ray meets the surface from either side, and its triangle; None for a miss."""

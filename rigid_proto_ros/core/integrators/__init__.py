@@ -8,11 +8,20 @@ An integrator takes the variables of a segment (core/motion.py) forward in time 
 
 from __future__ import annotations
 
-from ..errors import InputError
+from ..errors import CommandRefused, InputError
 from .integrator import Integrator
 from .rk4 import RK4
 
 INTEGRATORS: dict[str, Integrator] = {integrator.name: integrator for integrator in (RK4,)}
+
+
+def check_carried(integrator: Integrator, needs: frozenset[str]) -> None:
+    """Raises CommandRefused (``integrator``) naming those that can when ``integrator`` can't meet all ``needs``."""
+    lacks = integrator.lacks(needs)
+    if lacks:
+        able = ", ".join(name for name, other in INTEGRATORS.items() if not other.lacks(needs))
+        wanted = " and ".join(sorted(needs))
+        raise CommandRefused("integrator", "integrator", integrator.name, f"one that carries {wanted}: {able}")
 
 
 def integrator_named(name: str) -> Integrator:

@@ -1,26 +1,67 @@
 # SPDX-License-Identifier: MIT
-"""What every fixed-step integrator is: a name, facts about it, and one compiled kernel."""
+"""What every integrator is: a name, facts about it, what it can carry, and a way to make steps of a segment."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from ..problem import HAS_STRING
+
+if TYPE_CHECKING:
+    from ..loads import Load
+    from .stepping import Stepper
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
 
+BODY_TORQUE = "a torque"
+WORLD_TORQUE = "a torque fixed in the world or a world force off the centre of mass"
+BODY_FORCE = "a force that turns with the body"
+ANGULAR_DAMPING = "angular damping"
+STRING = "a string"
+NO_GYROSCOPIC_TERM = "gyroscopic: false"
+
+LOADS = frozenset({BODY_TORQUE, WORLD_TORQUE, BODY_FORCE})
+"""What wrenches and pokes can ask for. Gravity, world forces at the COM and linear damping are closed form for all."""
+
+
+def needs_of_load(load: Load) -> frozenset[str]:
+    """What a wrench or poke asks of the integrator."""
+    turns = any(load.torque) or (load.mesh_point is not None and any(load.force))
+    if load.axes == "world":
+        return frozenset({WORLD_TORQUE}) if turns else frozenset()
+    return frozenset(({BODY_TORQUE} if turns else set()) | ({BODY_FORCE} if any(load.force) else set()))
+
 
 @dataclass(frozen=True)
 class Integrator:
-    """A fixed-step integrator.
-
-    order: global order of accuracy. evaluations: force evaluations per step. steps(y, p, h, n): take up to n steps of h
-    seconds in place and return how many were good; a step whose result isn't finite or passes MAX_SPEED is undone.
+    """order: global order of accuracy, None when exact. evaluations: of the equations of motion per step. source: where it
+    is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h of a
+    string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
+    kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result isn't
+    finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another. stiff: bounded at any ω_s h. stepper: how a segment is stepped: (problem, variables, step_ns, accuracy).
     """
 
     name: str
-    order: int
+    order: int | None
     evaluations: int
-    steps: Callable[[np.ndarray, np.ndarray, float, int], int]
+    source: str
+    limits: str
+    stability_limit: float
+    carries: frozenset[str]
+    kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None
+    stepper: Callable[[Integrator, np.ndarray, np.ndarray, int, float], Stepper]
+    string_kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None = None
+    stiff: bool = False
+
+    def kernel_for(self, problem: np.ndarray):
+        """The kernel that steps this problem; only the ones used are ever compiled."""
+        return self.string_kernel if problem[HAS_STRING] != 0.0 and self.string_kernel else self.kernel
+
+    def lacks(self, needs: frozenset[str]) -> frozenset[str]:
+        """What of a scene's needs it can't carry; empty when it fits."""
+        return needs - self.carries
