@@ -6,7 +6,7 @@ SHELL := /bin/bash
 PY := .venv/bin/python
 READY := .venv/.pins
 # What the node says to others stays on this machine, unless the user has chosen otherwise.
-run up: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+run up pictures: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 12
@@ -31,14 +31,14 @@ lint: setup ## ruff and mypy
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 
-pictures: setup ## draw the README's pictures anew from recordings (needs mesa-vulkan-drivers)
-	$(PY) -m rigid_proto_ros.cli.main snapshot out/session.rrd --at 4 -o docs/flight.png
+pictures: run ## fly, and draw the README's picture anew from the recording (needs mesa-vulkan-drivers)
+	.venv/bin/rigid_proto snapshot out/session.rrd --at 4 -o docs/flight.png
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
 	$(PY) -m colcon build --packages-select rigid_proto_ros
 
 bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU and versions
-	@for file in benchmarks/bench_*.py; do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
+	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -v references); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
 
 .venv-bench/.pins: $(READY) benchmarks/requirements.txt
 	.venv/bin/python -m venv .venv-bench
