@@ -132,5 +132,3 @@ def test_kill_9_loses_at_most_a_second(tmp_path):
     # 100 states a second were published; the flush comes every 0.5 s.
     assert published - len(session.times) <= 100
     assert whole_bytes(path)[0] <= path.stat().st_size
-
-

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 
-from rigid_proto_ros.core.errors import InputError
+from ..core.errors import InputError
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Take the picture; InputError says what was wrong with the request."""
-    from rigid_proto_ros.rerun_view.snapshot import take_picture
+    from ..rerun_view.snapshot import take_picture
 
     take_picture(args.session, args.at, args.output, args.view, _size(args.size))
     return 0

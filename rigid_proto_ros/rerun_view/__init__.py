@@ -5,6 +5,6 @@
 run that nobody watches doesn't pay for it.
 """
 
-from rigid_proto_ros.rerun_view.observer import RerunObserver
+from .observer import RerunObserver
 
 __all__ = ["RerunObserver"]

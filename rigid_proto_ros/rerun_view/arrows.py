@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigid_proto_ros.core.observer import ShownLoad
-from rigid_proto_ros.rerun_view.derived import rotation_matrices, to_world
+from ..core.observer import ShownLoad
+from .derived import rotation_matrices, to_world
 
 IMPULSE_SHOWN_NS = 150_000_000
 """[ns of simulated time] An impulse acts at an instant; its arrow stays this long so that it can be seen."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_proto_ros.core.observer import BodySnapshot
+from ..core.observer import BodySnapshot
 
 
 @dataclass(frozen=True)

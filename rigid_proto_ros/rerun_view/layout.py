@@ -7,7 +7,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
-from rigid_proto_ros.rerun_view import entities as e
+from . import entities as e
 
 TRAIL_SECONDS = 3.0
 """[simulated s] Length of the trail shown behind the body."""

@@ -20,14 +20,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.observer import BodySnapshot, Observer, ShownLoad
-from rigid_proto_ros.rerun_view.mailbox import BLOCK_ROWS, Mailbox, Mark
-from rigid_proto_ros.rerun_view.ports import choose_port
+from ..core.errors import InputError
+from ..core.observer import BodySnapshot, Observer, ShownLoad
+from .mailbox import BLOCK_ROWS, Mailbox, Mark
+from .ports import choose_port
 
 if TYPE_CHECKING:
-    from rigid_proto_ros.rerun_view.streams import FileStream, LiveServer, LiveStream
-    from rigid_proto_ros.rerun_view.viewers import ViewerProcess
+    from .streams import FileStream, LiveServer, LiveStream
+    from .viewers import ViewerProcess
 
 FLUSH_PERIOD_S = 0.5
 """What a kill -9 loses at most, and how far viewers lag; every flush costs about 10 ms and 10 kB of overhead."""
@@ -153,7 +153,7 @@ class RerunObserver(Observer):
 
         Raises InputError where the file can't be written. A recording that begins in flight shows everything from there on.
         """
-        from rigid_proto_ros.rerun_view.streams import FileStream
+        from .streams import FileStream
 
         # Finished first: it may be the same file.
         self.stop_recording()
@@ -198,7 +198,7 @@ class RerunObserver(Observer):
         """Start the flushing thread, once there is something to flush to."""
         if self._mailbox is not None:
             return
-        from rigid_proto_ros.rerun_view.writer import SceneWriter
+        from .writer import SceneWriter
 
         self._writer = SceneWriter()
         self._mailbox = Mailbox()
@@ -209,7 +209,7 @@ class RerunObserver(Observer):
         self._thread.start()
 
     def _open_server(self, viewer: str, rerun_port: int | None, web_port: int | None, memory_limit: str) -> None:
-        from rigid_proto_ros.rerun_view.streams import LiveServer
+        from .streams import LiveServer
 
         port = choose_port("rerun_port", rerun_port, DEFAULT_RERUN_PORT)
         web = choose_port("web_port", web_port, DEFAULT_WEB_PORT) if viewer == "web" else 0
@@ -222,7 +222,7 @@ class RerunObserver(Observer):
         self._open_viewer(viewer, web)
 
     def _open_viewer(self, viewer: str, web_port: int) -> None:
-        from rigid_proto_ros.rerun_view import viewers
+        from . import viewers
 
         try:
             if viewer == "web":
@@ -289,7 +289,7 @@ class RerunObserver(Observer):
             self._writer.attach(*mark.content)
 
     def _next_run(self) -> None:
-        from rigid_proto_ros.rerun_view.streams import FileStream, LiveStream
+        from .streams import FileStream, LiveStream
 
         writer = self._writer
         moved = writer.moved
@@ -319,7 +319,7 @@ class RerunObserver(Observer):
                 writer.attach(file)
 
     def _finish_file(self) -> None:
-        from rigid_proto_ros.rerun_view.streams import FileStream
+        from .streams import FileStream
 
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
             self._writer.streams.remove(stream)
@@ -329,7 +329,7 @@ class RerunObserver(Observer):
                 self._lost(str(error))
 
     def _give_up_file(self, error: OSError) -> None:
-        from rigid_proto_ros.rerun_view.streams import FileStream
+        from .streams import FileStream
 
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
             self._writer.streams.remove(stream)

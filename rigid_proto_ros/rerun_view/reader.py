@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.recorded_session import RecordedSession
-from rigid_proto_ros.rerun_view import entities as e
-from rigid_proto_ros.rerun_view.rrd_file import whole_bytes, whole_part
+from ..core.errors import InputError
+from ..recorded_session import RecordedSession
+from . import entities as e
+from .rrd_file import whole_bytes, whole_part
 
 STATES = "Scalars:scalars"
 TEXT = "TextLog:text"

@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.rerun_view.viewers import viewer_program
+from ..core.errors import InputError
+from .viewers import viewer_program
 
 MAGIC = b"RRF2"
 HEADER_BYTES = 12

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.recorded_session import RecordedSession
-from rigid_proto_ros.rerun_view import entities as e
-from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
-from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.rrd_file import whole_part
-from rigid_proto_ros.rerun_view.viewers import ViewerProcess, open_headless
+from ..core.errors import InputError
+from ..recorded_session import RecordedSession
+from . import entities as e
+from .ports import LOOPBACK, any_free_port
+from .reader import read_session
+from .rrd_file import whole_part
+from .viewers import ViewerProcess, open_headless
 
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0

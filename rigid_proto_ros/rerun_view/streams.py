@@ -16,8 +16,8 @@ from typing import Any
 
 import rerun as rr
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.rerun_view.ports import LOOPBACK
+from ..core.errors import InputError
+from .ports import LOOPBACK
 
 APPLICATION_ID = "rigid_proto_ros"
 FLUSH_TIMEOUT_S = 5.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.rerun_view.derived import rotation_matrices, to_world
+from .derived import rotation_matrices, to_world
 
 RATE = 200
 """[1/s, simulated] At most so many pieces: a picture needn't have every state."""

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from urllib.parse import quote
 
-from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+from .ports import LOOPBACK, any_free_port
 
 STOP_TIMEOUT_S = 1.0
 

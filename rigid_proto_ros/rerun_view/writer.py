@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rigid_proto_ros.core.observer import BodySnapshot, ShownLoad
-from rigid_proto_ros.rerun_view import entities as e
-from rigid_proto_ros.rerun_view.arrows import IMPULSE_SHOWN_NS, Arrow, ArrowSamples, ArrowScale, arrows_of
-from rigid_proto_ros.rerun_view.derived import angle_to, carried_along, derive, rotation_matrices
-from rigid_proto_ros.rerun_view.layout import layout
-from rigid_proto_ros.rerun_view.mailbox import Block, Mark
-from rigid_proto_ros.rerun_view.streams import Stream
-from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
-from rigid_proto_ros.rerun_view.trail import Trail
+from ..core.observer import BodySnapshot, ShownLoad
+from . import entities as e
+from .arrows import IMPULSE_SHOWN_NS, Arrow, ArrowSamples, ArrowScale, arrows_of
+from .derived import angle_to, carried_along, derive, rotation_matrices
+from .layout import layout
+from .mailbox import Block, Mark
+from .streams import Stream
+from .surface_normals import shaded_surface
+from .trail import Trail
 
 TRAIL_RADIUS = 0.004
 """In body sizes."""
@@ -247,7 +247,9 @@ class SceneWriter:
             return
         at = self._vertices * self._body.scale - self._body.center_of_mass
         tip = at[np.argmax(np.einsum("ij,ij->i", at, at))]
-        points, counts = self._trail.between(times_ns[chosen], rows[chosen], tip, spacing=1.5 * TRAIL_RADIUS * self.size)
+        points, counts = self._trail.between(
+            times_ns[chosen], rows[chosen], tip, spacing=1.5 * TRAIL_RADIUS * self.size
+        )
         columns = rr.Points3D.columns(positions=points).partition(counts)
         self._send_rows(e.TRAIL, _times(times_ns[chosen], walls[chosen]), columns)
 
