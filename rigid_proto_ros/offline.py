@@ -18,16 +18,24 @@ from .scenario import Scenario, make_scenario, publication_ns
 from .scene_file import read_scene_file, scalar
 
 
-def read_scene(name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print) -> Scenario:
+def scene_file(name: str) -> Path:
+    """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
+    path = Path(name)
+    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
+        return scene_path(name.removesuffix(".yaml"))
+    if not path.exists():
+        raise InputError("scene", name, f"a scene file, or one of the bundled {', '.join(scene_names())}")
+    return path
+
+
+def read_scene(
+    name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print
+) -> Scenario:
     """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
 
     An unknown name in a section for this node raises InputError; in ``/**`` it is warned of.
     """
-    path = Path(name)
-    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
-        path = scene_path(name.removesuffix(".yaml"))
-    elif not path.exists():
-        raise InputError("scene", name, f"a scene file, or one of the bundled {', '.join(scene_names())}")
+    path = scene_file(name)
     scene = read_scene_file(path)
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():

@@ -154,7 +154,9 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
 def _line_difference(recorded: Sequence[str], computed: Sequence[str]) -> Difference | None:
     for number, (ours, theirs) in enumerate(zip(computed, recorded, strict=False), 1):
         if ours != theirs:
-            return Difference(_decoded(theirs, number)[0], f"command {number} differs: {theirs} recorded, {ours} computed")
+            return Difference(
+                _decoded(theirs, number)[0], f"command {number} differs: {theirs} recorded, {ours} computed"
+            )
     if len(computed) > len(recorded):
         line = computed[len(recorded)]
         return Difference(_decoded(line, len(recorded) + 1)[0], f"a command that wasn't recorded: {line}")

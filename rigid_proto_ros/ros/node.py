@@ -32,7 +32,6 @@ from .parameter_server import converted, declare_parameters, ros_parameter
 from .physics_thread import PhysicsThread
 
 
-
 class RigidBodyNode(Node):
     """make_observer(scenario, node name) gives the viewer and recorder, or a null Observer.
 
@@ -224,9 +223,7 @@ class _StatePublisher:
 
     def __init__(self, node: Node, world_frame: str, body_frame: str) -> None:
         def publisher(message_type, topic):
-            return node.create_publisher(
-                message_type, f"~/{topic}", qos.STATE, qos_overriding_options=qos.OVERRIDABLE
-            )
+            return node.create_publisher(message_type, f"~/{topic}", qos.STATE, qos_overriding_options=qos.OVERRIDABLE)
 
         self._pose = publisher(PoseStamped, "pose"), cdr.StampedTemplate(world_frame, 7)
         self._twist = publisher(TwistStamped, "twist"), cdr.StampedTemplate(world_frame, 6)

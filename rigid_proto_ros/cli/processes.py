@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""Child processes that never outlive their parent's command."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+_MODULES = {"rigid_body_node": "rigid_proto_ros.ros.main", "poke_client": "rigid_proto_ros.ros.poke_client"}
+GRACE_S = 5.0
+"""A process that doesn't end within this time of SIGINT is killed."""
+
+
+def own_executable(name: str) -> list[str]:
+    """How to start one of this package's executables with the interpreter and packages of this process."""
+    return [sys.executable, "-m", _MODULES[name]]
+
+
+def _end_with_parent() -> None:
+    # Linux: SIGTERM when the parent dies, so that kill -9 of the command leaves no orphan.
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+
+
+class Processes:
+    """Starts processes and ends them all on leaving, also when the command itself is ended by a signal."""
+
+    def __init__(self) -> None:
+        self._running: list[subprocess.Popen] = []
+        self._handler = None
+
+    def __enter__(self) -> Processes:
+        self._handler = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+        return self
+
+    def __exit__(self, *_) -> None:
+        for process in reversed(self._running):
+            self.end(process)
+        signal.signal(signal.SIGTERM, self._handler)
+
+    def start(self, command: list[str]) -> subprocess.Popen:
+        """Start a process in a session of its own: a Ctrl-C at the terminal reaches this command alone, which ends them."""
+        folder = str(Path(__file__).resolve().parents[2])
+        paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+        process = subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent, env=environment)
+        self._running.append(process)
+        return process
+
+    def wait_for(self, process: subprocess.Popen, while_running: subprocess.Popen) -> int:
+        """Wait until a process has ended; returns its status, or that of the other one when it ended before."""
+        while process.poll() is None:
+            if while_running.poll() is not None:
+                return while_running.returncode or 1
+            time.sleep(0.05)
+        return process.returncode
+
+    def end(self, process: subprocess.Popen) -> int:
+        """SIGINT, then after a while SIGKILL; returns the status."""
+        if process in self._running:
+            self._running.remove(process)
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(GRACE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+        return process.wait()

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto up``: the node with a live view, until Ctrl-C; what ``make up`` runs."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+
+def add_parser(subparsers) -> None:
+    """Declare the command's arguments."""
+    parser = subparsers.add_parser("up", help="node and live view, until Ctrl-C")
+    parser.add_argument("scene", nargs="?", default="t_handle", metavar="SCENE.yaml", help="scene file or bundled name")
+    parser.add_argument("--mesh", metavar="PATH", help="fly this mesh")
+    parser.add_argument("--viewer", choices=("auto", "web", "native", "none"), default="auto")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Become the node: signals reach it directly."""
+    from ..offline import read_scene, scene_file
+
+    overrides = ["-p", f"mesh:={args.mesh}"] if args.mesh else []
+    read_scene(args.scene, {"mesh": args.mesh} if args.mesh else {})
+    viewer = args.viewer
+    if viewer == "auto":
+        display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        viewer = "native" if display else "web"
+    print("Try in another terminal: .venv/bin/poke_client poke --at tip --push 0.5      (Ctrl-C ends the node)")
+    sys.stdout.flush()
+    from ..ros.main import main
+
+    ros_arguments = ["--ros-args", "--params-file", str(scene_file(args.scene)), "-p", f"viewer:={viewer}", *overrides]
+    return main(["rigid_body_node", *ros_arguments])
