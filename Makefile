@@ -47,7 +47,7 @@ bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU a
 	@touch $@
 
 stress: setup ## long and hostile tests
-	$(PY) -m pytest -m stress $(ARGS)
+	$(PY) -m pytest -m stress $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen
 
 clean: ## everything that was made here, the environments included
 	rm -rf .venv .venv-bench build install log out *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage

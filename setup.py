@@ -38,7 +38,7 @@ setup(
     zip_safe=False,
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",
-    description="Prototype the properties of a rigid body: exact inertia from a mesh, flight under wrenches, Rerun view",
+    description="Prototype the properties of a rigid body: exact inertia from a mesh, flight under wrenches, Rerun",
     license="MIT",
     entry_points={
         "console_scripts": [

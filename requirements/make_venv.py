@@ -23,14 +23,17 @@ def stop(message):
     sys.exit("make setup: " + message)
 
 
-def version_of(python):
-    """(major, minor) of an interpreter, or None when it does not run."""
-    probe = [python, "-c", "import sys; print(*sys.version_info[:2])"]
+def interpreter(python):
+    """(path, (major, minor)) of the interpreter that a command starts, or None when it does not run.
+
+    Inside a virtual environment that is the one it was made from: .venv must not be judged by, or made from, itself.
+    """
+    code = "import sys; print(getattr(sys, '_base_executable', sys.executable)); print(*sys.version_info[:2])"
     try:
-        words = subprocess.run(probe, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True).stdout.split()
+        lines = subprocess.check_output([python, "-c", code], stderr=subprocess.DEVNULL).decode().splitlines()
     except (OSError, subprocess.CalledProcessError):
         return None
-    return tuple(int(word) for word in words)
+    return lines[0], tuple(int(word) for word in lines[1].split())
 
 
 def runs(python, code):
@@ -45,13 +48,14 @@ def supported_python():
     candidates = [asked] if asked else [sys.executable, "python3.13", "python3.12", "python3.11"]
     if not asked and "ROS_DISTRO" in os.environ:
         candidates = ["/usr/bin/python3", *candidates]  # the one that the installed rclpy was built for
-    for candidate in candidates:
-        version = version_of(candidate)
-        if version and SUPPORTED[0] <= version <= SUPPORTED[1]:
-            return candidate, version
+    found = [pair for pair in map(interpreter, candidates) if pair]
+    for path, version in found:
+        if SUPPORTED[0] <= version <= SUPPORTED[1]:
+            return path, version
+    received = "{}.{} ({})".format(*found[0][1], found[0][0]) if found else "none that runs ({})".format(candidates[0])
     stop(
-        "python: got {} ({}); accepted: Python {}.{} to {}.{} (name another one with PYTHON=/path/to/python3)".format(
-            ".".join(map(str, version_of(candidates[0]) or ("none",))), candidates[0], *SUPPORTED[0], *SUPPORTED[1]
+        "python: got {}; accepted: Python {}.{} to {}.{} (name another one with PYTHON=/path/to/python3)".format(
+            received, *SUPPORTED[0], *SUPPORTED[1]
         )
     )
     return None
@@ -112,7 +116,7 @@ def main():
     inner = VENV / "bin" / "python"
     config = VENV / "pyvenv.cfg"
     shares = config.is_file() and "include-system-site-packages = true" in config.read_text()
-    if not config.is_file() or shares != ros_installed or version_of(str(inner)) != version:
+    if not config.is_file() or shares != ros_installed or (interpreter(str(inner)) or (None, None))[1] != version:
         print("making .venv with Python {}.{}".format(*version), flush=True)
         options = ["--clear"] + (["--system-site-packages"] if ros_installed else [])
         made = subprocess.run(

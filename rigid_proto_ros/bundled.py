@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the package's own bodies, scenes and examples lie: in the source tree, in a virtual environment, or in a ROS prefix."""
+"""Where the package's own bodies, scenes and examples lie: source tree, virtual environment or ROS prefix."""
 
 import os
 from collections.abc import Iterator

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Write the bundled bodies as .obj files: ``python -m rigid_proto_ros.bodies [--into FOLDER] [NAME ...]``. Needs manifold3d."""
+"""Write the bundled bodies as .obj files; needs manifold3d: ``python -m rigid_proto_ros.bodies [NAME ...]``."""
 
 import argparse
 from pathlib import Path

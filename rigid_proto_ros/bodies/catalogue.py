@@ -38,7 +38,7 @@ def t_handle() -> Surface:
 
 
 def tennis_racket() -> Surface:
-    """Tennis racket: x from the butt (origin) along the handle to the rim, y across the face, z normal to the strings."""
+    """Tennis racket: x from the butt (origin) to the rim, y across the face, z normal to the strings."""
     centre, half_length, half_width = 0.515, 0.164, 0.126
     angle = 2.0 * np.pi * np.arange(72) / 72
     hoop = np.stack([centre + half_length * np.cos(angle), half_width * np.sin(angle), 0.0 * angle], axis=1)
@@ -75,7 +75,7 @@ def tennis_racket() -> Surface:
 
 
 def hammer() -> Surface:
-    """Forged hammer: z from the grip's end (origin) up to the head, whose face looks along +x and whose peen along -x."""
+    """Forged hammer: z from the grip's end (origin) up to the head; its face looks along +x, its peen along -x."""
     grip = smooth_curve(
         [
             (0.0, 0.014, 0.0105),
@@ -124,7 +124,7 @@ def hammer() -> Surface:
 
 
 def l_bracket() -> Surface:
-    """Angle bracket: origin at the outer corner, long leg along x, short leg along z, width along y from 0; three holes.
+    """Angle bracket with three holes: origin at the outer corner, long leg along x, short leg along z, width along y.
 
     The hole beside the middle makes all three products of inertia nonzero.
     """
@@ -254,7 +254,7 @@ BODIES = {
 
 
 def _rounded_ends(profile: list[tuple[float, float]], radius: float) -> np.ndarray:
-    """Close a lathe profile at both ends, its first and last edge rounded; long straight parts split for rounder triangles."""
+    """Close a lathe profile at both ends with rounded edges; long straight parts are split for rounder triangles."""
     (r0, z0), (r1, z1) = profile[0], profile[-1]
     quarter = np.linspace(0.0, np.pi / 2.0, 5)
     low = np.stack([r0 - radius + radius * np.sin(quarter), z0 + radius - radius * np.cos(quarter)], axis=1)

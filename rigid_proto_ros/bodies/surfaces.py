@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Closed triangle surfaces by lofting, and their boolean union and difference.
 
-A surface is a pair ``(vertices (n, 3) float64 in metres, triangles (m, 3) int64)``, wound outward. Lofts and boxes are made
-directly, so that their triangles follow the shape; only joining and drilling use manifold3d, which is imported there.
+A surface is a pair ``(vertices (n, 3) float64 in metres, triangles (m, 3) int64)``, wound outward. Lofts and boxes are
+made directly, so that their triangles follow the shape; only joining and drilling use manifold3d, which is imported there.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ Surface = tuple[np.ndarray, np.ndarray]
 def loft(rings: np.ndarray, closed: bool = False) -> Surface:
     """Skin over rings of points; each ring runs counter-clockwise seen from the side the rings advance to.
 
-    rings: (k, n, 3). An open loft is capped by a fan about each end ring's centre; a ring whose points all coincide is a
-    pole. ``closed`` joins the last ring to the first instead.
+    rings: (k, n, 3). An open loft is capped by a fan about each end ring's centre; a ring whose points all coincide is
+    a pole. ``closed`` joins the last ring to the first instead.
     """
     rings = np.asarray(rings, dtype=float)
     count, sides = rings.shape[:2]
@@ -74,7 +74,7 @@ def tube(
 
 
 def rounded_box(size: Sequence[float], edge_radius: float, arc: int = 3, spans: int = 1) -> Surface:
-    """Box about the origin with rounded edges. size: (3,) m; ``arc`` facets per quarter edge, ``spans`` per flat side."""
+    """Box about the origin with rounded edges. size: 3 x m; ``arc`` facets per quarter edge, ``spans`` per flat side."""
     half = np.asarray(size, dtype=float) / 2.0 - edge_radius
     slope = np.tan(np.linspace(0.0, np.pi / 4.0, arc + 1))
     lean = np.concatenate([-slope[::-1], np.zeros(spans - 1), slope])
@@ -108,7 +108,7 @@ def extrude(outline: np.ndarray, height: float) -> Surface:
 
 
 def move(surface: Surface, offset: Sequence[float] = (0.0, 0.0, 0.0), axes: str = "xyz") -> Surface:
-    """Send the surface's x, y, z to the named axes (a cyclic order, so that it stays a rotation), then shift it by ``offset``."""
+    """Send x, y, z to the named axes (a cyclic order, so that it stays a rotation), then shift by ``offset`` metres."""
     if axes not in ("xyz", "yzx", "zxy"):
         raise ValueError(f"axes: got {axes!r}; accepted: xyz, yzx, zxy")
     moved = np.empty_like(surface[0])
