@@ -7,6 +7,7 @@ The node, the offline run and replay all come through here, so that one scene me
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from .core.mass_properties import MeshMoments, explicit_mass_properties, scale_v
 from .core.rotation import matrix_from_quaternion, unit_quaternion
 from .core.setup import Setup
 from .core.state import state_row
+from .core.string import StringSettings
 from .core.surface import Surface
 from .mesh_body import mesh_body
 from .mesh_io import Mesh
@@ -57,6 +59,25 @@ class Scenario:
             values["mass"] = 0.0
         reuse = all(values[name] == self.values[name] for name in _MESH_PARAMETERS)
         return _build(values, self.body_mesh if reuse else _load(values))
+
+    def with_inertia(self, mass: float, com, tensor6, relative: bool) -> Scenario:
+        """The scenario with an explicit inertia, as a message gives it; raises InputError.
+
+        com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. tensor6: ixx ixy ixz iyy iyz
+        izz about it. It stands for the whole body, so every ballast mass becomes 0.
+        """
+        scale = self.setup.body.scale
+        com = np.asarray(com, dtype=float) + (self.setup.body.center_of_mass if relative else 0.0)
+        changes: dict[str, object] = {
+            "inertia_model": "explicit",
+            "explicit_inertia.mass": mass,
+            "explicit_inertia.center_of_mass": [_divided(c, s) for c, s in zip(com, scale, strict=True)],
+            "explicit_inertia.tensor": list(tensor6),
+        }
+        for name, value in self.values.items():
+            if name.startswith("ballast."):
+                changes[name] = [0.0, *value[1:]]
+        return self.with_changes(changes)
 
     @property
     def text(self) -> str:
@@ -109,6 +130,17 @@ def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario
         step_ns=max(1, nanoseconds(values["step"])),
         wrench_timeout_ns=nanoseconds(values["wrench_timeout"]),
         poke_duration_ns=max(1, nanoseconds(values["poke_duration"])),
+        string=StringSettings(
+            attached=values["string.attached"],
+            attach=tuple(values["string.attach"]),
+            target=tuple(values["string.target"]),
+            stiffness=values["string.stiffness"],
+            frequency=values["string.frequency"],
+            damping_ratio=values["string.damping_ratio"],
+            rest_length=values["string.rest_length"],
+            bilateral=values["string.bilateral"],
+            timeout_ns=nanoseconds(values["string.timeout"]),
+        ),
         initial=state_row(values["initial.position"], quaternion, values["initial.linear_velocity"], omega_body),
     )
     return Scenario(values, body_mesh, setup, tuple(properties.warnings))
@@ -124,6 +156,15 @@ def _mass_properties(values, body_mesh, scale):
     return body_mesh.moments.mass_properties(
         values["inertia_model"], scale=scale, mass=values["mass"], density=values["density"], ballast=ballast
     )
+
+
+def _divided(product: float, factor: float) -> float:
+    """x with x · factor == product in double precision where there is one, so that an echoed COM stays to the bit."""
+    x = product / factor
+    for near in (x, math.nextafter(x, math.inf), math.nextafter(x, -math.inf)):
+        if near * factor == product:
+            return near
+    return x
 
 
 def nanoseconds(seconds: float) -> int:

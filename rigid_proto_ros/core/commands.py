@@ -85,17 +85,16 @@ class ClearWrench:
 
 @dataclass(frozen=True)
 class Change:
-    """A change of parameters; ``apply`` gives the new Setup from the values in force then, or raises InputError."""
+    """A change of parameters (kind ``set``) or of the whole inertia by message (``inertia``).
 
-    changes: dict
+    content: as the event log keeps it; apply() gives the new Setup from the values in force then, or raises InputError.
+    """
+
+    content: dict
     apply: Callable
     message: bytes = b""
-    kind = "set"
-    rank = Rank.CHANGE
-
-    @property
-    def content(self) -> dict:
-        return self.changes
+    kind: str = "set"
+    rank: Rank = Rank.CHANGE
 
 
 @dataclass(frozen=True)

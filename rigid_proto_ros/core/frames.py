@@ -38,12 +38,16 @@ class Frame:
     impulse: bool = False
 
     @property
+    def options(self) -> str:
+        """What stands behind the point."""
+        if self.duration_s is not None:
+            return f";duration={self.duration_s!r}"
+        return ";impulse" if self.impulse else ""
+
+    @property
     def text(self) -> str:
         """The frame written out, with both axes and point."""
-        options = ";impulse" if self.impulse else ""
-        if self.duration_s is not None:
-            options = f";duration={self.duration_s!r}"
-        return f"{self.axes}@{point_text(self.point)}{options}"
+        return f"{self.axes}@{point_text(self.point)}{self.options}"
 
 
 def point_text(point: tuple) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from .body import Body
 from .errors import CommandRefused
-from .frames import Frame
+from .frames import Frame, point_text
 from .state import State
 from .surface import Surface
 
@@ -39,6 +39,13 @@ class Load:
     @property
     def is_zero(self) -> bool:
         return not (any(self.force) or any(self.torque))
+
+    @property
+    def frame_id(self) -> str:
+        """The settled frame: world or body axes, and the point in mesh coordinates."""
+        axes = "world" if self.axes == "world" else "body"
+        point = ("com",) if self.mesh_point is None else ("point", self.mesh_point)
+        return f"{axes}@{point_text(point)}"
 
     def arm(self, body: Body) -> np.ndarray:
         """From the COM to the point of attack (3,) [m, body axes]."""

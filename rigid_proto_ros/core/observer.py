@@ -72,6 +72,9 @@ class Observer:
     def load_ended(self, time_ns: int, load_id: int) -> None:
         """The load with this id acts no longer."""
 
+    def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
+        """A wrench or poke (``kind``) as it took effect: its point settled on the body, its axes world or body."""
+
     def event(self, time_ns: int, line: str) -> None:
         """One JSON line of the event log (command, parameter change, service), as applied."""
 

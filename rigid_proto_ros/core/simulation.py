@@ -159,6 +159,11 @@ class Simulation:
         free = self._held is None and self.string is None and not self._pulses
         return still and free and not self._pending
 
+    def check_change(self, new: Setup) -> None:
+        """Raises CommandRefused (``integrator``) when the new setup's integrator can't carry what acts, or will."""
+        tied = self.string is not None if new.string.attached == self.setup.string.attached else new.string.attached
+        check_carried(new.integrator, _needs(new, (acting.load for acting in self._acting()), tied))
+
     # The way of a command
 
     def submit(self, command: Command, at_ns: int | None = None) -> int:
@@ -295,6 +300,10 @@ class Simulation:
 
     def _begin_load(self, command: WrenchCommand, load: Load) -> None:
         self._load_ids += 1
+        force = load.force_body(self.setup.body, self.state) if load.axes == "normal" else np.asarray(load.force)
+        self.observer.applied(
+            self.time_ns, load.frame_id + command.frame.options, command.kind, force, np.asarray(load.torque)
+        )
         if command.frame.impulse:
             self.state = apply_impulse(load, self.setup.body, self.state)
             self.observer.load_began(self.time_ns, self._load_ids, self._shown("impulse", load))
@@ -329,8 +338,7 @@ class Simulation:
         """Take another setup in flight. The same mesh at the same size stays where it is, so a COM that moves within it
         takes position and velocity along; another mesh or size keeps the COM and its motion.
         """
-        tied = self.string is not None if new.string.attached == self.setup.string.attached else new.string.attached
-        check_carried(new.integrator, _needs(new, (acting.load for acting in self._acting()), tied))
+        self.check_change(new)
         old, self.setup = self.setup, new
         moved = new.body.center_of_mass - old.body.center_of_mass
         if new.geometry == old.geometry and moved.any():
