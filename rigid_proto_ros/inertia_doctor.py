@@ -8,9 +8,7 @@ below the limit.
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -379,38 +377,3 @@ def compare_robot(
     if not diagnoses:
         raise InputError("compare", robot.name, "links that show a mesh; name it, inspect MESH --compare FILE")
     return diagnoses
-
-
-def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
-    """One paragraph a link on stdout."""
-    for d in diagnoses:
-        print(f"{d.link} ({d.mesh}): {d.status}{'; ' + d.note if d.note else ''}")
-        if d.inertia_error is not None:
-            off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
-            print(
-                f"  off by: inertia {d.inertia_error:.2g}, centre of mass {d.center_of_mass_error:.2g} of the size{off}"
-            )
-        for cause in d.causes:
-            print(f"  cause: {cause}")
-        if d.status == "off" and d.expected is not None:
-            center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
-            print(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
-            print("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))
-
-
-def run_compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:
-    """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to 1e-3, otherwise 1."""
-    for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
-        if getattr(args, flag):
-            raise InputError(f"--{flag}", "given with --compare", "--compare alone or with --json")
-    chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
-    density = args.density or 0.0
-    diagnoses = compare_robot(
-        Path(args.compare), mesh=mesh, scale=chosen, mass=args.mass, density=density,
-        repair=args.repair, fallback=args.fallback, max_triangles=args.max_triangles,
-    )  # fmt: skip
-    if args.json:
-        print(json.dumps({"compare": args.compare, "links": [d.as_dict() for d in diagnoses]}))
-    else:
-        print_diagnoses(diagnoses)
-    return 0 if all(d.status == "ok" for d in diagnoses) else 1

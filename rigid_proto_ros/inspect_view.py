@@ -8,17 +8,15 @@ Lengths are drawn from the COM, so that a mesh far from its file's origin isn't 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.inertia_tensor import equimomental_shapes, principal_axes
 from rigid_proto_ros.inertial_export import quaternion_wxyz
+from rigid_proto_ros.mesh_inspection import Inspection
 from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
-
-if TYPE_CHECKING:
-    from rigid_proto_ros.cli.inspect import Inspection
 
 MESH_COLOR = (150, 170, 190, 230)
 AXIS_COLORS = ((220, 70, 60), (70, 170, 80), (70, 110, 220))

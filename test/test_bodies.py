@@ -73,6 +73,29 @@ def test_body_is_a_closed_outward_wound_solid(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_surface_encloses_each_point_once_or_not_at_all(name: str) -> None:
+    vertices, triangles = read(body_path(name))
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    chosen = np.random.default_rng(1).choice(len(triangles), 120)
+    # Parts that overlap or folds would show as a winding number of 2 just inside, or 1 just outside, some triangle.
+    for side, expected in ((1e-6, 0.0), (-1e-6, 1.0)):
+        points = corners[chosen].mean(axis=1) + side * normals[chosen]
+        numbers = [winding_number(point, corners) for point in points]
+        assert numbers == pytest.approx([expected] * len(points), abs=1e-6)
+
+
+def winding_number(point: np.ndarray, corners: np.ndarray) -> float:
+    """How often closed triangles (m, 3, 3) wind about a point: their solid angles (van Oosterom, Strackee 1983) over 4 pi."""
+    a, b, c = np.swapaxes(corners - point, 0, 1)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    rest = (np.einsum("ij,ij->i", p, q) * length for p, q, length in ((a, b, lc), (b, c, la), (c, a, lb)))
+    return float(np.arctan2(triple, la * lb * lc + sum(rest)).sum() / (2.0 * np.pi))
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_body_is_one_solid_of_a_size_one_holds(name: str) -> None:
     vertices, triangles = read(body_path(name))
     assert parts(triangles) == (2 if name == "hollow_box" else 1)

@@ -7,30 +7,27 @@ import argparse
 import json
 import re
 import sys
-from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigid_proto_ros.cli.progress import Progress
 from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.inertia_tensor import degenerate_pairs, equimomental_shapes, principal_axes
-from rigid_proto_ros.core.mass_properties import INERTIA_MODELS, MassProperties, scale_vector
-from rigid_proto_ros.core.mesh_topology_verdict import WARNING, Finding, unit_suspicion
+from rigid_proto_ros.core.inertia_tensor import principal_axes, six_from_tensor
+from rigid_proto_ros.core.mass_properties import MassProperties, scale_vector
 from rigid_proto_ros.inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
-from rigid_proto_ros.mesh_body import FALLBACKS, MeshBody, mesh_body
+from rigid_proto_ros.mesh_body import FALLBACKS, mesh_body
+from rigid_proto_ros.mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
 from rigid_proto_ros.mesh_io import MAX_TRIANGLES, load_mesh
 
-MODELS = tuple(model for model in INERTIA_MODELS if model != "explicit")
+if TYPE_CHECKING:
+    from rigid_proto_ros.inertia_doctor import LinkDiagnosis
+
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
 VERIFIED = 1e-13
 """Largest error against rational arithmetic with which ``--verify`` is content."""
-SHOWN_DEGENERATE = 1e-9
-JSON_KEYS = (
-    *("mesh", "vertices", "triangles", "watertight", "winding_consistent", "components", "volume", "area", "mass"),
-    *("density", "center_of_mass", "inertia", "principal_moments", "principal_axes", "principal_degenerate"),
-    *("equimomental_box", "equimomental_ellipsoid", "bounding_box", "models", "verdict"),
-)
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -68,123 +65,6 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
     parser.set_defaults(run=run)
     return parser
-
-
-@dataclass(frozen=True)
-class Inspection:
-    """All that is known of a mesh at one scale, mass and model. ``refusal`` is the error that stands in the way of the
-    chosen model, ``models`` the mass properties of those that can be had."""
-
-    body: MeshBody
-    scale: np.ndarray
-    model: str
-    models: dict[str, MassProperties]
-    findings: list[Finding]
-    refusal: InputError | None
-    volume: float | None
-    area: float | None
-    lower: np.ndarray | None
-    upper: np.ndarray | None
-    density: float | None
-
-    @property
-    def chosen(self) -> MassProperties:
-        """Mass properties of the chosen model."""
-        return self.models[self.model]
-
-
-def inspect_mesh(
-    body: MeshBody, *, model: str = "solid", scale=1.0, mass: float = 0.0, density: float = 1000.0, ballast=()
-) -> Inspection:
-    """Mass properties of every model that ``body`` can have, and the remarks that belong to them."""
-    s = scale_vector(scale)
-    findings = list(body.verdict.findings)
-    if not body.verdict.usable:
-        refusal = InputError(body.mesh.name, body.verdict.reason, "finite vertices that span a body")
-        return Inspection(body, s, model, {}, findings, refusal, None, None, None, None, None)
-    moments = body.moments
-    points = body.vertices[np.unique(body.triangles)] * s
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    suspicion = unit_suspicion(float(np.max(upper - lower)))
-    if suspicion:
-        findings.append(suspicion)
-    models, refusal = {}, None
-    # Mass, density, scale and ballast are checked by any model: their refusal comes first and is the same for all.
-    for name in (model, *(other for other in MODELS if other != model)):
-        try:
-            models[name] = moments.mass_properties(name, scale=s, mass=mass, density=density, ballast=ballast)
-        except InputError as error:
-            if name == model:
-                refusal = error
-            elif refusal is None and not (name == "solid" and not body.verdict.closed):
-                findings.append(Finding(f"model_{name}", WARNING, str(error)))
-            continue
-        findings += [Finding("tensor", WARNING, text) for text in models[name].warnings]
-    volume = None
-    if body.verdict.closed or moments.stand_in is not None:
-        volume = moments.moments("solid").measure * float(np.prod(np.abs(s)))
-    shell = moments.moments("shell", s) if "shell" in models else None
-    area = None if shell is None else shell.measure * float(s[0]) ** 2
-    implied = density
-    if mass > 0.0:
-        implied = mass / volume if volume else None
-    return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied)
-
-
-def as_json(inspection: Inspection) -> dict:
-    """The inspection as the command's JSON object."""
-    verdict = [finding.as_dict() for finding in inspection.findings]
-    if inspection.refusal is not None:
-        return {**dict.fromkeys(JSON_KEYS), "verdict": verdict}
-    body, chosen = inspection.body, inspection.chosen
-    moments, axes = principal_axes(chosen.inertia)
-    box, ellipsoid = equimomental_shapes(chosen.mass, moments)
-    return {
-        "mesh": body.mesh.path,
-        "vertices": len(body.mesh.vertices),
-        "triangles": len(body.triangles),
-        "watertight": body.verdict.watertight,
-        "winding_consistent": body.verdict.winding_consistent,
-        "components": body.verdict.components,
-        "volume": inspection.volume,
-        "area": inspection.area,
-        "mass": chosen.mass,
-        "density": inspection.density,
-        "center_of_mass": chosen.center_of_mass.tolist(),
-        "inertia": chosen.inertia.tolist(),
-        "principal_moments": moments.tolist(),
-        "principal_axes": axes.tolist(),
-        "principal_degenerate": list(degenerate_pairs(moments, SHOWN_DEGENERATE)),
-        "equimomental_box": box.tolist(),
-        "equimomental_ellipsoid": ellipsoid.tolist(),
-        "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
-        "models": {
-            name: None
-            if name not in inspection.models
-            else {
-                "mass": inspection.models[name].mass,
-                "center_of_mass": inspection.models[name].center_of_mass.tolist(),
-                "inertia": inspection.models[name].inertia.tolist(),
-            }
-            for name in MODELS
-        },
-        "verdict": verdict,
-    }
-
-
-def verify(body: MeshBody, scale: np.ndarray, progress: Progress) -> dict[str, float]:
-    """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
-    from rigid_proto_ros.core.exact_moments import exact_solid_moments, relative_errors
-
-    moments = body.moments
-    moments.solid_raw()  # refuses what bounds no solid
-    vertices, triangles = moments.stand_in or (moments.vertices, moments.triangles)
-    exact = exact_solid_moments(vertices, triangles, progress.fraction).outward().scaled(scale)
-    unit = moments.mass_properties("solid", scale=scale, density=1.0)
-    points = vertices[np.unique(triangles)] * scale
-    diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    volume = moments.moments("solid").measure * float(np.prod(np.abs(scale)))
-    return relative_errors(exact, volume, unit.center_of_mass, unit.inertia, diagonal)
 
 
 def print_report(inspection: Inspection, report: dict) -> None:
@@ -265,9 +145,7 @@ def run(args: argparse.Namespace) -> int:
     density = DENSITY if args.density is None else args.density
     _check_amount("density", density, zero=False)
     if args.compare is not None:
-        from rigid_proto_ros.inertia_doctor import run_compare
-
-        return run_compare(args, mesh_name, scale)
+        return _compare(args, mesh_name, scale)
     if mesh_name is None:
         raise InputError("MESH", None, "a mesh (path, package:// URI or bundled name), or --compare ROBOT")
     scale_vector(scale)
@@ -288,7 +166,7 @@ def run(args: argparse.Namespace) -> int:
     status = 0
     if args.verify:
         with Progress("checking in rational arithmetic") as progress:
-            report["verification"] = verify(body, inspection.scale, progress)
+            report["verification"] = verify(body, inspection.scale, progress.fraction)
         if max(report["verification"].values()) > VERIFIED:
             print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)
             status = 1
@@ -316,3 +194,40 @@ def run(args: argparse.Namespace) -> int:
 def _check_amount(name: str, value: float, *, zero: bool) -> None:
     if not (value > 0.0 or (zero and value == 0.0)) or value == float("inf"):
         raise InputError(name, value, "a finite number > 0")
+
+
+def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
+    """One paragraph a link on stdout."""
+    for d in diagnoses:
+        print(f"{d.link} ({d.mesh}): {d.status}{'; ' + d.note if d.note else ''}")
+        if d.inertia_error is not None:
+            off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
+            print(
+                f"  off by: inertia {d.inertia_error:.2g}, centre of mass {d.center_of_mass_error:.2g} of the size{off}"
+            )
+        for cause in d.causes:
+            print(f"  cause: {cause}")
+        if d.status == "off" and d.expected is not None:
+            center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
+            print(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
+            print("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))
+
+
+def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:
+    """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to 1e-3, otherwise 1."""
+    from rigid_proto_ros.inertia_doctor import compare_robot  # XML and all: only who compares pays for it
+
+    for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
+        if getattr(args, flag):
+            raise InputError(f"--{flag}", "given with --compare", "--compare alone or with --json")
+    chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
+    density = args.density or 0.0
+    diagnoses = compare_robot(
+        Path(args.compare), mesh=mesh, scale=chosen, mass=args.mass, density=density,
+        repair=args.repair, fallback=args.fallback, max_triangles=args.max_triangles,
+    )  # fmt: skip
+    if args.json:
+        print(json.dumps({"compare": args.compare, "links": [d.as_dict() for d in diagnoses]}))
+    else:
+        print_diagnoses(diagnoses)
+    return 0 if all(d.status == "ok" for d in diagnoses) else 1
