@@ -39,6 +39,11 @@ def string(text: str) -> bytes:
     return _HEADER + struct.pack(f"<I{len(data)}s", len(data), data)
 
 
+def time(time_ns: int) -> bytes:
+    """A rosgraph_msgs/Clock."""
+    return _HEADER + struct.pack("<iI", *divmod(time_ns, 1_000_000_000))
+
+
 class StampedTemplate:
     """One message kept as a buffer: only its stamp and its doubles are written anew.
 

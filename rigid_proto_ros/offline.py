@@ -13,7 +13,7 @@ from .core.errors import CommandRefused, InputError
 from .core.observer import Observer
 from .core.simulation import Simulation
 from .parameters import parameter_named
-from .poke_script import ScriptCommand, core_command
+from .poke_script import ScriptCommand, core_command, with_contacts
 from .scenario import Scenario, make_scenario, publication_ns
 from .scene_file import read_scene_file, scalar
 
@@ -78,7 +78,8 @@ class OfflineRun:
         if observer is not None:
             tell_start(observer, scenario)
             self.simulation.announce()
-        for number, command in enumerate(script or [], 1):
+        script = with_contacts(script or [], scenario.setup.contacts)
+        for number, command in enumerate(script, 1):
             try:
                 core = core_command(command, command.t_ns, scenario.setup.contacts, self._apply_changes)
                 if command.kind == "set":

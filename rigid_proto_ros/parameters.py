@@ -161,7 +161,7 @@ _DECLARED = (
     Parameter("poke_duration", "double", 0.05, "Length of a poke that names none.", "s", 1e-9, 1e9),
     Parameter("schedule_horizon", "double", 3600.0, "How far ahead of simulated time a command's stamp may lie.", "s", 0.0, 1e9),
     Parameter("string.attached", "bool", False, "The string is tied from the start, without a timeout."),
-    _vector("string.attach", [0.0, 0.0, 0.0], "Where it is tied, in mesh coordinates; snapped to the surface.", "mesh units"),
+    _vector("string.attach", [0.0, 0.0, 0.0], "Where it is tied, in mesh coordinates.", "mesh units"),
     _vector("string.target", [0.0, 0.0, 0.0], "Where its free end is while it is tied from the start, world axes.", "m"),
     Parameter("string.stiffness", "double", 50.0, "Stiffness of the string.", "N/m", 0.0, 1e30),
     Parameter("string.frequency", "double", 0.0, "Above 0 it wins over stiffness: angular frequency of the effective mass on the string, so that light and heavy bodies pull alike.", "rad/s", 0.0, 1e15),

@@ -7,14 +7,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import yaml
 
 from . import cdr
-from .core.commands import Change, ClearWrench, Command, WrenchCommand
-from .core.errors import InputError
+from .core.commands import Change, ClearWrench, Command, MoveString, ReleaseString, TieString, WrenchCommand
+from .core.errors import CommandRefused, InputError
 from .core.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
 from .scenario import nanoseconds
 from .scene_file import MAX_BYTES
@@ -24,7 +26,11 @@ MAX_ENTRIES = 1_000_000
 """Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
 
 _FORCES = ("force", "push", "impulse")
-_POKE_KEYS = {"t", "at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
+_POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
+_TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}
+MESH_FRAME = "body/mesh"
+"""Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
+
 _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
 
 
@@ -32,7 +38,8 @@ _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
 class ScriptCommand:
     """One command of an expanded script. t_ns: when it acts, from the script's start.
 
-    kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). kind ``set``: changes. kind ``clear_wrench``: nothing.
+    kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and point
+    (3,), or the name of a contact to attach to. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
     """
 
     t_ns: int
@@ -41,17 +48,31 @@ class ScriptCommand:
     force: tuple = (0.0, 0.0, 0.0)
     torque: tuple = (0.0, 0.0, 0.0)
     changes: dict | None = None
+    point: tuple = (0.0, 0.0, 0.0)
+    contact: str = ""
+
+    @property
+    def topic(self) -> str:
+        """The topic that carries it, below the node's name."""
+        return {
+            "wrench": "wrench",
+            "poke": "poke",
+            "string_target": "string/target",
+            "string_attach": "string/attach",
+        }.get(self.kind, "schedule")
 
     def message(self, stamp_ns: int) -> bytes:
         """The message as it goes over its topic."""
         if self.kind in ("wrench", "poke"):
             return cdr.wrench_stamped(stamp_ns, self.frame_id, self.force, self.torque)
+        if self.kind in ("string_target", "string_attach"):
+            return cdr.stamped_doubles(stamp_ns, self.frame_id, self.point)
         return cdr.string(self.schedule_text(stamp_ns))
 
     def schedule_text(self, stamp_ns: int) -> str:
-        """A ``set`` or ``clear_wrench`` entry for the schedule topic, with an absolute time."""
-        entry: dict = {"t": stamp_ns / 1e9}
-        entry.update({"set": self.changes} if self.kind == "set" else {"service": self.kind})
+        """A ``set``, ``release`` or ``clear_wrench`` entry for the schedule topic, with an absolute time."""
+        content = {"set": {"set": self.changes}, "string_release": {"string": "release"}}
+        entry = {"t": stamp_ns / 1e9, **content.get(self.kind, {"service": self.kind})}
         return yaml.safe_dump(entry, default_flow_style=True, width=math.inf).strip()
 
 
@@ -80,38 +101,75 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
         mark = getattr(error, "problem_mark", None)
         where = f"{name}, line {mark.line + 1}" if mark else name
         raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
+    whole: dict = {}
+    if isinstance(entries, dict) and "script" in entries:
+        whole = {key: value for key, value in entries.items() if key != "script"}
+        _check_keys(whole, _TIMING_KEYS - {"t"}, name)
+        entries = entries["script"]
     if entries is None:
         entries = []
     if not isinstance(entries, list):
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[ScriptCommand] = []
     for number, entry in enumerate(entries, 1):
-        commands += _expand(entry, f"{name}, entry {number}", wrench_timeout)
-        if len(commands) > MAX_ENTRIES:
-            raise InputError(f"{name}, entry {number}", f"over {MAX_ENTRIES} commands", f"at most {MAX_ENTRIES}")
+        where = f"{name}, entry {number}"
+        for k, offset_ns in enumerate(_offsets_ns(whole, name)):
+            for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}"):
+                jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
+                commands += _expand(entry, max(0, t_ns + offset_ns + jitter_ns), where, wrench_timeout)
+            if len(commands) > MAX_ENTRIES:
+                raise InputError(where, f"over {MAX_ENTRIES} commands", f"at most {MAX_ENTRIES}")
     return sorted(commands, key=lambda command: command.t_ns)
 
 
-def _expand(entry, where: str, wrench_timeout: float) -> list[ScriptCommand]:
+def _times_ns(entry, where: str, seed: str) -> list[int]:
+    """When an entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up to ±``jitter``."""
     if not isinstance(entry, dict):
         raise InputError(where, entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
     if "t" not in entry:
         raise InputError(f"{where}, t", None, "the time in seconds")
     t_ns = nanoseconds(_number(entry["t"], f"{where}, t", 0.0, MAX_TIME_S))
+    offsets = _offsets_ns(entry, where)
+    return [max(0, t_ns + offset + _jitter_ns(entry, where, f"{seed}/{k}")) for k, offset in enumerate(offsets)]
+
+
+def _offsets_ns(timing: dict, where: str) -> list[int]:
+    repeat = _number(timing.get("repeat", 1), f"{where}, repeat", 1, MAX_ENTRIES)
+    if repeat != int(repeat):
+        raise InputError(f"{where}, repeat", repeat, "a whole number of times")
+    if repeat > 1 and "every" not in timing:
+        raise InputError(f"{where}, every", None, "the seconds between repeats")
+    every = _number(timing.get("every", 0.0), f"{where}, every", 0.0, MAX_TIME_S)
+    return [nanoseconds(k * every) for k in range(int(repeat))]
+
+
+def _jitter_ns(timing: dict, where: str, seed: str) -> int:
+    """A uniform random shift, the same for the same seed wherever and whenever the script is read."""
+    jitter = _number(timing.get("jitter", 0.0), f"{where}, jitter", 0.0, MAX_TIME_S)
+    if jitter == 0.0:
+        return 0
+    own = _number(timing.get("seed", 0), f"{where}, seed", 0, 2**63)
+    return nanoseconds(random.Random(f"{int(own)}/{seed}").uniform(-jitter, jitter))
+
+
+def _expand(entry: dict, t_ns: int, where: str, wrench_timeout: float) -> list[ScriptCommand]:
     if "wrench" in entry:
-        _check_keys(entry, {"t", "wrench"}, where)
+        _check_keys(entry, _TIMING_KEYS | {"wrench"}, where)
         return _expand_wrench(entry["wrench"], t_ns, f"{where}, wrench", wrench_timeout)
+    if "string" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"string"}, where)
+        return _expand_string(entry["string"], t_ns, f"{where}, string")
     if "set" in entry:
-        _check_keys(entry, {"t", "set"}, where)
+        _check_keys(entry, _TIMING_KEYS | {"set"}, where)
         if not isinstance(entry["set"], dict) or not entry["set"]:
             raise InputError(f"{where}, set", entry["set"], "{parameter: value, ...}")
         return [ScriptCommand(t_ns, "set", changes={str(k): v for k, v in entry["set"].items()})]
     if "service" in entry:
-        _check_keys(entry, {"t", "service"}, where)
+        _check_keys(entry, _TIMING_KEYS | {"service"}, where)
         if entry["service"] != "clear_wrench":
             raise InputError(f"{where}, service", entry["service"], "clear_wrench")
         return [ScriptCommand(t_ns, "clear_wrench")]
-    _check_keys(entry, _POKE_KEYS, where)
+    _check_keys(entry, _TIMING_KEYS | _POKE_KEYS, where)
     return [_poke(entry, t_ns, where)]
 
 
@@ -145,6 +203,41 @@ def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float) -> list[
         repeats += [ScriptCommand(t, "wrench", first.frame_id, force, torque) for t in times]
     # The last message holds no axes to misread: no wrench at all.
     return [*repeats, ScriptCommand(t_ns + duration_ns, "wrench", "world@com")]
+
+
+def _expand_string(entry, t_ns: int, where: str) -> list[ScriptCommand]:
+    if entry == "release":
+        return [ScriptCommand(t_ns, "string_release")]
+    accepted = "release, or {attach: contact or [x, y, z] in mesh coordinates, target: [x, y, z] in the world}"
+    if not isinstance(entry, dict) or not entry or not set(entry) <= {"attach", "target"}:
+        raise InputError(where, entry, accepted)
+    commands = []
+    if "attach" in entry:
+        attach = entry["attach"]
+        if isinstance(attach, dict) and set(attach) == {"point"}:
+            attach = attach["point"]
+        if isinstance(attach, str) and CONTACT_NAME.match(attach):
+            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, contact=attach))
+        else:
+            point = _vector(attach, f"{where}, attach")
+            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, point=point))
+    if "target" in entry:
+        target = _vector(entry["target"], f"{where}, target")
+        commands.append(ScriptCommand(t_ns, "string_target", "world", point=target))
+    return commands
+
+
+def with_contacts(script: list[ScriptCommand], contacts: Mapping[str, tuple]) -> list[ScriptCommand]:
+    """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
+    settled = []
+    for command in script:
+        if command.contact:
+            if command.contact not in contacts:
+                known = ", ".join(sorted(contacts)) or "none"
+                raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
+            command = replace(command, point=tuple(float(x) for x in contacts[command.contact]), contact="")
+        settled.append(command)
+    return settled
 
 
 def _wrench_fields(entry: dict, where: str) -> tuple[str, tuple, tuple]:
@@ -227,6 +320,31 @@ def core_command(command: ScriptCommand, stamp_ns: int, contacts, apply_changes,
         return Change(command.changes, lambda: apply_changes(command.changes), message)
     if command.kind == "clear_wrench":
         return ClearWrench(message)
+    if command.kind == "string_release":
+        return ReleaseString(message)
+    if command.kind == "string_target":
+        return string_target(stamp_ns, command.frame_id, command.point, frames[0])
+    if command.kind == "string_attach":
+        return string_attach(stamp_ns, command.frame_id, command.point, *frames)
     frame = parse_frame(command.frame_id, contacts, *frames)
     held = command.kind == "wrench"
     return WrenchCommand(held, frame, command.force, command.torque, stamp_ns, command.frame_id, message)
+
+
+def string_target(stamp_ns: int, frame_id: str, point, world: str = "world") -> MoveString:
+    """The core's command for a message of the string's target topic; raises CommandRefused."""
+    if frame_id not in ("", "world", world):
+        raise CommandRefused("frame", "frame_id", frame_id[:80], f"{world}: the target is a point of the world")
+    message = cdr.stamped_doubles(stamp_ns, frame_id, point)
+    return MoveString(tuple(point), stamp_ns, frame_id, message)
+
+
+def string_attach(stamp_ns: int, frame_id: str, point, world: str = "world", body: str = "body") -> TieString:
+    """The core's command for a message of the string's attach topic; raises CommandRefused."""
+    axes = {"": "world", "world": "world", world: "world", "body": "body", body: "body"}
+    axes |= {MESH_FRAME: "mesh", f"{body}/mesh": "mesh"}
+    if frame_id not in axes:
+        accepted = f"{world}, {body} (metres from the COM) or {body}/mesh (mesh coordinates)"
+        raise CommandRefused("frame", "frame_id", frame_id[:80], accepted)
+    message = cdr.stamped_doubles(stamp_ns, frame_id, point)
+    return TieString(axes[frame_id], tuple(point), stamp_ns, frame_id, message)

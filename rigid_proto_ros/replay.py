@@ -10,15 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import cdr
-from .core.commands import Change, ClearWrench, Command, WrenchCommand
+from .core.commands import Change, ClearWrench, Command, Rank, ReleaseString, WrenchCommand
 from .core.errors import InputError
 from .core.frames import parse_frame
 from .core.observer import Observer
 from .core.simulation import Simulation
 from .mesh_io import Mesh, load_mesh
 from .parameters import convert_all
+from .poke_script import string_attach, string_target
 from .recorded_session import RecordedSession
-from .scenario import Scenario, make_scenario
+from .scenario import Scenario, check_inertia, make_scenario
 from .scene_file import read_scene_text
 
 _TOUCH_NO_MOTION = ("reset", "pause", "step")
@@ -88,9 +89,7 @@ class Resimulation:
             if kind in ("wrench", "poke"):
                 stamp_ns, frame_id = content["stamp_ns"], content["frame_id"]
                 force, torque = tuple(content["force"]), tuple(content["torque"])
-                values, contacts = self.scenario.values, self.scenario.setup.contacts
-                names = values["world_frame"], values["body_frame"] or "rigid_body"
-                frame = parse_frame(frame_id, contacts, *names)
+                frame = parse_frame(frame_id, self.scenario.setup.contacts, *self._frame_names())
                 message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
                 return WrenchCommand(kind == "wrench", frame, force, torque, stamp_ns, frame_id, message)
             if kind == "set":
@@ -98,15 +97,37 @@ class Resimulation:
                 return Change(content, lambda: self._change(content))
             if kind == "clear_wrench":
                 return ClearWrench()
+            if kind == "string_release":
+                return ReleaseString()
+            if kind in ("string_target", "string_attach"):
+                names = self._frame_names()
+                read = string_target if kind == "string_target" else string_attach
+                names = names[:1] if kind == "string_target" else names
+                return read(content["stamp_ns"], content["frame_id"], content["point"], *names)
+            if kind == "inertia":
+                return Change(
+                    content, lambda: self._take_on(check_inertia(self.scenario, content)), b"", kind, Rank.INERTIA
+                )
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"event {number}", content, "the content of a recorded event") from None
-        raise InputError(f"event {number}, kind", kind, "wrench, poke, set, clear_wrench, reset, pause, step")
+        raise InputError(
+            f"event {number}, kind",
+            kind,
+            "wrench, poke, string_target, string_attach, string_release, inertia, set, clear_wrench, reset, pause, step",
+        )
+
+    def _frame_names(self) -> tuple[str, str]:
+        values = self.scenario.values
+        return values["world_frame"], values["body_frame"] or "rigid_body"
 
     def _change(self, changes: dict):
-        self.scenario = self.scenario.with_changes(changes)
-        return self.scenario.setup
+        return self._take_on(self.scenario.with_changes(changes))
+
+    def _take_on(self, scenario: Scenario):
+        self.scenario = scenario
+        return scenario.setup
 
 
 def _decoded(line: str, number: int) -> tuple[int, str, dict]:

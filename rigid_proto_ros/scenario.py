@@ -15,7 +15,7 @@ import numpy as np
 
 from . import parameters
 from .core.body import make_body
-from .core.errors import InputError, MeshError
+from .core.errors import CommandRefused, InputError, MeshError
 from .core.inertia_tensor import check_tensor
 from .core.integrators import integrator_named
 from .core.mass_properties import MeshMoments, explicit_mass_properties, scale_vector
@@ -83,7 +83,8 @@ class Scenario:
     def text(self) -> str:
         """The scenario as a parameter file that starts the same simulation."""
         lines = [f"    {name}: {_yaml(value)}" for name, value in sorted(self.values.items())]
-        return "\n".join(["rigid_body:", "  ros__parameters:", *lines, ""])
+        mesh = [f"# mesh_sha256: {self.body_mesh.mesh.sha256}"] if self.body_mesh else []
+        return "\n".join([*mesh, "rigid_body:", "  ros__parameters:", *lines, ""])
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
@@ -156,6 +157,17 @@ def _mass_properties(values, body_mesh, scale):
     return body_mesh.moments.mass_properties(
         values["inertia_model"], scale=scale, mass=values["mass"], density=values["density"], ballast=ballast
     )
+
+
+def check_inertia(scenario: Scenario, content: Mapping) -> Scenario:
+    """The scenario with the inertia of an event's content; raises CommandRefused (``nonfinite``, ``tensor``)."""
+    numbers = [content["mass"], *content["com"], *content["tensor"]]
+    if not np.isfinite(numbers).all():
+        raise CommandRefused("nonfinite", "inertia", numbers, "finite numbers")
+    try:
+        return scenario.with_inertia(content["mass"], content["com"], content["tensor"], content["relative"])
+    except InputError as error:
+        raise CommandRefused("tensor", error.field, error.received, error.accepted) from None
 
 
 def _divided(product: float, factor: float) -> float:

@@ -80,8 +80,8 @@ def _show_flight(duration_s: float, node) -> None:
 
 def _report(session: Path) -> int:
     """What happened, read back from the recording itself."""
-    from ..replay import session_scenario
     from ..core.state import State
+    from ..replay import session_scenario
     from ..rerun_view.reader import read_session
 
     recorded = read_session(session)

@@ -60,6 +60,9 @@ class Observer:
     def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
         """A run begins: the scene as parameter-file text; vertices (n, 3) [mesh coordinates], triangles (m, 3)."""
 
+    def scene_changed(self, time_ns: int, scene: str) -> None:
+        """The parameters in force from ``time_ns`` on, as parameter-file text; also right after ``started``."""
+
     def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
         """The body is this one from ``time_ns`` on; called once at the start and again at every change."""
 

@@ -202,9 +202,12 @@ class Simulation:
             self.observer.load_ended(self.time_ns, acting.load_id)
         self.observer.reset()
         self.events.reset()
+        replaced = setup is not None and setup is not self.setup
         self.setup = setup or self.setup
         self._start_over()
         self.log("reset", {})
+        if replaced:
+            self.announce()
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""

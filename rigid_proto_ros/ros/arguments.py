@@ -23,7 +23,7 @@ def check_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
         if option == "--params-file":
             scene = read_scene_file(value, node_name)
             for name, given in scene.values.items():
-                if _is_ros_parameter(name):
+                if is_ros_parameter(name):
                     continue
                 try:
                     parameter_named(name)
@@ -61,7 +61,7 @@ def _check_assignment(text: str, node_name: str) -> None:
         name = left
     elif node.lstrip("/") not in (node_name, "**"):
         return
-    if _is_ros_parameter(name):
+    if is_ros_parameter(name):
         return
     parameter = parameter_named(name)
     tree = compose_text(value, f"-p {name}")
@@ -75,5 +75,6 @@ def _check_assignment(text: str, node_name: str) -> None:
             )
 
 
-def _is_ros_parameter(name: str) -> bool:
+def is_ros_parameter(name: str) -> bool:
+    """Whether the name is one that every rclpy node has."""
     return any(name == known or (known.endswith(".") and name.startswith(known)) for known in ROS_PARAMETERS)

@@ -12,21 +12,24 @@ from collections import Counter
 from collections.abc import Callable
 
 import yaml
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from .. import cdr
-from ..core.commands import WrenchCommand
+from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
 from ..core.frames import parse_frame
-from ..poke_script import MAX_TIME_S, core_command, parse_script
-from ..scenario import nanoseconds
+from ..poke_script import MAX_TIME_S, MESH_FRAME, core_command, parse_script, string_attach, string_target
+from ..scenario import check_inertia, nanoseconds
 from . import qos
 from .message_bytes import read_wrench_stamped
 from .stamps import effective_time
+
+TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
+"""What received messages are counted by."""
 
 MAX_SCHEDULE_LENGTH = 100_000
 """Characters of one schedule entry."""
@@ -51,12 +54,23 @@ class CommandIntake:
     received counts messages by topic, ``late`` and ``wall_stamp`` stamps that mean now; refusals are the simulation's.
     """
 
-    def __init__(self, node: Node, frames: tuple[str, str], apply_changes: Callable, on_refusal: Callable) -> None:
+    def __init__(
+        self,
+        node: Node,
+        frames: tuple[str, str],
+        apply_changes: Callable,
+        apply_inertia: Callable,
+        on_refusal: Callable,
+    ) -> None:
         self.received: Counter[str] = Counter()
         self.late = 0
         self.wall_stamp = 0
         self._frames = frames
         self._apply_changes = apply_changes
+        self._apply_inertia = apply_inertia
+        self.queue_full = 0
+        self.sequence_gaps = 0
+        self._last_sequence: dict[int, int] = {}
         self._on_refusal = on_refusal
         group = _TakenByHand()
 
@@ -74,6 +88,9 @@ class CommandIntake:
         self._sources = (
             ("wrench", subscribe(WrenchStamped, "wrench"), WrenchStamped, self._wrench),
             ("poke", subscribe(WrenchStamped, "poke"), WrenchStamped, self._poke),
+            ("string", subscribe(PointStamped, "string/target"), PointStamped, self._string_target),
+            ("string", subscribe(PointStamped, "string/attach"), PointStamped, self._string_attach),
+            ("inertia", subscribe(InertiaStamped, "inertia/set"), InertiaStamped, self._inertia),
             ("schedule", subscribe(String, "schedule"), String, self._schedule),
         )
 
@@ -82,16 +99,30 @@ class CommandIntake:
         for topic, subscription, message_type, read in self._sources:
             with subscription.handle:
                 # Bounded, so that a flood can't hold up the motion for ever.
-                for _ in range(qos.COMMAND_DEPTH):
+                for count in range(qos.COMMAND_DEPTH):
                     taken = subscription.handle.take_message(message_type, True)
                     if taken is None:
                         break
+                    if count == qos.COMMAND_DEPTH - 1:
+                        self.queue_full += 1
                     self.received[topic] += 1
+                    self._count_gap(subscription, taken[1].get("publication_sequence_number"))
                     try:
                         read(taken[0], simulation, scenario)
                     except CommandRefused as refusal:
                         simulation.refuse(refusal)
                         self._on_refusal(refusal)
+
+    def _count_gap(self, subscription, number: int | None) -> None:
+        """Messages that a publisher sent and we never saw. Numbers are each publisher's own, so with several of them
+        nothing can be said.
+        """
+        if number is None:
+            return
+        last = self._last_sequence.get(id(subscription))
+        self._last_sequence[id(subscription)] = number
+        if last is not None and number > last + 1 and subscription.get_publisher_count() == 1:
+            self.sequence_gaps += number - last - 1
 
     @property
     def commands_received(self) -> int:
@@ -114,6 +145,35 @@ class CommandIntake:
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
+    def _string_target(self, data: bytes, simulation, scenario) -> None:
+        stamp_ns, frame_id, point = _read_point_stamped(data)
+        command = string_target(stamp_ns, frame_id, point, self._frames[0])
+        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+
+    def _string_attach(self, data: bytes, simulation, scenario) -> None:
+        stamp_ns, frame_id, point = _read_point_stamped(data)
+        command = string_attach(stamp_ns, frame_id, point, *self._frames)
+        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+
+    def _inertia(self, data: bytes, simulation, scenario) -> None:
+        message = deserialize_message(data, InertiaStamped)
+        stamp, given = message.header.stamp, message.inertia
+        stamp_ns, frame_id = stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id
+        body = self._frames[1]
+        if frame_id not in ("", "body", body, MESH_FRAME, f"{body}/mesh"):
+            raise CommandRefused("frame", "frame_id", frame_id[:80], f"{body}/mesh, or {body} (from the present COM)")
+        content = {
+            "stamp_ns": stamp_ns,
+            "frame_id": frame_id,
+            "relative": frame_id in ("body", body),
+            "mass": given.m,
+            "com": [given.com.x, given.com.y, given.com.z],
+            "tensor": [given.ixx, given.ixy, given.ixz, given.iyy, given.iyz, given.izz],
+        }
+        check_inertia(scenario, content)
+        command = Change(content, lambda: self._apply_inertia(content), bytes(data), "inertia", Rank.INERTIA)
+        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+
     def _schedule(self, data, simulation, scenario) -> None:
         text = deserialize_message(data, String).data
         if len(text) > MAX_SCHEDULE_LENGTH:
@@ -121,8 +181,9 @@ class CommandIntake:
         try:
             entry = yaml.safe_load(text)
             (command,) = parse_script(yaml.safe_dump([entry]), "schedule") if isinstance(entry, dict) else (None,)
-            if command is None or command.kind not in ("set", "clear_wrench"):
-                raise InputError("schedule", text[:80], "one entry {t, set} or {t, service: clear_wrench}")
+            if command is None or command.topic != "schedule":
+                accepted = "one entry {t, set}, {t, string: release} or {t, service: clear_wrench}"
+                raise InputError("schedule", text[:80], accepted)
             stamp_ns = nanoseconds(min(float(entry["t"]), MAX_TIME_S))
             if command.kind == "set":
                 scenario.with_changes(command.changes)
@@ -143,3 +204,9 @@ class CommandIntake:
         elif counter == "wall_stamp":
             self.wall_stamp += 1
         return when_ns
+
+
+def _read_point_stamped(data: bytes) -> tuple[int, str, tuple[float, float, float]]:
+    message = deserialize_message(data, PointStamped)
+    stamp, point = message.header.stamp, message.point
+    return stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id, (point.x, point.y, point.z)

@@ -6,7 +6,10 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "schedule")
+REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tensor", "integrator", "schedule")
+
+
+_TROUBLES = ("refused_total", "overruns", "real_time_lost_s", "sequence_gaps", "queue_full")
 
 
 class Diagnostics:
@@ -21,16 +24,16 @@ class Diagnostics:
 
     def _report(self) -> None:
         values = self._values()
-        troubles = float(values["refused_total"]) + float(values["overruns"]) + float(values["real_time_lost_s"])
+        troubles = sum(float(values[key]) for key in _TROUBLES)
         troubled, self._troubles_before = troubles > self._troubles_before, troubles
         if self._publisher.get_subscription_count() == 0:
             return
-        failure = values.pop("failure")
+        warning = values.pop("warning")
         status = DiagnosticStatus(
             name=f"{self._node.get_fully_qualified_name()}: simulation", hardware_id="simulated rigid body"
         )
-        status.level = DiagnosticStatus.WARN if troubled or failure else DiagnosticStatus.OK
-        status.message = failure or ("refused, lost or late in the last second" if troubled else values["state"])
+        status.level = DiagnosticStatus.WARN if troubled or warning else DiagnosticStatus.OK
+        status.message = warning or ("refused, lost or late in the last second" if troubled else values["state"])
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp = self._node.get_clock().now().to_msg()

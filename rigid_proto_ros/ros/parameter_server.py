@@ -10,7 +10,7 @@ from rclpy.parameter import Parameter as RosParameter
 from .. import parameters
 from ..core.errors import InputError
 from ..parameters import PARAMETERS, READ_ONLY, Parameter, parameter_named
-from .arguments import _is_ros_parameter
+from .arguments import is_ros_parameter
 
 _TYPES = {
     "double": ParameterType.PARAMETER_DOUBLE,
@@ -50,7 +50,7 @@ def declare_parameters(node: Node) -> dict[str, object]:
     overrides = node._parameter_overrides
     names = list(PARAMETERS)
     for name in overrides:
-        if _is_ros_parameter(name) or name in PARAMETERS:
+        if is_ros_parameter(name) or name in PARAMETERS:
             continue
         try:
             parameter_named(name)
@@ -78,7 +78,7 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
     """Parameters as a client sent them, each in its declared type; raises InputError."""
     result = []
     for change in changes:
-        if _is_ros_parameter(change.name):
+        if is_ros_parameter(change.name):
             result.append(change)
             continue
         parameter = parameter_named(change.name)

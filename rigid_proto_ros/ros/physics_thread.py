@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..core.observer import Observer
 from ..core.simulation import Simulation
@@ -24,6 +24,9 @@ DRAIN_NS = 10_000_000
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
 
+FOLLOW_NS = 1_000_000
+"""A followed clock is looked at this often [ns of wall time]."""
+
 MAX_LAG_NS = 250_000_000
 """A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
 
@@ -35,13 +38,13 @@ class Timekeeping:
     overruns: int = 0
     real_time_lost_s: float = 0.0
     paused: bool = False
-    requests: list = field(default_factory=list)
 
 
 class PhysicsThread:
     """publish(state) is called for every publication; take_commands() at every tick, to submit what has arrived.
 
-    on_failure(message) is called when the motion stopped in its last good state.
+    on_failure(message) is called when the motion stopped in its last good state. followed_clock() gives nanoseconds of a clock
+    that simulated time follows instead of the wall's.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class PhysicsThread:
         publish: Callable[[State], None],
         take_commands: Callable[[], None],
         on_failure: Callable[[str], None],
+        followed_clock: Callable[[], int] | None = None,
     ) -> None:
         self.scenario = scenario
         self.observer = observer
@@ -59,6 +63,7 @@ class PhysicsThread:
         self._publish = publish
         self._take_commands = take_commands
         self._on_failure = on_failure
+        self._followed_clock = followed_clock
         self._requests: list[tuple[Callable, Future]] = []
         self._wake = threading.Event()
         self._stopping = False
@@ -114,7 +119,8 @@ class PhysicsThread:
 
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
-        self.simulation.reset()
+        # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
+        self.simulation.reset(self.scenario.setup)
         self._publication = 0
         self._anchor()
 
@@ -189,12 +195,16 @@ class PhysicsThread:
             self._publication += 1
 
     def _anchor(self) -> None:
-        self._anchor_wall_ns = self._last_drain_ns = time.monotonic_ns()
+        self._last_drain_ns = time.monotonic_ns()
+        self._anchor_wall_ns = self._followed_clock() if self._followed_clock else self._last_drain_ns
         self._anchor_simulated_ns = self.simulation.time_ns
         self._paused_publication_ns = 0
 
     def _simulated_present_ns(self) -> int:
         """Simulated time that the wall clock asks for; time lost beyond MAX_LAG_NS is given up and counted."""
+        if self._followed_clock:
+            passed_ns = self._followed_clock() - self._anchor_wall_ns
+            return max(self.simulation.time_ns, self._anchor_simulated_ns + passed_ns)
         if self._factor == 0.0:
             return self._publication_ns()
         present_ns = self._anchor_simulated_ns + int((time.monotonic_ns() - self._anchor_wall_ns) * self._factor)
@@ -210,6 +220,8 @@ class PhysicsThread:
 
     def _next_wake_ns(self) -> int:
         latest_ns = self._last_drain_ns + DRAIN_NS
+        if self._followed_clock:
+            return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
         if self.timekeeping.paused:
             return latest_ns
         if self._factor == 0.0:

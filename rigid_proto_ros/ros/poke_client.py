@@ -29,6 +29,9 @@ def main(argv: list[str] | None = None) -> int:
     try:
         args = _arguments(own)
         script = _script(args)
+        if args.dry_run:
+            _print_plan(script)
+            return 0
         return _send(script, args, argv)
     except InputError as error:
         print(f"poke_client: {' '.join(str(error).split())}", file=sys.stderr)
@@ -49,6 +52,8 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
     parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="added to every t (default 0.2)")
+    parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
+    parser.add_argument("--wrench-timeout", type=float, default=1.5, metavar="S", help="as the node has it (1.5)")
     parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node")
     line = parser.add_argument_group("one command from the line")
     line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
@@ -60,7 +65,12 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
     line.add_argument("--for", dest="duration", type=float, metavar="S", help="seconds that it lasts")
     args = parser.parse_args(argv)
-    for name, value, upper in (("--lead", args.lead, 3600.0), ("--timeout", args.timeout, MAX_TIME_S)):
+    limits = (
+        ("--lead", args.lead, 3600.0),
+        ("--timeout", args.timeout, MAX_TIME_S),
+        ("--wrench-timeout", args.wrench_timeout, MAX_TIME_S),
+    )
+    for name, value, upper in limits:
         if not 0.0 <= value <= upper:
             raise InputError(name, value, f"seconds from 0 to {upper:g}")
     return args
@@ -68,7 +78,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
 
 def _script(args: argparse.Namespace) -> list[ScriptCommand]:
     if args.what not in _ONE_LINE_COMMANDS:
-        return read_script(args.what)
+        return read_script(args.what, args.wrench_timeout)
     import yaml
 
     given = {
@@ -78,7 +88,7 @@ def _script(args: argparse.Namespace) -> list[ScriptCommand]:
     }
     given["at"] = _point(args.at)
     entry = {"t": 0.0, **given} if args.what == "poke" else {"t": 0.0, "wrench": given}
-    return parse_script(yaml.safe_dump([entry]), args.what)
+    return parse_script(yaml.safe_dump([entry]), args.what, args.wrench_timeout)
 
 
 def _point(text: str):
@@ -99,6 +109,19 @@ def _point(text: str):
         origin, direction = values.split("/")
         return {"ray": {"origin": triple(origin), "direction": triple(direction)}}
     return text
+
+
+def _print_plan(script: list[ScriptCommand]) -> None:
+    for command in script:
+        content = {
+            "wrench": lambda c: f"{c.frame_id}  force {list(c.force)}  torque {list(c.torque)}",
+            "string_target": lambda c: f"{c.frame_id}  {list(c.point)}",
+            "string_attach": lambda c: f"{c.frame_id}  {c.contact or list(c.point)}",
+            "set": lambda c: str(c.changes),
+        }
+        content["poke"] = content["wrench"]
+        text = content.get(command.kind, lambda c: "")(command)
+        print(f"{command.t_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 
 def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]) -> int:

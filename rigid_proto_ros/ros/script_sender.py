@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, WrenchStamped
+from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ..core.errors import InputError
-from ..poke_script import ScriptCommand
+from ..poke_script import ScriptCommand, with_contacts
 from ..scenario import nanoseconds
 from . import qos
 
@@ -63,6 +64,8 @@ class ScriptSender(Node):
             "wrench": publisher(WrenchStamped, f"{self.target}/wrench", qos.COMMAND),
             "poke": publisher(WrenchStamped, f"{self.target}/poke", qos.COMMAND),
             "schedule": publisher(String, f"{self.target}/schedule", qos.COMMAND),
+            "string/target": publisher(PointStamped, f"{self.target}/string/target", qos.COMMAND),
+            "string/attach": publisher(PointStamped, f"{self.target}/string/attach", qos.COMMAND),
         }
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
         self._pause_client = self.create_client(SetBool, f"{self.target}/pause")
@@ -71,6 +74,7 @@ class ScriptSender(Node):
 
     def send(self, script: list[ScriptCommand], reset: bool = False, lead_s: float = 0.2) -> Report:
         """Send all commands, each stamped with the simulated time at which it acts."""
+        script = with_contacts(script, self._contacts(script))
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
         if reset:
@@ -88,9 +92,8 @@ class ScriptSender(Node):
                 self._call(self._pause_client, SetBool.Request(data=False))
                 paused = False
             self._hold_back(number, stamp_ns)
-            topic = command.kind if command.kind in ("wrench", "poke") else "schedule"
-            self._topics[topic].publish(command.message(stamp_ns))
-            sent[topic] += 1
+            self._topics[command.topic].publish(command.message(stamp_ns))
+            sent[command.topic] += 1
             self._show(f"sent {number + 1} of {len(script)}")
         self._confirm(len(script))
         if paused:
@@ -99,6 +102,22 @@ class ScriptSender(Node):
         # The counters of the same report that confirmed the last command.
         late, refused = (int(self._counters[k]) - int(before[k]) for k in ("late", "refused_total"))
         return Report(sent, late, refused, start_ns + (script[-1].t_ns if script else 0))
+
+    def _contacts(self, script: list[ScriptCommand]) -> dict[str, tuple]:
+        """The contacts that the script ties strings to, as the node has them."""
+        names = sorted({command.contact for command in script if command.contact})
+        if not names:
+            return {}
+        client = self.create_client(GetParameters, f"{self.target}/get_parameters")
+        self._spin_until(client.service_is_ready, f"the service {client.srv_name}")
+        found = {}
+        for name in names:
+            future = client.call_async(GetParameters.Request(names=[f"contacts.{name}"]))
+            self._spin_until(future.done, f"an answer of {client.srv_name}")
+            values = future.result().values
+            if values and len(values[0].double_array_value) == 3:
+                found[name] = tuple(values[0].double_array_value)
+        return found
 
     def _wait_for_node(self, timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s

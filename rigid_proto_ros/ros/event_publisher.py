@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""What happened to the body, as messages: inertia and scene (latched), applied commands, the event log."""
+
+from __future__ import annotations
+
+import numpy as np
+from geometry_msgs.msg import InertiaStamped, WrenchStamped
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from .. import cdr
+from ..core.observer import BodySnapshot, Observer
+from . import qos
+
+
+class EventPublisher(Observer):
+    """An observer that publishes; its methods run on the physics thread, and are rare."""
+
+    def __init__(self, node: Node, body_frame: str) -> None:
+        def publisher(message_type, topic, profile):
+            return node.create_publisher(message_type, f"~/{topic}", profile, qos_overriding_options=qos.OVERRIDABLE)
+
+        self._mesh_frame = f"{body_frame}/mesh"
+        self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
+        self._scene = publisher(String, "scene", qos.LATCHED)
+        self._applied = publisher(WrenchStamped, "applied", qos.EVENT)
+        self._events = publisher(String, "events", qos.EVENT)
+
+    def scene_changed(self, time_ns: int, scene: str) -> None:
+        """All parameters, and the mesh's hash in a comment, as a parameter file."""
+        self._scene.publish(cdr.string(scene))
+
+    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
+        """The latched inertia: COM in scaled mesh coordinates, tensor about it in mesh axes."""
+        message = InertiaStamped()
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+        message.header.frame_id = self._mesh_frame
+        inertia, I = message.inertia, body.inertia
+        inertia.m = body.mass
+        inertia.com.x, inertia.com.y, inertia.com.z = body.center_of_mass.tolist()
+        inertia.ixx, inertia.ixy, inertia.ixz = float(I[0, 0]), float(I[0, 1]), float(I[0, 2])
+        inertia.iyy, inertia.iyz, inertia.izz = float(I[1, 1]), float(I[1, 2]), float(I[2, 2])
+        self._inertia.publish(message)
+
+    def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
+        """A wrench or poke as it took effect."""
+        if self._applied.get_subscription_count():
+            self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force.tolist(), torque.tolist()))
+
+    def event(self, time_ns: int, line: str) -> None:
+        """A line of the event log."""
+        if self._events.get_subscription_count():
+            self._events.publish(cdr.string(line))

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""Pose, twist and odometry, /clock and /tf: packed bytes, and nothing packed for a topic that nobody listens to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+
+from .. import cdr
+from ..core.rotation import rotate
+from ..core.state import State
+from . import qos
+
+
+class StatePublisher:
+    """Publishes states of one body. Use ``configure`` for what parameters switch on and off."""
+
+    def __init__(self, node: Node, world_frame: str, body_frame: str) -> None:
+        self._node = node
+        self._frames = world_frame, body_frame
+
+        def publisher(message_type, topic):
+            return node.create_publisher(message_type, f"~/{topic}", qos.STATE, qos_overriding_options=qos.OVERRIDABLE)
+
+        self._pose = publisher(PoseStamped, "pose"), cdr.StampedTemplate(world_frame, 7)
+        self._twist = publisher(TwistStamped, "twist"), cdr.StampedTemplate(world_frame, 6)
+        self._odom = (
+            publisher(Odometry, "odom"),
+            cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame),
+        )
+        self._clock = None
+        self._tf = None
+
+    def configure(self, values: Mapping[str, object]) -> None:
+        """Create or drop the publishers of /clock and /tf; runs on the executor's thread."""
+        if values["publish_clock"] and self._clock is None:
+            self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
+        elif not values["publish_clock"] and self._clock is not None:
+            clock, self._clock = self._clock, None
+            self._node.destroy_publisher(clock)
+        if values["publish_tf"] and self._tf is None:
+            self._tf = self._tf_publisher()
+        elif not values["publish_tf"] and self._tf is not None:
+            tf, self._tf = self._tf, None
+            self._node.destroy_publisher(tf)
+
+    def _tf_publisher(self):
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            self._node.get_logger().warning("publish_tf: tf2_msgs isn't installed (ros-jazzy-tf2-msgs); no /tf")
+            return None
+        return self._node.create_publisher(TFMessage, "/tf", qos.TF)
+
+    def publish(self, state: State) -> None:
+        """Publish one state on every topic that has a subscriber."""
+        time_ns, row = state.time_ns, state.row.tolist()
+        q, v, w = row[3:7], row[7:10], row[10:13]
+        clock = self._clock
+        if clock is not None and clock.get_subscription_count():
+            clock.publish(cdr.time(time_ns))
+        publisher, template = self._pose
+        if publisher.get_subscription_count():
+            publisher.publish(bytes(template.pack(time_ns, row[:7])))
+        publisher, template = self._twist
+        if publisher.get_subscription_count():
+            publisher.publish(bytes(template.pack(time_ns, [*v, *rotate(*q, *w)])))
+        publisher, template = self._odom
+        if publisher.get_subscription_count():
+            # An Odometry's twist is in the child frame: body axes.
+            template.pack(time_ns, row[:7])
+            v_body = rotate(-q[0], -q[1], -q[2], q[3], *v)
+            publisher.publish(bytes(template.pack(time_ns, [*v_body, *w], at=cdr.ODOMETRY_TWIST_AT)))
+        tf = self._tf
+        if tf is not None and tf.get_subscription_count():
+            tf.publish(self._transform(tf.msg_type, time_ns, row))
+
+    def _transform(self, message_type, time_ns: int, row: list[float]):
+        transform = TransformStamped()
+        transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+        transform.header.frame_id, transform.child_frame_id = self._frames
+        t, r = transform.transform.translation, transform.transform.rotation
+        t.x, t.y, t.z, r.x, r.y, r.z, r.w = row[:7]
+        return message_type(transforms=[transform])
