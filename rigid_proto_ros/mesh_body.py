@@ -37,8 +37,9 @@ class MeshBody:
 
     @property
     def triangles(self) -> np.ndarray:
-        """Triangles (m, 3)."""
-        return self.moments.triangles
+        """Triangles (m, 3), turned outward when the file winds them inward throughout."""
+        triangles = self.moments.triangles
+        return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles
 
 
 def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> MeshBody:
