@@ -171,6 +171,7 @@ _DECLARED = (
     Parameter("string.timeout", "double", 1.0, "The string lets go this long after the last target message; 0 never.", "s", 0.0, 1e9),
     Parameter("publish_clock", "bool", False, "Publish simulated time on /clock."),
     Parameter("publish_tf", "bool", False, "Publish the body's frame on /tf (where tf2_msgs is installed)."),
+    Parameter("imu_contact", "string", "", "Contact at which ~/imu measures; empty means the centre of mass."),
     Parameter("world_frame", "string", "world", "Name of the world frame in published messages.", changes=READ_ONLY),
     Parameter("body_frame", "string", "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY),
     Parameter("record", "string", "", "Record the session to this .rrd file; empty records nothing."),

@@ -117,12 +117,16 @@ def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario
     R = matrix_from_quaternion(quaternion)
     w = np.asarray(values["initial.angular_velocity"])
     omega_body = R[0] * w[0] + R[1] * w[1] + R[2] * w[2]
+    contacts = {n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")}
+    if values["imu_contact"] and values["imu_contact"] not in contacts:
+        known = ", ".join(sorted(contacts)) or "the body has none"
+        raise InputError("imu_contact", values["imu_contact"], f"'' for the COM, or a contact ({known})")
     setup = Setup(
         body=body,
         inertia_model=values["inertia_model"],
         surface=body_mesh.surface if body_mesh else None,
         geometry=(body_mesh.mesh.sha256 if body_mesh else "", *scale.tolist()),
-        contacts={n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")},
+        contacts=contacts,
         gravity=np.asarray(values["gravity"]),
         linear_damping=values["linear_damping"],
         angular_damping=values["angular_damping"],

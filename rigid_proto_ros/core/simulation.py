@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .accelerations import specific_force
 from .commands import (
     Change,
     ClearWrench,
@@ -145,6 +146,10 @@ class Simulation:
         start = self._segment.start.angular_momentum(self.setup.body.inertia)
         moved, size = self.angular_momentum - start, float((start * start).sum()) ** 0.5
         return float((moved * moved).sum()) ** 0.5 / size if size > 0.0 else 0.0
+
+    def specific_force(self, point) -> np.ndarray:
+        """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]."""
+        return specific_force(self.setup, self._load_sum(), self.string, self.state, point)
 
     @property
     def has_pending(self) -> bool:

@@ -3,26 +3,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from xml.sax.saxutils import quoteattr
+
 import numpy as np
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
 from std_msgs.msg import String
 
 from .. import cdr
+from ..core.mass_properties import MassProperties
 from ..core.observer import BodySnapshot, Observer
+from ..inertial_export import urdf_inertial
 from . import qos
 
 
 class EventPublisher(Observer):
     """An observer that publishes; its methods run on the physics thread, and are rare."""
 
-    def __init__(self, node: Node, body_frame: str) -> None:
+    def __init__(self, node: Node, body_frame: str, mesh_path: Callable[[], str]) -> None:
         def publisher(message_type, topic, profile):
             return node.create_publisher(message_type, f"~/{topic}", profile, qos_overriding_options=qos.OVERRIDABLE)
 
+        self._body_frame = body_frame
         self._mesh_frame = f"{body_frame}/mesh"
+        self._mesh_path = mesh_path
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
         self._scene = publisher(String, "scene", qos.LATCHED)
+        self._description = publisher(String, "robot_description", qos.LATCHED)
         self._applied = publisher(WrenchStamped, "applied", qos.EVENT)
         self._events = publisher(String, "events", qos.EVENT)
 
@@ -41,6 +49,7 @@ class EventPublisher(Observer):
         inertia.ixx, inertia.ixy, inertia.ixz = float(I[0, 0]), float(I[0, 1]), float(I[0, 2])
         inertia.iyy, inertia.iyz, inertia.izz = float(I[1, 1]), float(I[1, 2]), float(I[2, 2])
         self._inertia.publish(message)
+        self._description.publish(String(data=self._urdf(body)))
 
     def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
         """A wrench or poke as it took effect."""
@@ -51,3 +60,18 @@ class EventPublisher(Observer):
         """A line of the event log."""
         if self._events.get_subscription_count():
             self._events.publish(cdr.string(line))
+
+    def _urdf(self, body: BodySnapshot) -> str:
+        """The body as a URDF of one link at the COM, for viewers that draw robot descriptions."""
+        inertial = urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia), frame="com")
+        path = self._mesh_path()
+        visual = ""
+        if path:
+            origin = " ".join(f"{-c + 0.0:.17g}" for c in body.center_of_mass)
+            scale = " ".join(f"{s:.17g}" for s in body.scale)
+            mesh = f'<mesh filename={quoteattr("file://" + path)} scale="{scale}"/>'
+            visual = f'<visual><origin xyz="{origin}" rpy="0 0 0"/><geometry>{mesh}</geometry></visual>'
+        name = quoteattr(self._body_frame)
+        return (
+            f'<?xml version="1.0"?>\n<robot name={name}>\n<link name={name}>\n{inertial}{visual}\n</link>\n</robot>\n'
+        )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
@@ -43,8 +44,8 @@ class RigidBodyNode(Node):
         self.world_frame = scenario.values["world_frame"]
         self.body_frame = scenario.values["body_frame"] or self.get_name()
         viewer = make_observer(scenario, self.get_name()) if make_observer else Observer()
-        self.observer = Observers(EventPublisher(self, self.body_frame), viewer)
-        self.states = StatePublisher(self, self.world_frame, self.body_frame)
+        self.observer = Observers(EventPublisher(self, self.body_frame, self._mesh_path), viewer)
+        self.states = StatePublisher(self, self.world_frame, self.body_frame, self._specific_force)
         self.states.configure(scenario.values)
         self.physics = PhysicsThread(
             scenario,
@@ -99,6 +100,13 @@ class RigidBodyNode(Node):
     def _motion_failed(self, message: str) -> None:
         self.get_logger().error(f"paused in the last good state: {message}")
 
+    def _specific_force(self):
+        """At the contact that ~/imu is mounted at, or the COM."""
+        contact, simulation = self.physics.scenario.values["imu_contact"], self.physics.simulation
+        body = simulation.setup.body
+        point = body.point(simulation.setup.contacts[contact]) if contact else np.zeros(3)
+        return simulation.specific_force(point)
+
     def _apply_scheduled(self, changes: dict):
         """A scheduled ``set`` takes effect: the ROS parameters follow on the executor's thread."""
         return self._take_on(self.physics.scenario.with_changes(changes))
@@ -106,6 +114,10 @@ class RigidBodyNode(Node):
     def _apply_inertia(self, content: dict):
         """An inertia message takes effect."""
         return self._take_on(check_inertia(self.physics.scenario, content))
+
+    def _mesh_path(self) -> str:
+        mesh = self.physics.scenario.body_mesh
+        return mesh.mesh.path if mesh else ""
 
     def _tell_scene(self, scenario: Scenario) -> None:
         self.observer.scene_changed(self.physics.simulation.time_ns, scenario.text)

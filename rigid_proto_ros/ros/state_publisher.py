@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Pose, twist and odometry, /clock and /tf: packed bytes, and nothing packed for a topic that nobody listens to."""
+"""Pose, twist, odometry, IMU, /clock and /tf: packed bytes, and nothing packed for a topic that nobody listens to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
 
 from .. import cdr
 from ..core.rotation import rotate
@@ -17,10 +19,14 @@ from . import qos
 
 
 class StatePublisher:
-    """Publishes states of one body. Use ``configure`` for what parameters switch on and off."""
+    """Publishes states of one body. Use ``configure`` for what parameters switch on and off.
 
-    def __init__(self, node: Node, world_frame: str, body_frame: str) -> None:
+    specific_force() gives what an accelerometer at the chosen contact shows at the present state.
+    """
+
+    def __init__(self, node: Node, world_frame: str, body_frame: str, specific_force: Callable[[], np.ndarray]) -> None:
         self._node = node
+        self._specific_force = specific_force
         self._frames = world_frame, body_frame
 
         def publisher(message_type, topic):
@@ -32,6 +38,7 @@ class StatePublisher:
             publisher(Odometry, "odom"),
             cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame),
         )
+        self._imu = publisher(Imu, "imu")
         self._clock = None
         self._tf = None
 
@@ -75,9 +82,22 @@ class StatePublisher:
             template.pack(time_ns, row[:7])
             v_body = rotate(-q[0], -q[1], -q[2], q[3], *v)
             publisher.publish(bytes(template.pack(time_ns, [*v_body, *w], at=cdr.ODOMETRY_TWIST_AT)))
+        if self._imu.get_subscription_count():
+            self._imu.publish(self._imu_message(time_ns, q, w))
         tf = self._tf
         if tf is not None and tf.get_subscription_count():
             tf.publish(self._transform(tf.msg_type, time_ns, row))
+
+    def _imu_message(self, time_ns: int, q: list[float], w: list[float]) -> Imu:
+        """Attitude, angular velocity and exact specific force, both in body axes, at the contact that was chosen."""
+        message = Imu()
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+        message.header.frame_id = self._frames[1]
+        o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
+        o.x, o.y, o.z, o.w = q
+        rate.x, rate.y, rate.z = w
+        felt.x, felt.y, felt.z = self._specific_force().tolist()
+        return message
 
     def _transform(self, message_type, time_ns: int, row: list[float]):
         transform = TransformStamped()
