@@ -44,7 +44,13 @@ def prepare(problem: Problem, step: float, integrator: str) -> Run | None:
     if spring is not None:
         plant.AddForceElement(
             LinearSpringDamper(
-                plant.world_body(), spring.target, body, spring.point, spring.rest_length, spring.stiffness, spring.damping
+                plant.world_body(),
+                spring.target,
+                body,
+                spring.point,
+                spring.rest_length,
+                spring.stiffness,
+                spring.damping,
             )
         )
     plant.Finalize()
@@ -90,7 +96,9 @@ def _add_forces(builder, plant, body, problem: Problem) -> None:
         force = np.array(w.force)
         turn = RotationMatrix.MakeFromOneVector(force / np.linalg.norm(force), 2)
         infos.append(
-            PropellerInfo(body_index=body.index(), X_BP=RigidTransform(turn, w.point), thrust_ratio=math.dist(force, (0, 0, 0)))
+            PropellerInfo(
+                body_index=body.index(), X_BP=RigidTransform(turn, w.point), thrust_ratio=math.dist(force, (0, 0, 0))
+            )
         )
     propeller = builder.AddSystem(Propeller(infos))
     source = builder.AddSystem(ConstantVectorSource(np.ones(len(infos))))

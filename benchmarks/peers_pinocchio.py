@@ -24,7 +24,9 @@ def prepare(problem: Problem, step: float) -> Run | None:
         return None
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
-    model.appendBodyToJoint(joint, pin.Inertia(problem.mass, np.zeros(3), np.array(problem.inertia)), pin.SE3.Identity())
+    model.appendBodyToJoint(
+        joint, pin.Inertia(problem.mass, np.zeros(3), np.array(problem.inertia)), pin.SE3.Identity()
+    )
     model.gravity.linear = np.array(problem.gravity)
     data = model.createData()
     forces = [pin.Force.Zero(), pin.Force.Zero()]

@@ -22,9 +22,10 @@ sys.path.insert(0, str(HERE.parent / "test"))
 
 import itertools
 
-from problems import PROBLEMS, Problem
 from reference_motion import free_motion, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
+
+from problems import PROBLEMS, Problem
 
 FOLDER = HERE / "references"
 
@@ -33,9 +34,7 @@ def reference_row(problem: Problem) -> list:
     """The 13 numbers (mpf) of the state at the problem's end; raises FileNotFoundError or ValueError (another problem)."""
     cached = json.loads((FOLDER / f"{problem.name}.json").read_text())
     if cached["fingerprint"] != problem.fingerprint:
-        raise ValueError(
-            f"references/{problem.name}.json belongs to another problem; delete it to compute it anew"
-        )
+        raise ValueError(f"references/{problem.name}.json belongs to another problem; delete it to compute it anew")
     with mp.workdps(50):
         return [mpf(c) for c in cached["row"]]
 
@@ -53,9 +52,7 @@ def compute(problem: Problem, digits: int) -> list:
                 if w.impulse and w.begin == begin:
                     row = _after_impulse(problem, row, w)
             acting = [
-                w
-                for w in problem.wrenches
-                if not w.impulse and w.begin <= begin and not (w.end or np.inf) <= begin
+                w for w in problem.wrenches if not w.impulse and w.begin <= begin and not (w.end or np.inf) <= begin
             ]
             # Command times are integer nanoseconds, so a segment's length is their exact difference.
             span = mpf(round(end * 1e9) - round(begin * 1e9)) / 10**9
@@ -64,15 +61,10 @@ def compute(problem: Problem, digits: int) -> list:
 
 
 def _loaded(problem: Problem, acting) -> ReferenceProblem:
-    sums = {
-        name: [mpf(0)] * 3
-        for name in ("force_world", "force_body", "torque_world", "torque_body")
-    }
+    sums = {name: [mpf(0)] * 3 for name in ("force_world", "force_body", "torque_world", "torque_body")}
     moment = [[mpf(0)] * 3 for _ in range(3)]
     for w in acting:
-        force, torque, arm = (
-            [mpf(c) for c in part] for part in (w.force, w.torque, w.point)
-        )
+        force, torque, arm = ([mpf(c) for c in part] for part in (w.force, w.torque, w.point))
         for k in range(3):
             a, b = (k + 1) % 3, (k + 2) % 3
             sums[f"force_{w.axes}"][k] += force[k]
@@ -80,15 +72,11 @@ def _loaded(problem: Problem, acting) -> ReferenceProblem:
             if w.axes == "body":
                 sums["torque_body"][k] += arm[a] * force[b] - arm[b] * force[a]
             else:
-                moment[k] = [
-                    m + arm[k] * f for m, f in zip(moment[k], force, strict=True)
-                ]
+                moment[k] = [m + arm[k] * f for m, f in zip(moment[k], force, strict=True)]
     s = problem.spring
     string = None
     if s is not None:
-        string = ReferenceString(
-            s.point, s.target, s.stiffness, s.damping, s.rest_length, s.bilateral
-        )
+        string = ReferenceString(s.point, s.target, s.stiffness, s.damping, s.rest_length, s.bilateral)
     return ReferenceProblem(
         problem.mass,
         problem.inertia,
@@ -104,23 +92,12 @@ def _loaded(problem: Problem, acting) -> ReferenceProblem:
 def _after_impulse(problem: Problem, row, w) -> list:
     row = [mpf(c) for c in row]
     R = rotation_of(row[3:7])
-    impulse, arm, turn = (
-        [mpf(c) for c in part] for part in (w.force, w.point, w.torque)
-    )
-    world = (
-        impulse
-        if w.axes == "world"
-        else [sum(R[i][j] * impulse[j] for j in range(3)) for i in range(3)]
-    )
+    impulse, arm, turn = ([mpf(c) for c in part] for part in (w.force, w.point, w.torque))
+    world = impulse if w.axes == "world" else [sum(R[i][j] * impulse[j] for j in range(3)) for i in range(3)]
     body = [sum(R[j][i] * world[j] for j in range(3)) for i in range(3)]
     if w.axes == "world":
         turn = [sum(R[j][i] * turn[j] for j in range(3)) for i in range(3)]
-    turn = [
-        turn[k]
-        + arm[(k + 1) % 3] * body[(k + 2) % 3]
-        - arm[(k + 2) % 3] * body[(k + 1) % 3]
-        for k in range(3)
-    ]
+    turn = [turn[k] + arm[(k + 1) % 3] * body[(k + 2) % 3] - arm[(k + 2) % 3] * body[(k + 1) % 3] for k in range(3)]
     change = mpmath.lu_solve(
         mpmath.matrix([[mpf(c) for c in r] for r in problem.inertia]),
         mpmath.matrix(turn),
@@ -133,15 +110,10 @@ def _after_impulse(problem: Problem, row, w) -> list:
 
 def _closed_form(problem: Problem) -> list:
     """Torque-free: attitude and ω by elliptic functions, translation by Newton."""
-    R, w = free_motion(
-        problem.inertia, problem.row[10:13], problem.duration, problem.row[3:7]
-    )
+    R, w = free_motion(problem.inertia, problem.row[10:13], problem.duration, problem.row[3:7])
     with mp.workdps(60):
         t = mpf(problem.duration)
-        x, v, g = (
-            [mpf(c) for c in part]
-            for part in (problem.row[0:3], problem.row[7:10], problem.gravity)
-        )
+        x, v, g = ([mpf(c) for c in part] for part in (problem.row[0:3], problem.row[7:10], problem.gravity))
         position = [x[k] + t * v[k] + t * t / 2 * g[k] for k in range(3)]
         return [*position, *_quaternion(R), *(v[k] + t * g[k] for k in range(3)), *w]
 
@@ -206,9 +178,7 @@ def cache(problem: Problem, digits: int = 25) -> dict:
 
 
 def main() -> None:
-    names = sys.argv[1:] or [
-        name for name in PROBLEMS if not (FOLDER / f"{name}.json").exists()
-    ]
+    names = sys.argv[1:] or [name for name in PROBLEMS if not (FOLDER / f"{name}.json").exists()]
     for name in names:
         cache(PROBLEMS[name])
 

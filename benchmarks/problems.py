@@ -65,36 +65,23 @@ class Problem:
     @property
     def fingerprint(self) -> str:
         """SHA-256 of all numbers: a cached reference belongs to exactly one of these."""
-        return hashlib.sha256(
-            json.dumps(asdict(self), sort_keys=True).encode()
-        ).hexdigest()
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
     @property
     def torque_free(self) -> bool:
         """Nothing but gravity acts."""
-        return (
-            not self.wrenches
-            and self.spring is None
-            and self.linear_damping == self.angular_damping == 0.0
-        )
+        return not self.wrenches and self.spring is None and self.linear_damping == self.angular_damping == 0.0
 
     @property
     def conservative(self) -> bool:
         """Energy, the string's and gravity's potential included, stays what it was."""
-        damped = (
-            self.linear_damping
-            or self.angular_damping
-            or (self.spring is not None and self.spring.damping)
-        )
+        damped = self.linear_damping or self.angular_damping or (self.spring is not None and self.spring.damping)
         return not (self.wrenches or damped)
 
     @property
     def constant_body_wrench(self) -> bool:
         """The only wrench is fixed to the body and acts all the time: what most peers can express."""
-        return all(
-            w.axes == "body" and w.end is None and w.begin == 0.0 and not w.impulse
-            for w in self.wrenches
-        )
+        return all(w.axes == "body" and w.end is None and w.begin == 0.0 and not w.impulse for w in self.wrenches)
 
 
 def tuples(matrix) -> tuple:
@@ -127,21 +114,12 @@ def _times(matrix, vector) -> list[float]:
 def _turned(moments) -> np.ndarray:
     """R diag(moments) Rᵀ, symmetric to the last bit."""
     return np.array(
-        [
-            [
-                sum(float(TURN[i, k] * TURN[j, k]) * moments[k] for k in range(3))
-                for j in range(3)
-            ]
-            for i in range(3)
-        ]
+        [[sum(float(TURN[i, k] * TURN[j, k]) * moments[k] for k in range(3)) for j in range(3)] for i in range(3)]
     )
 
 
 def _cross(a, b) -> list[float]:
-    return [
-        float(a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
-        for k in range(3)
-    ]
+    return [float(a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]) for k in range(3)]
 
 
 def _spin(w, position=ZERO, velocity=ZERO) -> tuple:
@@ -169,9 +147,7 @@ _P2_FORCE = Wrench("body", (0.2, 0.1, -0.15), (0.5, -0.3, 0.8))
 
 def _p2(name: str, title: str, spin: float) -> Problem:
     row = _spin(_times(TURN, [0.3 * spin, spin, -0.2 * spin]))
-    return Problem(
-        name, title, 10.0, 2.0, P1B.inertia, row, (0.0, 0.0, -9.81), (_P2_FORCE,)
-    )
+    return Problem(name, title, 10.0, 2.0, P1B.inertia, row, (0.0, 0.0, -9.81), (_P2_FORCE,))
 
 
 P2 = _p2("P2", "force fixed to a body point, gravity", 1.0)
@@ -204,15 +180,11 @@ def effective_mass(mass: float, inertia, arm, direction) -> float:
         _cross(inertia[0], inertia[1]),
     ]
     determinant = sum(float(inertia[0][k]) * adjugate[0][k] for k in range(3))
-    turned = [
-        sum(adjugate[j][i] * turn[j] for j in range(3)) / determinant for i in range(3)
-    ]
+    turned = [sum(adjugate[j][i] * turn[j] for j in range(3)) / determinant for i in range(3)]
     return 1.0 / (1.0 / mass + sum(t * c for t, c in zip(turn, turned, strict=True)))
 
 
-def string_problem(
-    frequency: float, damping_ratio: float, bilateral: bool, duration: float = 1.0
-) -> Problem:
+def string_problem(frequency: float, damping_ratio: float, bilateral: bool, duration: float = 1.0) -> Problem:
     """P3: a 2 kg body hung by an offset point on a string of 1 m, for ω_s [rad/s] and ζ; starts at rest length."""
     mass, inertia, arm = 2.0, _turned([0.02, 0.03, 0.04]), np.array([0.1, 0.15, 0.2])
     target, up, w = (
@@ -268,9 +240,7 @@ def _heavy() -> Problem:
     k = m_eff * 30.0**2
     length = 3.0 + mass * 9.81 * np.cos(angle) / k
     position = -length * up - arm
-    spring = Spring(
-        tuple(map(float, arm)), ZERO, k, 0.2 * (k * m_eff) ** 0.5, 3.0, False, 30.0, 0.1
-    )
+    spring = Spring(tuple(map(float, arm)), ZERO, k, 0.2 * (k * m_eff) ** 0.5, 3.0, False, 30.0, 0.1)
     return Problem(
         "heavy",
         "one ton on a string of 3 m",
@@ -308,15 +278,10 @@ POKES = Problem(
         Wrench("world", (0.0, 0.05, 0.0), (0.0, 0.0, 1.5), begin=0.5, end=0.55),
         Wrench("body", (0.08, 0.0, 0.0), (0.0, 0.8, 0.3), begin=1.0, end=1.05),
         Wrench("world", ZERO, (0.2, 0.0, 0.0), (0.0, 0.002, 0.0), begin=1.5, end=3.0),
-        Wrench(
-            "world", (-0.02, 0.05, 0.0), (0.02, -0.05, 0.03), begin=2.0, impulse=True
-        ),
+        Wrench("world", (-0.02, 0.05, 0.0), (0.02, -0.05, 0.03), begin=2.0, impulse=True),
         Wrench("body", (-0.02, -0.05, 0.01), (1.0, 0.0, 0.5), begin=3.2, end=3.25),
         Wrench("world", (0.08, 0.0, 0.0), (0.0, 0.0, -1.2), begin=4.0, end=4.123456789),
     ),
 )
 
-PROBLEMS = {
-    p.name: p
-    for p in (P1, P1B, P2, P2_FAST, *P3, P4_ROD, P4_PLATE, HEAVY, DAMPED, POKES)
-}
+PROBLEMS = {p.name: p for p in (P1, P1B, P2, P2_FAST, *P3, P4_ROD, P4_PLATE, HEAVY, DAMPED, POKES)}

@@ -19,11 +19,39 @@ CENTRE = "world/centre"
 LOADS = "world/loads"
 TRAIL = "world/trail"
 
+ANGULAR_VELOCITY = "world/centre/angular_velocity"
+MOMENTUM = "world/centre/angular_momentum"
+BOUNDING_BOX = "world/body/bounding_box"
+INERTIA_BOX = "world/body/equimomental_box"
+INERTIA_ELLIPSOID = "world/body/equimomental_ellipsoid"
+
+GHOST = "world/ghost"
+GHOST_MESH = "world/ghost/mesh"
+GHOST_BOX = "world/ghost/equimomental_box"
+
+POINSOT = "poinsot"
+POINSOT_UPRIGHT = "poinsot/upright"
+"""Turned so that the invariable plane is a floor."""
+POINSOT_BODY = "poinsot/upright/body"
+POINSOT_PRINCIPAL = "poinsot/upright/body/principal"
+POINSOT_ELLIPSOID = "poinsot/upright/body/principal/ellipsoid"
+POINSOT_POLHODE = "poinsot/upright/body/principal/polhode"
+POINSOT_SEPARATRIX = "poinsot/upright/body/principal/separatrix"
+POINSOT_PLANE = "poinsot/upright/invariable_plane"
+POINSOT_OMEGA = "poinsot/upright/angular_velocity"
+POINSOT_MOMENTUM = "poinsot/upright/angular_momentum"
+POINSOT_HERPOLHODE = "poinsot/upright/herpolhode"
+
 STATE = "state"
 ENERGY = "plots/energy"
 ANGULAR_MOMENTUM = "plots/angular_momentum"
 ANGULAR_MOMENTUM_ANGLE = "plots/angular_momentum_angle"
 ANGULAR_VELOCITY_BODY = "plots/angular_velocity_body"
+DRIFT = "plots/drift"
+GHOST_ANGLE = "plots/ghost_angle"
+
+STATUS = "status"
+"""Below it one lane a track: ``loads``, ``integrator``, ``inertia_model`` and those that the run reports."""
 
 SCENE = "session/scene"
 SESSION_MESH = "session/mesh"
@@ -36,14 +64,20 @@ RED, GREEN, BLUE = (235, 85, 85), (90, 200, 110), (85, 150, 250)
 GREY, YELLOW, VIOLET, ORANGE = (190, 190, 190), (240, 200, 70), (190, 120, 245), (250, 150, 60)
 MESH_COLOUR = (214, 205, 190)
 TRAIL_COLOUR = (250, 205, 95)
+OMEGA_COLOUR = (90, 230, 230)
+MOMENTUM_COLOUR = (190, 120, 245)
+GHOST_COLOUR = (120, 180, 255)
+GHOST_ALPHA = 110
 
 LOAD_COLOURS = {"wrench": ORANGE, "poke": (255, 80, 80), "impulse": (255, 70, 200)}
-TORQUE_COLOUR = (120, 220, 220)
+TORQUE_COLOUR = (255, 210, 120)
 
 SERIES = {
     ENERGY: (("translational", BLUE), ("rotational", ORANGE), ("potential", GREEN), ("total", GREY)),
     ANGULAR_MOMENTUM: (("Lx", RED), ("Ly", GREEN), ("Lz", BLUE), ("|L|", GREY)),
     ANGULAR_MOMENTUM_ANGLE: (("angle of L to its start", VIOLET),),
+    DRIFT: (("energy, relative", ORANGE), ("L as a vector, relative", VIOLET)),
+    GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
     ANGULAR_VELOCITY_BODY: (("ω1", RED), ("ω2", GREEN), ("ω3", BLUE)),
 }
 """Per plotted entity the names and colours of its scalars, in the order in which they are logged."""

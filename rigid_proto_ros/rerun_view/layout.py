@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a viewer arranges a flight when it opens: the body on the left, plots on the right, what was said below."""
+"""How a viewer arranges a flight when it opens."""
 
 from __future__ import annotations
 
@@ -12,26 +12,16 @@ from . import entities as e
 TRAIL_SECONDS = 3.0
 """[simulated s] Length of the trail shown behind the body."""
 
+HERPOLHODE_SECONDS = 20.0
+
 BACKGROUND = (24, 27, 34)
 
 
-def layout(size: float) -> Any:
-    """The blueprint for a body of this size [m]."""
+def layout(size: float, initial_view: str) -> Any:
+    """The blueprint for a body of this size [m]: three tabs, ``initial_view`` in front."""
+    tabs = {"lesson": lesson(size), "debugging": debugging(size), "plain": flight_view(size, "Plain", PLAIN)}
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                flight_view(size),
-                command_view(),
-                row_shares=[5, 1],
-            ),
-            rrb.Vertical(
-                plot(e.ENERGY, "Energy [J]"),
-                plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
-                plot(e.ANGULAR_MOMENTUM_ANGLE, "Angle of L to its start [rad]"),
-                plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
-            ),
-            column_shares=[3, 2],
-        ),
+        rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
         rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -39,12 +29,60 @@ def layout(size: float) -> Any:
     )
 
 
-def flight_view(size: float) -> Any:
+def lesson(size: float) -> Any:
+    """How the tensor governs the motion: the flight, Poinsot's construction, what is conserved and what isn't."""
+    return rrb.Horizontal(
+        rrb.Vertical(flight_view(size, "Flight", LESSON), command_view(), row_shares=[5, 1]),
+        rrb.Vertical(
+            poinsot_view(),
+            plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
+            plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
+            plot(e.ENERGY, "Energy [J]"),
+            row_shares=[2, 1, 1, 1],
+        ),
+        column_shares=[3, 2],
+        name="Lesson",
+    )
+
+
+def debugging(size: float) -> Any:
+    """Everything that is logged: every plot, the state line, the event lines as they are."""
+    return rrb.Horizontal(
+        rrb.Vertical(
+            flight_view(size, "All shapes", DEBUGGING),
+            rrb.StateTimelineView(origin=e.STATUS, name="State"),
+            rrb.Tabs(
+                rrb.TextLogView(origin=e.EVENTS, name="Events"),
+                command_view(),
+                rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
+            ),
+            row_shares=[3, 1, 1],
+        ),
+        rrb.Grid(
+            plot(e.ENERGY, "Energy [J]"),
+            plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
+            plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
+            plot(e.ANGULAR_MOMENTUM_ANGLE, "Angle of L to its start [rad]"),
+            plot(e.DRIFT, "Drift since the last command"),
+            plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]"),
+            grid_columns=2,
+        ),
+        name="Debugging",
+    )
+
+
+# What the flight views leave out; everything else below ``world`` is shown.
+LESSON = (e.BOUNDING_BOX, e.INERTIA_BOX, e.INERTIA_ELLIPSOID)
+DEBUGGING: tuple[str, ...] = ()
+PLAIN = (*LESSON, e.BODY_AXES, e.ANGULAR_VELOCITY, e.MOMENTUM, e.TRAIL)
+
+
+def flight_view(size: float, name: str, hidden: tuple[str, ...]) -> Any:
     """The body in the world, followed by the camera, with its trail."""
     return rrb.Spatial3DView(
         origin="/" + e.CENTRE,
-        contents=f"/{e.WORLD}/**",
-        name="Flight",
+        contents=[f"+ /{e.WORLD}/**", *(f"- /{entity}/**" for entity in hidden)],
+        name=name,
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
@@ -53,24 +91,36 @@ def flight_view(size: float) -> Any:
             look_target=[0.0, 0.0, 0.0],
             eye_up=[0.0, 0.0, 1.0],
         ),
-        overrides={
-            "/" + e.TRAIL: [
-                rrb.VisibleTimeRanges(
-                    [
-                        rrb.VisibleTimeRange(
-                            e.SIM_TIME,
-                            start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL_SECONDS),
-                            end=rrb.TimeRangeBoundary.cursor_relative(),
-                        ),
-                        rrb.VisibleTimeRange(
-                            e.ROS_TIME,
-                            start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL_SECONDS),
-                            end=rrb.TimeRangeBoundary.cursor_relative(),
-                        ),
-                    ]
-                )
-            ]
-        },
+        overrides={"/" + e.TRAIL: [] if e.TRAIL in hidden else [_last_seconds(TRAIL_SECONDS)]},
+    )
+
+
+def poinsot_view() -> Any:
+    """The ellipsoid of inertia rolling on the invariable plane."""
+    return rrb.Spatial3DView(
+        origin="/" + e.POINSOT,
+        contents="$origin/**",
+        name="Poinsot: the inertia ellipsoid rolls on the invariable plane",
+        background=list(BACKGROUND),
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=[2.5, -2.0, 1.0], look_target=[0.0, 0.0, -0.4], eye_up=[0.0, 0.0, 1.0]
+        ),
+        overrides={"/" + e.POINSOT_HERPOLHODE: [_last_seconds(HERPOLHODE_SECONDS)]},
+    )
+
+
+def _last_seconds(seconds: float) -> Any:
+    """Shows what was logged in the last seconds before the cursor, on either timeline."""
+    return rrb.VisibleTimeRanges(
+        [
+            rrb.VisibleTimeRange(
+                timeline,
+                start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
+                end=rrb.TimeRangeBoundary.cursor_relative(),
+            )
+            for timeline in (e.SIM_TIME, e.ROS_TIME)
+        ]
     )
 
 

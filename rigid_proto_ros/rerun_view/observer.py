@@ -22,7 +22,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.observer import BodySnapshot, Observer, ShownLoad
-from .mailbox import BLOCK_ROWS, Mailbox, Mark
+from .mailbox import BLOCK_ROWS, Block, Mailbox, Mark
 from .ports import choose_port
 
 if TYPE_CHECKING:
@@ -36,6 +36,9 @@ CLOSE_TIMEOUT_S = 10.0
 """A disk that doesn't take the rest in this time is given up."""
 
 VIEWERS = ("none", "web", "native", "serve")
+INITIAL_VIEWS = ("lesson", "debugging", "plain")
+"""Tabs of the layout; the others are a click away."""
+
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
 LIVE_MEMORY_LIMIT = "256MiB"
@@ -49,7 +52,7 @@ class RerunObserver(Observer):
 
     viewer: ``none``; ``serve`` hosts the live stream on loopback; ``web`` serves the web viewer too; ``native`` opens
     the viewer's window. rerun_port and web_port: None takes the first free port from the default on; a number is used
-    or refused. ``report`` gets one line for every address and every warning, ``on_error`` one line when recording has
+    or refused. initial_view: the tab of the layout that is in front. ``report`` gets one line for every address and every warning, ``on_error`` one line when recording has
     stopped because the file can't be written; both may be called from another thread.
 
     Raises InputError for a file that can't be written, a port that is taken, an unknown viewer.
@@ -65,16 +68,23 @@ class RerunObserver(Observer):
         report: Callable[[str], None] | None = None,
         on_error: Callable[[str], None] | None = None,
         live_memory_limit: str = LIVE_MEMORY_LIMIT,
+        initial_view: str = "lesson",
     ) -> None:
         if viewer not in VIEWERS:
             raise InputError("viewer", viewer, "one of " + ", ".join(VIEWERS))
+        if initial_view not in INITIAL_VIEWS:
+            raise InputError("initial_view", initial_view, "one of " + ", ".join(INITIAL_VIEWS))
         self.name = name
+        self._initial_view = initial_view
         self.live_address = ""
         self.web_address = ""
         self.error = ""
         self._report = report or _logger.info
         self._on_error = on_error or _logger.error
         self._mailbox: Mailbox | None = None
+        self._ghosts = Mailbox()
+        self._ghost_block: Block | None = None
+        self._ghost_sent = 0
         self._writer: Any = None
         self._run = 1
         self._run_id = uuid.uuid4().hex
@@ -123,8 +133,23 @@ class RerunObserver(Observer):
         """Note a refusal."""
         self._mark(time_ns, "refused", reason, message)
 
+    def status(self, time_ns: int, track: str, value: str) -> None:
+        """Note that a lane of the state line changes."""
+        self._mark(time_ns, "status", track, value)
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        """Note the ghost from ``time_ns`` on."""
+        self._mark(time_ns, "ghost_began", ghost)
+
+    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:
+        """Copy one state row (13,) of the ghost."""
+        if self._mailbox is not None:
+            self._ghosts.put(time_ns, row)
+
     def reset(self) -> None:
         """Begin a new run."""
+        if self._mailbox is not None:
+            self._ghosts.mark(-1, "reset")
         self._mark(-1, "reset")
 
     def close(self) -> None:
@@ -134,6 +159,7 @@ class RerunObserver(Observer):
         self._closed = True
         if self._mailbox is not None and self._thread is not None:
             self._mailbox.close()
+            self._ghosts.close()
             self._thread.join(CLOSE_TIMEOUT_S)
             if self._thread.is_alive():
                 self._lost(f"{self.recording}: the disk did not take the last states")
@@ -189,7 +215,7 @@ class RerunObserver(Observer):
     def _mark(self, time_ns: int, kind: str, *content: Any) -> None:
         if self._mailbox is not None:
             self._mailbox.mark(time_ns, kind, *content)
-        elif kind in ("started", "body_changed"):
+        elif kind in ("started", "body_changed", "ghost_began"):
             # Kept for a recording that is switched on later.
             self._remembered = [kept for kept in self._remembered if kept[1] != kind]
             self._remembered.append((time_ns, kind, *content))
@@ -200,7 +226,7 @@ class RerunObserver(Observer):
             return
         from .writer import SceneWriter
 
-        self._writer = SceneWriter()
+        self._writer = SceneWriter(self._initial_view)
         self._mailbox = Mailbox()
         for remembered in self._remembered:
             self._mailbox.mark(*remembered)
@@ -266,6 +292,7 @@ class RerunObserver(Observer):
             full = block.count == BLOCK_ROWS
             self._writer.write(block, self._on_mark, skip_live=waiting > 1)
             self._mailbox.give_back(block)
+        self._flush_ghost()
         for stream in list(self._writer.streams):
             try:
                 stream.flush()
@@ -274,8 +301,31 @@ class RerunObserver(Observer):
         while self._passed:
             self._passed.pop().set()
 
+    def _flush_ghost(self, upto_reset: bool = False) -> None:
+        """Send the ghost's states that wait, or those of the run that ends."""
+        while True:
+            if self._ghost_block is None:
+                self._ghost_block, _ = self._ghosts.take()
+                self._ghost_sent = 0
+            block = self._ghost_block
+            if block is None:
+                return
+            reset = block.marks[0] if block.marks else None
+            end = reset.after_rows if reset else block.count
+            self._writer.write_ghost(block, self._ghost_sent, end)
+            self._ghost_sent = end
+            if reset is not None:
+                if not upto_reset:
+                    # The body's own reset hasn't come yet: what follows belongs to the next run.
+                    return
+                block.marks.pop(0)
+                return
+            self._ghost_block = None
+            self._ghosts.give_back(block)
+
     def _on_mark(self, mark: Mark) -> None:
         if mark.kind == "reset":
+            self._flush_ghost(upto_reset=True)
             self._next_run()
         elif mark.kind == "record":
             file, finished = mark.content

@@ -7,9 +7,6 @@ import numpy as np
 
 from .derived import rotation_matrices, to_world
 
-RATE = 200
-"""[1/s, simulated] At most so many pieces: a picture needn't have every state."""
-
 POINTS_PER_PIECE_MAX = 32
 
 
@@ -17,16 +14,7 @@ class Trail:
     """Remembers where the path has got to."""
 
     def __init__(self) -> None:
-        self._last_tick: int | None = None
         self._last: tuple[int, np.ndarray, np.ndarray] | None = None
-
-    def choose(self, times_ns: np.ndarray) -> np.ndarray:
-        """Indices of the states (n,) that end a piece of the trail."""
-        ticks = times_ns // (1_000_000_000 // RATE)
-        before = int(ticks[0]) - 1 if self._last_tick is None else self._last_tick
-        chosen = np.flatnonzero(np.diff(ticks, prepend=before) > 0)
-        self._last_tick = int(ticks[-1])
-        return chosen
 
     def between(
         self, times_ns: np.ndarray, rows: np.ndarray, point: np.ndarray, spacing: float

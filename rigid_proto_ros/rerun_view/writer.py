@@ -3,27 +3,37 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import rerun as rr
 
-from ..core.observer import BodySnapshot, ShownLoad
+from ..core.observer import BodySnapshot
 from . import entities as e
-from .arrows import IMPULSE_SHOWN_NS, Arrow, ArrowSamples, ArrowScale, arrows_of
-from .derived import angle_to, carried_along, derive, rotation_matrices
-from .layout import layout
+from .arrows import ArrowScale, arrow_length
+from .columns import Ticks, scalar_columns, time_columns
+from .derived import rotation_matrices, to_world
+from .ghost import Ghost
+from .lanes import Lanes
+from .load_arrows import LoadArrows
 from .mailbox import Block, Mark
+from .plots import Plots
+from .poinsot_picture import PoinsotPicture
+from .statics import TRAIL_RADIUS, Scene, drawn_mesh, send_body, send_scene, send_styles
 from .streams import Stream
-from .surface_normals import shaded_surface
 from .trail import Trail
+from .words import Words
 
-TRAIL_RADIUS = 0.004
-"""In body sizes."""
+PICTURE_RATE = 200
+"""[1/s, simulated] of what is only looked at: a picture needn't have every state."""
+
+MIDDLING_SPIN = 5.0
+"""[rad/s] whose arrow is of middling length."""
+
+MOTION_ARROWS = 0.7
+"""Length of the arrows of ω and L against those of loads."""
 
 
 class SceneWriter:
@@ -32,15 +42,13 @@ class SceneWriter:
     ``streams`` receive everything; ``attach`` brings a new one up to date. Not for several threads.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, initial_view: str) -> None:
         self.streams: list[Stream] = []
+        self._initial_view = initial_view
         self._skip_live = False
-        self._scene = ""
-        self._vertices: np.ndarray | None = None
-        self._triangles: np.ndarray | None = None
-        self._mesh_sha256 = ""
-        self._surface: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._scene: Scene | None = None
         self._body: BodySnapshot | None = None
+        self._ghost_body: BodySnapshot | None = None
         self.restart()
 
     # What holds for a whole run
@@ -48,113 +56,34 @@ class SceneWriter:
     def restart(self) -> None:
         """A new run: simulated time starts again at 0; scene, mesh and body stay."""
         self.moved = False
-        self.rows_written = 0
         self._last_time_ns = 0
-        self._last_row: np.ndarray | None = None
-        self._last_row_ns = 0
-        self._momentum_at_start: np.ndarray | None = None
+        self._ticks = Ticks(PICTURE_RATE)
         self._trail = Trail()
-        self._acting: dict[int, tuple[str, Arrow | None, Arrow | None]] = {}
-        self._not_placed: dict[int, ShownLoad] = {}
-        self._impulses_end: deque[tuple[int, int]] = deque()
-        self._arrows = {(kind, part): ArrowSamples() for kind in e.LOAD_COLOURS for part in ("force", "torque")}
+        self._plots = Plots()
+        self._poinsot = PoinsotPicture()
+        self._loads = LoadArrows()
+        self._ghost = Ghost()
+        self._words = Words()
+        self._lanes = Lanes()
+        self._load_changes: list[tuple[int, bool]] = []
+        self._acted = self._touched = False
+        self._tell_body()
 
     def attach(self, stream: Stream) -> None:
         """Send a stream what holds at all times, and the body as it is now; then it gets whatever follows."""
         self.streams.append(stream)
-        self._for_new_streams([stream])
-
-    def start(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
-        """Take the scene and the mesh, and send them to the streams that are attached."""
-        self._scene, self._mesh_sha256 = scene, mesh_sha256
-        self._vertices, self._triangles = vertices, triangles
-        self._surface = None
-        if vertices is not None and triangles is not None and len(triangles):
-            self._surface = shaded_surface(vertices, triangles)
-        for stream in self.streams:
-            self._send_scene(stream)
-
-    @property
-    def size(self) -> float:
-        """A length [m] that stands for the body: the diagonal of its box, or of the box of equal inertia."""
+        if self._scene is not None:
+            send_scene(stream, self._scene)
         if self._body is None:
-            return 1.0
-        if self._vertices is not None and len(self._vertices):
-            extent = np.ptp(self._vertices, axis=0) * np.abs(self._body.scale)
-        else:
-            principal = np.linalg.eigvalsh(self._body.inertia)
-            extent = np.sqrt(np.maximum(3.0 * (principal.sum() - 2.0 * principal) / self._body.mass, 0.0) * 2.0)
-        return float(np.linalg.norm(extent)) or 1.0
-
-    def _for_new_streams(self, streams: Iterable[Stream]) -> None:
-        for stream in streams:
-            if self._scene or self._surface is not None:
-                self._send_scene(stream)
-            if self._body is not None:
-                self._send_styles(stream)
-                self._send_body(stream, self._last_time_ns, time.time_ns())
-
-    def _send_scene(self, stream: Stream) -> None:
-        stream.log_static(e.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        stream.log_static(e.SCENE, rr.TextDocument(self._scene, media_type="text/plain"))
-        if self._surface is None:
             return
-        vertices, triangles, normals = self._surface
-        stream.log_static(
-            e.BODY_MESH,
-            rr.Mesh3D(
-                vertex_positions=vertices,
-                triangle_indices=triangles,
-                vertex_normals=normals,
-                albedo_factor=[*e.MESH_COLOUR, 255],
-            ),
-        )
-        # The numbers themselves, so that the flight can be computed again from the recording alone.
-        stream.log_static(
-            e.SESSION_MESH,
-            rr.AnyValues(
-                sha256=self._mesh_sha256,
-                vertices=np.ascontiguousarray(self._vertices, dtype=np.float64).ravel(),
-                triangles=np.ascontiguousarray(self._triangles, dtype=np.int64).ravel(),
-            ),
-        )
-
-    def _send_styles(self, stream: Stream) -> None:
-        size = self.size
-        for entity, series in e.SERIES.items():
-            names, colours = zip(*series, strict=True)
-            stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
-        axes = np.eye(3) * 0.35 * size
-        stream.log_static(
-            e.BODY_AXES,
-            rr.Arrows3D(vectors=axes, colors=[e.RED, e.GREEN, e.BLUE], radii=0.006 * size),
-        )
-        stream.log_static(e.TRAIL, rr.Points3D.from_fields(colors=e.TRAIL_COLOUR, radii=TRAIL_RADIUS * size))
-        for kind, part in self._arrows:
-            colour = e.LOAD_COLOURS[kind] if part == "force" else e.TORQUE_COLOUR
-            style = rr.Arrows3D.from_fields(colors=colour, radii=0.012 * size)
-            stream.log_static(f"{e.LOADS}/{kind}/{part}", style)
-        stream.send_blueprint(layout(size))
-
-    def _send_body(self, stream: Stream, time_ns: int, wall_ns: int) -> None:
-        body = self._body
-        times = _times(np.array([time_ns]), np.array([wall_ns]))
-        stream.send(e.BODY_MESH, times, rr.Transform3D.columns(translation=[-body.center_of_mass], scale=[body.scale]))
-        values = {
-            "mass": [float(body.mass)],
-            "center_of_mass": np.asarray(body.center_of_mass, dtype=np.float64),
-            "inertia": np.asarray(body.inertia, dtype=np.float64).ravel(),
-            "scale": np.asarray(body.scale, dtype=np.float64),
-            "gravity": np.asarray(body.gravity, dtype=np.float64),
-            "inertia_model": [body.inertia_model],
-            "integrator": [body.integrator],
-            "gyroscopic": [bool(body.gyroscopic)],
-        }
-        stream.send(
-            e.SESSION_BODY,
-            times,
-            [column for k, v in values.items() for column in rr.AnyValues.columns(**{k: v}).partition([len(v)])],
-        )
+        now, wall = self._last_time_ns, time.time_ns()
+        send_styles(stream, self._size, self._initial_view)
+        send_body(stream, now, wall, self._body, self._scene)
+        self._poinsot.change_body(now, wall, self._body, stream.send)
+        if self._ghost_body is not None:
+            self._send_ghost_mesh(stream)
+            self._ghost.change(now, wall, self._ghost_body, stream.send)
+        self._lanes.repeat(now, wall, stream.send)
 
     # What happens in it
 
@@ -164,188 +93,162 @@ class SceneWriter:
         With ``skip_live`` the states go to files alone: viewers miss some where the machine doesn't keep up.
         """
         self._skip_live = skip_live
-        texts: list[tuple[str, int, int, str, str]] = []
-        rows_from = shown_from = 0
-
-        def finish_rows(upto: int) -> None:
-            nonlocal rows_from
-            self._write_rows(block, rows_from, upto)
-            rows_from = upto
-
+        sent = shown = 0
         for mark in block.marks:
-            handler = _HANDLERS.get(mark.kind)
-            self._show_arrows(block, shown_from, mark.after_rows)
-            shown_from = mark.after_rows
-            if mark.time_ns > 0:
-                self.moved = True
-            self._last_time_ns = max(self._last_time_ns, mark.time_ns)
+            self._loads.rows(block, shown, mark.after_rows)
+            shown = mark.after_rows
+            self._note_time(mark.time_ns)
+            handler = _ALONG_WITH_ROWS.get(mark.kind)
             if handler is not None:
-                handler(self, mark, texts)
+                handler(self, mark)
                 continue
-            finish_rows(mark.after_rows)
-            self._send_arrows()
-            self._send_texts(texts)
-            if mark.kind == "body_changed":
-                self._change_body(mark)
-            elif mark.kind == "started":
-                self.start(*mark.content)
+            self._send_upto(block, sent, shown)
+            sent = shown
+            handler = _BETWEEN_ROWS.get(mark.kind)
+            if handler is not None:
+                handler(self, mark)
             else:
                 on_mark(mark)
-        self._show_arrows(block, shown_from, block.count)
-        finish_rows(block.count)
-        self._send_arrows()
-        self._send_texts(texts)
+        self._loads.rows(block, shown, block.count)
+        self._send_upto(block, sent, block.count)
 
-    def _change_body(self, mark: Mark) -> None:
-        size_before = self.size if self._body is not None else None
-        (self._body,) = mark.content
-        self._scale = ArrowScale.of(self._body.mass, self.size)
+    def write_ghost(self, block: Block, begin: int, end: int) -> None:
+        """Send states begin..end of the ghost, after the body's of the same times."""
+        self._ghost.rows(block, begin, end, self._send_rows)
+
+    def _note_time(self, time_ns: int) -> None:
+        self.moved = self.moved or time_ns > 0
+        self._last_time_ns = max(self._last_time_ns, time_ns)
+
+    def _send_upto(self, block: Block, begin: int, end: int) -> None:
+        self._write_rows(block, begin, end)
+        self._loads.send(self._send)
+        self._words.send(self._send)
+        self._lanes.send(self._send)
+
+    # Marks that don't concern the rows before them
+
+    def _load_began(self, mark: Mark) -> None:
+        self._loads.began(mark.time_ns, mark.wall_ns, *mark.content)
+        self._loads_changed(mark)
+
+    def _load_ended(self, mark: Mark) -> None:
+        self._loads.ended(mark.time_ns, mark.wall_ns, *mark.content)
+        self._loads_changed(mark)
+
+    def _loads_changed(self, mark: Mark) -> None:
+        kinds = self._loads.kinds_acting
+        self._load_changes.append((mark.after_rows, bool(kinds)))
+        self._lane(mark, "loads", " + ".join(kinds) or "none")
+
+    def _status(self, mark: Mark) -> None:
+        self._lane(mark, *mark.content)
+
+    def _event(self, mark: Mark) -> None:
+        self._words.event(mark.time_ns, mark.wall_ns, *mark.content)
+
+    def _refused(self, mark: Mark) -> None:
+        self._words.refusal(mark.time_ns, mark.wall_ns, *mark.content)
+
+    def _lane(self, mark: Mark, track: str, value: str) -> None:
+        self._lanes.change(mark.time_ns, mark.wall_ns, track, value)
+
+    # Marks that change what rows mean
+
+    def _started(self, mark: Mark) -> None:
+        self._scene = Scene(*mark.content)
         for stream in self.streams:
-            if self.size != size_before:
-                self._send_styles(stream)
-            self._send_body(stream, mark.time_ns, mark.wall_ns)
+            send_scene(stream, self._scene)
+        self._tell_body()
+
+    def _body_changed(self, mark: Mark) -> None:
+        before = self._size if self._body is not None else None
+        (self._body,) = mark.content
+        self._tell_body()
+        for stream in self.streams:
+            if self._size != before:
+                send_styles(stream, self._size, self._initial_view)
+            send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene)
+        self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
+        self._plots.disturbed()
+        if before is None:
+            self._lane(mark, "loads", "none")
+        self._lane(mark, "inertia_model", self._body.inertia_model)
+        self._lane(mark, "integrator", self._body.integrator + ("" if self._body.gyroscopic else ", not gyroscopic"))
+
+    def _tell_body(self) -> None:
+        if self._body is None:
+            return
+        self._size = self._scene.size(self._body) if self._scene is not None else 1.0
+        self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
+        self._loads.scale = ArrowScale.of(self._body.mass, self._size)
+
+    def _ghost_began(self, mark: Mark) -> None:
+        first = self._ghost_body is None
+        (self._ghost_body,) = mark.content
+        for stream in self.streams if first else ():
+            self._send_ghost_mesh(stream)
+        self._ghost.change(mark.time_ns, mark.wall_ns, self._ghost_body, self._send)
+
+    def _send_ghost_mesh(self, stream: Stream) -> None:
+        if self._scene is not None and self._scene.surface is not None:
+            stream.log_static(e.GHOST_MESH, drawn_mesh(self._scene.surface, (*e.GHOST_COLOUR, e.GHOST_ALPHA)))
+
+    # Rows
 
     def _write_rows(self, block: Block, begin: int, end: int) -> None:
-        """Pose, exact state and plots of rows begin..end, which all belong to the present body."""
+        """Pose, exact state, plots and pictures of rows begin..end, which all belong to the present body."""
+        disturbed = self._disturbed(begin, end)
         if begin == end:
             return
         times_ns, walls, rows = block.times[begin:end], block.walls[begin:end], block.rows[begin:end]
-        n = end - begin
-        times = _times(times_ns, walls)
-        if self._row_streams():
-            self._send_rows(e.STATE, times, rr.Scalars.columns(scalars=rows.ravel()).partition([13] * n))
-            pose = rr.Transform3D.columns(translation=rows[:, 0:3], quaternion=rows[:, 3:7])
-            self._send_rows(e.BODY, times, pose)
-            self._send_rows(e.CENTRE, times, rr.Transform3D.columns(translation=rows[:, 0:3]))
-            if self._body is not None:
-                self._write_plots(times, rows)
-                self._write_trail(times_ns, walls, rows)
-        self.rows_written += n
-        self.moved = self.moved or int(times_ns[-1]) > 0
-        self._last_time_ns = max(self._last_time_ns, int(times_ns[-1]))
-
-    def _write_plots(self, times: list[Any], rows: np.ndarray) -> None:
-        derived = derive(rows, self._body)
-        L = derived.angular_momentum
-        if self._momentum_at_start is None:
-            self._momentum_at_start = L[0].copy()
-        for entity, values in (
-            (e.ENERGY, derived.energies),
-            (e.ANGULAR_MOMENTUM, np.column_stack([L, np.linalg.norm(L, axis=1)])),
-            (e.ANGULAR_MOMENTUM_ANGLE, angle_to(self._momentum_at_start, L)[:, np.newaxis]),
-            (e.ANGULAR_VELOCITY_BODY, rows[:, 10:13]),
-        ):
-            columns = rr.Scalars.columns(scalars=values.ravel()).partition([values.shape[1]] * len(rows))
-            self._send_rows(entity, times, columns)
-
-    def _write_trail(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
-        """Points along the path of the body's farthest vertex, close enough to look like a line."""
-        if self._vertices is None or not len(self._vertices):
+        self._note_time(int(times_ns[-1]))
+        if self._ghost_body is not None:
+            self._ghost.body_rows(times_ns, rows)
+        if not self._row_streams():
             return
-        chosen = self._trail.choose(times_ns)
+        times = time_columns(times_ns, walls)
+        self._send_rows(e.STATE, times, scalar_columns(rows))
+        self._send_rows(e.BODY, times, rr.Transform3D.columns(translation=rows[:, 0:3], quaternion=rows[:, 3:7]))
+        self._send_rows(e.CENTRE, times, rr.Transform3D.columns(translation=rows[:, 0:3]))
+        if self._body is None:
+            return
+        L = self._plots.rows(times, rows, self._body, disturbed, self._send_rows)
+        self._poinsot.rows(times_ns, walls, rows, L, self._send_rows)
+        self._write_pictures(times_ns, walls, rows, L)
+
+    def _disturbed(self, begin: int, end: int) -> np.ndarray:
+        """Per row begin..end, whether a load acts there or did since the row before."""
+        disturbed = np.empty(end - begin, dtype=bool)
+        at = 0
+        for after_rows, acts in self._load_changes:
+            disturbed[at : after_rows - begin] = self._acted
+            at, self._acted = after_rows - begin, acts
+        disturbed[at:] = self._acted
+        for first_after in [0] * self._touched + [after_rows - begin for after_rows, _ in self._load_changes]:
+            disturbed[first_after : first_after + 1] = True
+        # What began or ended after the last of these rows concerns the next one too.
+        self._touched = (self._touched and begin == end) or any(after >= end for after, _ in self._load_changes)
+        self._load_changes.clear()
+        return disturbed
+
+    def _write_pictures(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, L: np.ndarray) -> None:
+        """Arrows of ω and L at the COM, and the trail: a dense line along the path of the farthest vertex."""
+        chosen = self._ticks.choose(times_ns)
         if not len(chosen):
             return
-        at = self._vertices * self._body.scale - self._body.center_of_mass
-        tip = at[np.argmax(np.einsum("ij,ij->i", at, at))]
-        points, counts = self._trail.between(
-            times_ns[chosen], rows[chosen], tip, spacing=1.5 * TRAIL_RADIUS * self.size
-        )
-        columns = rr.Points3D.columns(positions=points).partition(counts)
-        self._send_rows(e.TRAIL, _times(times_ns[chosen], walls[chosen]), columns)
-
-    # Loads
-
-    def _load_began(self, mark: Mark, _: list) -> None:
-        load_id, load = mark.content
-        self._not_placed[load_id] = load
-        if load.kind == "impulse":
-            self._impulses_end.append((mark.time_ns + IMPULSE_SHOWN_NS, load_id))
-        self._sample_arrows(mark.time_ns, mark.wall_ns, load.kind)
-
-    def _load_ended(self, mark: Mark, _: list) -> None:
-        (load_id,) = mark.content
-        self._sample_arrows(mark.time_ns, mark.wall_ns, self._forget_load(load_id))
-
-    def _forget_load(self, load_id: int) -> str:
-        """Returns its kind, "" if it isn't known."""
-        shown, load = self._acting.pop(load_id, None), self._not_placed.pop(load_id, None)
-        return shown[0] if shown else load.kind if load else ""
-
-    def _show_arrows(self, block: Block, begin: int, end: int) -> None:
-        """Arrows of the loads that act, at rows begin..end, between which no load begins or ends but impulses fade."""
-        while begin < end:
-            upto = end
-            if self._impulses_end:
-                ends_ns, load_id = self._impulses_end[0]
-                upto = begin + int(np.searchsorted(block.times[begin:end], ends_ns))
-            self._add_arrows(block.times[begin:upto], block.walls[begin:upto], block.rows[begin:upto])
-            if upto < end:
-                self._impulses_end.popleft()
-                faded = self._forget_load(load_id)
-                at = slice(upto, upto + 1)
-                self._add_arrows(np.array([ends_ns]), block.walls[at], block.rows[at], faded)
-            begin = upto
-        if end:
-            self._last_row, self._last_row_ns = block.rows[end - 1].copy(), int(block.times[end - 1])
-
-    def _sample_arrows(self, time_ns: int, wall_ns: int, kind: str) -> None:
-        """Arrows of one kind at a time between two states, the body carried along from the state before."""
-        if self._last_row is None:
-            return
-        row = carried_along(self._last_row, 1e-9 * (time_ns - self._last_row_ns))
-        self._add_arrows(np.array([time_ns]), np.array([wall_ns]), row[np.newaxis], kind)
-
-    def _add_arrows(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, only: str = "") -> None:
-        if not len(times_ns) or self._body is None:
-            return
-        if self._not_placed:
-            (R,) = rotation_matrices(rows[:1, 3:7])
-            for load_id, load in self._not_placed.items():
-                self._acting[load_id] = (load.kind, *arrows_of(load, self._scale, R))
-            self._not_placed.clear()
-        for (kind, part), samples in self._arrows.items():
-            if (not self._acting and not samples.showing) or only not in ("", kind):
-                continue
-            index = 1 if part == "force" else 2
-            arrows = [shown[index] for shown in self._acting.values() if shown[0] == kind and shown[index] is not None]
-            samples.add(times_ns, walls, rows, arrows)
-
-    def _send_arrows(self) -> None:
-        for (kind, part), samples in self._arrows.items():
-            if not samples.times:
-                continue
-            counts = np.concatenate(samples.counts)
-            total = int(counts.sum())
-            columns = rr.Arrows3D.columns(
-                vectors=np.concatenate(samples.vectors) if total else np.empty((0, 3)),
-                origins=np.concatenate(samples.origins) if total else np.empty((0, 3)),
-                labels=samples.labels,
-            ).partition(counts)
-            times = _times(np.concatenate(samples.times), np.concatenate(samples.walls))
-            self._send(f"{e.LOADS}/{kind}/{part}", times, columns)
-            samples.clear()
-
-    # Words
-
-    def _event(self, mark: Mark, texts: list) -> None:
-        (line,) = mark.content
-        texts.append((e.EVENTS, mark.time_ns, mark.wall_ns, line, "INFO"))
-        texts.append((e.COMMAND_LOG, mark.time_ns, mark.wall_ns, _readable(line), "INFO"))
-
-    def _refused(self, mark: Mark, texts: list) -> None:
-        reason, message = mark.content
-        texts.append((e.REFUSAL_LOG, mark.time_ns, mark.wall_ns, f"refused ({reason}): {message}", "WARN"))
-
-    def _send_texts(self, texts: list[tuple[str, int, int, str, str]]) -> None:
-        for entity in dict.fromkeys(text[0] for text in texts):
-            lines = [text for text in texts if text[0] == entity]
-            times = _times(np.array([line[1] for line in lines]), np.array([line[2] for line in lines]))
-            self._send(
-                entity,
-                times,
-                rr.TextLog.columns(text=[line[3] for line in lines], level=[line[4] for line in lines]),
-            )
-        texts.clear()
+        times, rows, L = time_columns(times_ns[chosen], walls[chosen]), rows[chosen], L[chosen]
+        w = to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
+        spin_of_middling = MIDDLING_SPIN * float(np.trace(self._body.inertia)) / 3.0
+        for entity, vectors, reference in (
+            (e.ANGULAR_VELOCITY, w, MIDDLING_SPIN),
+            (e.MOMENTUM, L, spin_of_middling),
+        ):
+            self._send_rows(entity, times, rr.Arrows3D.columns(vectors=_drawn(vectors, reference, self._size)))
+        if self._tip is not None:
+            spacing = 1.5 * TRAIL_RADIUS * self._size
+            points, counts = self._trail.between(times_ns[chosen], rows, self._tip, spacing)
+            self._send_rows(e.TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
 
     def _row_streams(self) -> list[Stream]:
         return [s for s in self.streams if not (self._skip_live and s.may_skip)]
@@ -359,36 +262,22 @@ class SceneWriter:
             stream.send(entity, times, columns)
 
 
-_HANDLERS = {
+def _drawn(vectors: np.ndarray, reference: float, size: float) -> np.ndarray:
+    """Vectors (n, 3) in their directions, with lengths for the eye."""
+    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
+    lengths = np.where(norms > 0.0, MOTION_ARROWS * arrow_length(norms, reference, size), 0.0)
+    return vectors * np.divide(lengths, norms, out=np.zeros_like(norms), where=norms > 0.0)
+
+
+_ALONG_WITH_ROWS = {
     "load_began": SceneWriter._load_began,
     "load_ended": SceneWriter._load_ended,
+    "status": SceneWriter._status,
     "event": SceneWriter._event,
     "refused": SceneWriter._refused,
 }
-
-
-def _times(times_ns: np.ndarray, walls: np.ndarray) -> list[Any]:
-    return [
-        rr.TimeColumn(e.SIM_TIME, duration=np.asarray(times_ns, np.int64).astype("timedelta64[ns]")),
-        rr.TimeColumn(e.ROS_TIME, timestamp=np.asarray(walls, np.int64).astype("datetime64[ns]")),
-    ]
-
-
-def _readable(line: str) -> str:
-    """An event line for people: its kind and what it says, without the hash."""
-    try:
-        event = json.loads(line)
-        content = event.get("content", {})
-    except (ValueError, AttributeError):
-        return line
-    if isinstance(content, dict):
-        content = ", ".join(f"{key} {_short(value)}" for key, value in content.items() if value not in ("", None))
-    return f"{event.get('kind', '')} {content}".strip()
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_short(item) for item in value) + "]"
-    return str(value)
+_BETWEEN_ROWS = {
+    "started": SceneWriter._started,
+    "body_changed": SceneWriter._body_changed,
+    "ghost_began": SceneWriter._ghost_began,
+}

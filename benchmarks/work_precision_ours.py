@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""Our integrators as contestants: the whole ``Simulation`` as a user runs it, and the bare compiled kernel.
+
+``simulation`` times Simulation.advance: segments, commands and the look at the end included. ``kernel`` times what a peer's
+step function is timed by: the integrator's own loop over steps, called once from Python.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from peers import Contestant, Run
+from problems import Problem, Wrench
+from rigid_proto_ros.core.body import make_body
+from rigid_proto_ros.core.commands import WrenchCommand
+from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.core.frames import parse_frame
+from rigid_proto_ros.core.integrators import INTEGRATORS
+from rigid_proto_ros.core.motion import to_row
+from rigid_proto_ros.core.setup import Setup
+from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.core.string import StringSettings
+
+ADAPTIVE = ("auto",)
+"""Integrators that take an accuracy instead of a step."""
+
+
+def our_version() -> str:
+    """Version of the package, also when it runs from a checkout."""
+    try:
+        return version("rigid_proto_ros")
+    except PackageNotFoundError:
+        return "checkout"
+
+
+def contestants() -> list[Contestant]:
+    """Every integrator of the package, by the two ways of timing it."""
+    found = []
+    for name in INTEGRATORS:
+        found.append(
+            Contestant(
+                "ours", our_version(), name, _bind(prepare_simulation, name), tolerance=name in ADAPTIVE, cost=0.4
+            )
+        )
+        if name not in ADAPTIVE:
+            found.append(Contestant("ours (kernel)", our_version(), name, _bind(prepare_kernel, name), cost=0.4))
+    return found
+
+
+def _bind(prepare, name):
+    return lambda problem, step: prepare(problem, step, name)
+
+
+def setup_of(problem: Problem, integrator: str, step: float, accuracy: float = 1e-9) -> Setup:
+    """The problem as a Setup; ``step`` [s]."""
+    values = {
+        "body": make_body(problem.mass, np.zeros(3), np.array(problem.inertia)),
+        "inertia_model": "explicit",
+        "surface": None,
+        "geometry": ("",),
+        "contacts": {},
+        "gravity": np.array(problem.gravity),
+        "linear_damping": problem.linear_damping,
+        "angular_damping": problem.angular_damping,
+        "gyroscopic": True,
+        "integrator": INTEGRATORS[integrator],
+        "step_ns": round(step * 1e9),
+        "accuracy": accuracy,
+        "wrench_timeout_ns": 0,
+        "poke_duration_ns": 50_000_000,
+        "string": _string(problem),
+        "initial": np.array(problem.row),
+    }
+    return Setup(**{f.name: values[f.name] for f in fields(Setup) if f.name in values})
+
+
+def _string(problem: Problem) -> StringSettings:
+    s = problem.spring
+    if s is None:
+        return StringSettings()
+    return StringSettings(
+        attached=True,
+        attach=s.point,
+        target=s.target,
+        stiffness=s.stiffness,
+        damping_ratio=s.damping_ratio,
+        rest_length=s.rest_length,
+        bilateral=s.bilateral,
+    )
+
+
+def submit(simulation: Simulation, wrenches: tuple[Wrench, ...]) -> None:
+    """The problem's wrenches as poke commands, each for its exact time; one without an end is held."""
+    for k, w in enumerate(wrenches):
+        frame = f"{w.axes}@point/{','.join(repr(float(c)) for c in w.point)}"
+        if w.impulse:
+            frame += ";impulse"
+        elif w.end is not None:
+            frame += f";duration={(round(w.end * 1e9) - round(w.begin * 1e9)) / 1e9!r}"
+        held = w.end is None and not w.impulse
+        command = WrenchCommand(held, parse_frame(frame), w.force, w.torque, 0, frame, bytes([k]))
+        simulation.submit(command, round(w.begin * 1e9))
+
+
+def simulation_of(problem: Problem, integrator: str, step: float, accuracy: float = 1e-9) -> Simulation | None:
+    """A Simulation at time 0 with the problem's commands submitted, or None when the integrator can't carry it."""
+    try:
+        simulation = Simulation(setup_of(problem, integrator, step, accuracy))
+        submit(simulation, problem.wrenches)
+        simulation.advance(0)
+    except InputError:
+        return None
+    return simulation
+
+
+def prepare_simulation(problem: Problem, step: float, integrator: str) -> Run | None:
+    """The whole simulation; ``step`` is the accuracy for an adaptive integrator."""
+    adaptive = integrator in ADAPTIVE
+    arguments = (1e-3, step) if adaptive else (step, 1e-9)
+    now = {"simulation": simulation_of(problem, integrator, *arguments)}
+    if now["simulation"] is None:
+        return None
+    begin = time.perf_counter()
+    now["simulation"].advance(round(min(problem.duration, 10 * arguments[0]) * 1e9))
+    compile_s = time.perf_counter() - begin
+
+    def restart():
+        now["simulation"] = simulation_of(problem, integrator, *arguments)
+
+    def advance(until: float):
+        now["simulation"].advance(round(until * 1e9))
+
+    def row():
+        simulation = now["simulation"]
+        if simulation.failure or simulation.refused:
+            return np.full(13, np.nan)
+        return simulation.state.row.copy()
+
+    restart()
+    if now["simulation"].refused:
+        return None
+    return Run(restart, advance, row, lambda: now["simulation"].steps, compile_s)
+
+
+def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None:
+    """The compiled loop alone, on problems of one segment whose end is a whole number of steps away."""
+    steps = round(problem.duration / step)
+    one_segment = all(w.end is None and w.begin == 0.0 and not w.impulse for w in problem.wrenches)
+    if not one_segment or abs(steps * step - problem.duration) > 1e-9:
+        return None
+    simulation = simulation_of(problem, integrator, step)
+    if simulation is None or simulation.refused:
+        return None
+    # A command at time 0 acts with the first advance beyond it.
+    simulation.advance(1)
+    segment = simulation._segment
+    p, kernel = segment._problem, INTEGRATORS[integrator].kernel_for(segment._problem)
+    if kernel is None:
+        return None
+    begin = time.perf_counter()
+    start = segment._variables.copy()
+    kernel(start.copy(), p, 1e-9, 1)
+    compile_s = time.perf_counter() - begin
+    now = {}
+
+    def restart():
+        now.update(y=start.copy(), done=0)
+
+    def advance(until: float):
+        wanted = round(until / step) - now["done"]
+        now["good"] = kernel(now["y"], p, step, wanted) == wanted
+        now["done"] += wanted
+
+    def row():
+        out = np.full(13, np.nan)
+        if now["good"]:
+            to_row(now["y"], p, now["done"] * step, out)
+        return out
+
+    restart()
+    return Run(restart, advance, row, lambda: now["done"], compile_s)

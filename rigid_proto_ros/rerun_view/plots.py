@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""Plotted values of one run, computed over a batch of states at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..core.observer import BodySnapshot
+from . import entities as e
+from .columns import Send, scalar_columns
+from .derived import angle_to, derive
+
+
+class Plots:
+    """Remembers the run's start, and the last moment from which nothing has acted on the body."""
+
+    def __init__(self) -> None:
+        self._momentum_at_start: np.ndarray | None = None
+        self._free_from: tuple[float, np.ndarray] | None = None
+
+    def disturbed(self) -> None:
+        """A load or a change of the body: drift counts anew from the next state."""
+        self._free_from = None
+
+    def rows(
+        self, times: list[Any], rows: np.ndarray, body: BodySnapshot, disturbed: np.ndarray, send: Send
+    ) -> np.ndarray:
+        """Send what is plotted of states (n, 13) and return their angular momenta (n, 3).
+
+        disturbed (n,) says at which states a load acts or has acted since the state before.
+        """
+        derived = derive(rows, body)
+        L, energies = derived.angular_momentum, derived.energies
+        if self._momentum_at_start is None:
+            self._momentum_at_start = L[0].copy()
+        send(e.ENERGY, times, scalar_columns(energies))
+        send(e.ANGULAR_MOMENTUM, times, scalar_columns(np.column_stack([L, np.linalg.norm(L, axis=1)])))
+        send(e.ANGULAR_MOMENTUM_ANGLE, times, scalar_columns(angle_to(self._momentum_at_start, L)[:, np.newaxis]))
+        send(e.ANGULAR_VELOCITY_BODY, times, scalar_columns(rows[:, 10:13]))
+        send(e.DRIFT, times, scalar_columns(self._drift(energies, L, disturbed)))
+        return L
+
+    def _drift(self, energies: np.ndarray, L: np.ndarray, disturbed: np.ndarray) -> np.ndarray:
+        """Relative change (n, 2) of the total energy and of L since the last disturbance; 0 while there is one."""
+        total = energies[:, 3]
+        size = np.abs(energies[:, :3]).sum(axis=1)
+        drift = np.zeros((len(L), 2))
+        borders = [0, *(np.flatnonzero(np.diff(disturbed)) + 1).tolist(), len(L)]
+        for begin, end in zip(borders[:-1], borders[1:], strict=True):
+            if disturbed[begin]:
+                self._free_from = (float(total[end - 1]), L[end - 1].copy())
+                continue
+            if self._free_from is None:
+                self._free_from = (float(total[begin]), L[begin].copy())
+            energy, momentum = self._free_from
+            drift[begin:end, 0] = _relative(total[begin:end] - energy, size[begin:end])
+            drift[begin:end, 1] = _relative(
+                np.linalg.norm(L[begin:end] - momentum, axis=1), np.full(end - begin, np.linalg.norm(momentum))
+            )
+        return drift
+
+
+def _relative(difference: np.ndarray, size: np.ndarray) -> np.ndarray:
+    return np.divide(difference, size, out=np.zeros(len(difference)), where=size > 0.0)

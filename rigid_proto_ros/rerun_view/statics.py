@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""What a stream is sent once, or when the body changes: scene, mesh, styles, layout, shapes of the inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from ..core.observer import BodySnapshot
+from . import entities as e
+from .columns import one_time
+from .inertia_shapes import PrincipalFrame, bounding_box
+from .layout import layout
+from .load_arrows import PARTS, load_entity
+from .streams import Stream
+from .surface_normals import shaded_surface
+
+TRAIL_RADIUS = 0.004
+AXIS_LENGTH = 0.25
+"""In body sizes."""
+
+
+@dataclass
+class Scene:
+    """The scene as text, the mesh as loaded, and the surface that is drawn: vertices, triangles, normals."""
+
+    text: str
+    vertices: np.ndarray | None
+    triangles: np.ndarray | None
+    mesh_sha256: str
+
+    def __post_init__(self) -> None:
+        self.surface: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        if self.vertices is not None and self.triangles is not None and len(self.triangles):
+            self.surface = shaded_surface(self.vertices, self.triangles)
+
+    def size(self, body: BodySnapshot) -> float:
+        """A length [m] that stands for the body: the diagonal of its box, or of the box of equal inertia."""
+        if self.surface is not None:
+            extent = np.ptp(self.vertices, axis=0) * np.abs(body.scale)
+        else:
+            extent = PrincipalFrame.of(np.asarray(body.inertia, dtype=float)).box_sides(body.mass)
+        return float(np.linalg.norm(extent)) or 1.0
+
+    def farthest_point(self, body: BodySnapshot) -> np.ndarray | None:
+        """The vertex (3,) farthest from the COM [m, body axes from the COM], whose path is drawn."""
+        if self.surface is None:
+            return None
+        at = self.vertices * body.scale - body.center_of_mass
+        return at[np.argmax(np.einsum("ij,ij->i", at, at))]
+
+
+def drawn_mesh(surface: tuple[np.ndarray, np.ndarray, np.ndarray], colour: tuple[int, ...]) -> Any:
+    """The surface in one colour, in mesh coordinates."""
+    vertices, triangles, normals = surface
+    return rr.Mesh3D(
+        vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=colour
+    )
+
+
+def send_scene(stream: Stream, scene: Scene) -> None:
+    """The scene's text and the mesh, once as drawn and once as the numbers themselves.
+
+    With the numbers the flight can be computed again from the recording alone.
+    """
+    stream.log_static(e.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    stream.log_static(e.POINSOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    stream.log_static(e.SCENE, rr.TextDocument(scene.text, media_type="text/plain"))
+    if scene.surface is None:
+        return
+    stream.log_static(e.BODY_MESH, drawn_mesh(scene.surface, (*e.MESH_COLOUR, 255)))
+    stream.log_static(
+        e.SESSION_MESH,
+        rr.AnyValues(
+            sha256=scene.mesh_sha256,
+            vertices=np.ascontiguousarray(scene.vertices, dtype=np.float64).ravel(),
+            triangles=np.ascontiguousarray(scene.triangles, dtype=np.int64).ravel(),
+        ),
+    )
+
+
+def send_styles(stream: Stream, size: float, initial_view: str) -> None:
+    """Colours, names and thicknesses for a body of this size [m], and the layout."""
+    for entity, series in e.SERIES.items():
+        names, colours = zip(*series, strict=True)
+        stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
+    axes = np.eye(3) * AXIS_LENGTH * size
+    stream.log_static(e.BODY_AXES, rr.Arrows3D(vectors=axes, colors=[e.RED, e.GREEN, e.BLUE], radii=0.006 * size))
+    stream.log_static(e.TRAIL, rr.Points3D.from_fields(colors=e.TRAIL_COLOUR, radii=TRAIL_RADIUS * size))
+    for kind, colour in e.LOAD_COLOURS.items():
+        for part in PARTS:
+            arrow_colour = colour if part == "force" else e.TORQUE_COLOUR
+            style = rr.Arrows3D.from_fields(colors=arrow_colour, radii=0.012 * size)
+            stream.log_static(load_entity(kind, part), style)
+    _arrow_style(stream, e.ANGULAR_VELOCITY, e.OMEGA_COLOUR, 0.009 * size, "ω")
+    _arrow_style(stream, e.MOMENTUM, e.MOMENTUM_COLOUR, 0.009 * size, "L")
+    line = 0.0025 * size
+    wire = rr.components.FillMode.MajorWireframe
+    style = rr.Boxes3D.from_fields(colors=e.GREY, radii=line, fill_mode=wire)
+    stream.log_static(e.BOUNDING_BOX, style)
+    stream.log_static(e.INERTIA_BOX, rr.Boxes3D.from_fields(colors=e.YELLOW, radii=line, fill_mode=wire))
+    stream.log_static(e.GHOST_BOX, rr.Boxes3D.from_fields(colors=e.GHOST_COLOUR, radii=line, fill_mode=wire))
+    stream.log_static(
+        e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=e.GREEN, line_radii=0.6 * line, fill_mode=wire)
+    )
+    _send_poinsot_styles(stream)
+    stream.send_blueprint(layout(size, initial_view))
+
+
+def _send_poinsot_styles(stream: Stream) -> None:
+    """The construction has the same size for every body."""
+    translucent = rr.components.FillMode.TransparentFillMajorWireframe
+    ellipsoid = rr.Ellipsoids3D.from_fields(colors=(*e.BLUE, 255), line_radii=0.003, fill_mode=translucent)
+    stream.log_static(e.POINSOT_ELLIPSOID, ellipsoid)
+    stream.log_static(e.POINSOT_POLHODE, rr.LineStrips3D.from_fields(colors=e.YELLOW, radii=0.012))
+    stream.log_static(e.POINSOT_SEPARATRIX, rr.LineStrips3D.from_fields(colors=e.RED, radii=0.007))
+    plane = rr.Boxes3D.from_fields(colors=(95, 98, 112, 255), radii=0.003, fill_mode=translucent)
+    stream.log_static(e.POINSOT_PLANE, plane)
+    stream.log_static(e.POINSOT_HERPOLHODE, rr.Points3D.from_fields(colors=e.ORANGE, radii=0.009))
+    _arrow_style(stream, e.POINSOT_OMEGA, e.OMEGA_COLOUR, 0.025, "ω")
+    _arrow_style(stream, e.POINSOT_MOMENTUM, e.MOMENTUM_COLOUR, 0.02, "L")
+
+
+def _arrow_style(stream: Stream, entity: str, colour: tuple[int, ...], radius: float, label: str) -> None:
+    stream.log_static(entity, rr.Arrows3D.from_fields(colors=colour, radii=radius, labels=label, show_labels=True))
+
+
+def send_body(stream: Stream, time_ns: int, wall_ns: int, body: BodySnapshot, scene: Scene | None) -> None:
+    """The body from ``time_ns`` on: where the mesh hangs, its boxes and ellipsoid, its numbers."""
+    times = one_time(time_ns, wall_ns)
+    mesh_place = rr.Transform3D.columns(translation=[-body.center_of_mass], scale=[body.scale])
+    stream.send(e.BODY_MESH, times, mesh_place)
+    if scene is not None and scene.surface is not None:
+        centre, half = bounding_box(scene.vertices, body.scale, body.center_of_mass)
+        stream.send(e.BOUNDING_BOX, times, rr.Boxes3D.columns(centers=[centre], half_sizes=[half]))
+    frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
+    turn = rr.Transform3D.columns(mat3x3=[frame.axes])
+    box = rr.Boxes3D.columns(half_sizes=[0.5 * frame.box_sides(body.mass)])
+    ellipsoid = rr.Ellipsoids3D.columns(half_sizes=[frame.ellipsoid_semi_axes(body.mass)])
+    stream.send(e.INERTIA_BOX, times, [*box, *turn])
+    stream.send(e.INERTIA_ELLIPSOID, times, [*ellipsoid, *turn])
+    numbers = {
+        "mass": [float(body.mass)],
+        "center_of_mass": np.asarray(body.center_of_mass, dtype=np.float64),
+        "inertia": np.asarray(body.inertia, dtype=np.float64).ravel(),
+        "scale": np.asarray(body.scale, dtype=np.float64),
+        "gravity": np.asarray(body.gravity, dtype=np.float64),
+        "inertia_model": [body.inertia_model],
+        "integrator": [body.integrator],
+        "gyroscopic": [bool(body.gyroscopic)],
+    }
+    columns = [c for name, v in numbers.items() for c in rr.AnyValues.columns(**{name: v}).partition([len(v)])]
+    stream.send(e.SESSION_BODY, times, columns)

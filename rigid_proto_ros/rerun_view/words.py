@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""What was said during a run: the event lines as logged, and the same for people."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from . import entities as e
+from .columns import Send, time_columns
+
+
+class Words:
+    """Collects lines of text and sends them together."""
+
+    def __init__(self) -> None:
+        self._lines: dict[str, list[tuple[int, int, str, str]]] = {}
+
+    def event(self, time_ns: int, wall_ns: int, line: str) -> None:
+        """A line of the event log: exactly as it is, and readable."""
+        self._add(e.EVENTS, time_ns, wall_ns, line, "INFO")
+        self._add(e.COMMAND_LOG, time_ns, wall_ns, readable(line), "INFO")
+
+    def refusal(self, time_ns: int, wall_ns: int, reason: str, message: str) -> None:
+        """A command that was refused."""
+        self._add(e.REFUSAL_LOG, time_ns, wall_ns, f"refused ({reason}): {message}", "WARN")
+
+    def _add(self, entity: str, *line: Any) -> None:
+        self._lines.setdefault(entity, []).append(line)
+
+    def send(self, send: Send) -> None:
+        """Send the lines collected so far."""
+        for entity, lines in self._lines.items():
+            times_ns, walls, texts, levels = zip(*lines, strict=True)
+            columns = rr.TextLog.columns(text=texts, level=levels)
+            send(entity, time_columns(np.array(times_ns), np.array(walls)), columns)
+        self._lines.clear()
+
+
+def readable(line: str) -> str:
+    """An event line for people: what it says, without its stamp, zero vectors and hash."""
+    try:
+        event = json.loads(line)
+        kind, content = event["kind"], event.get("content", {})
+    except (ValueError, KeyError, TypeError):
+        return line
+    if not isinstance(content, dict):
+        return f"{kind} {content}"
+    said = []
+    for key, value in content.items():
+        if key == "stamp_ns" or value in ("", None) or (isinstance(value, list) and not any(value)):
+            continue
+        said.append(_short(value) if key == "frame_id" else f"{key} {_short(value)}")
+    return " ".join([str(kind), ", ".join(said)]).strip()
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_short(item) for item in value) + "]"
+    return str(value)
