@@ -9,10 +9,37 @@ An integrator takes the variables of a segment (core/motion.py) forward in time 
 from __future__ import annotations
 
 from ..errors import CommandRefused, InputError
+from .discrete_gradient import DISCRETE_GRADIENT
+from .dop853 import DOP853
+from .euler import EULER
+from .free_body import FREE_BODY
+from .free_body_4 import FREE_BODY_4
+from .free_body_strang import FREE_BODY_STRANG
 from .integrator import Integrator
+from .lie_midpoint import LIE_MIDPOINT
+from .midpoint import MIDPOINT
 from .rk4 import RK4
+from .rkmk4 import RKMK4
+from .semi_implicit_euler import SEMI_IMPLICIT_EULER
+from .taylor import TAYLOR
 
-INTEGRATORS: dict[str, Integrator] = {integrator.name: integrator for integrator in (RK4,)}
+INTEGRATORS: dict[str, Integrator] = {
+    integrator.name: integrator
+    for integrator in (
+        EULER,
+        MIDPOINT,
+        SEMI_IMPLICIT_EULER,
+        RK4,
+        RKMK4,
+        LIE_MIDPOINT,
+        DOP853,
+        TAYLOR,
+        FREE_BODY,
+        FREE_BODY_STRANG,
+        FREE_BODY_4,
+        DISCRETE_GRADIENT,
+    )
+}
 
 
 def check_carried(integrator: Integrator, needs: frozenset[str]) -> None:

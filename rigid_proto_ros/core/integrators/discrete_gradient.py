@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: MIT
+"""discrete_gradient: the energy-momentum midpoint rule with a string of any stiffness.
+
+Over a step the string pulls with F = −μ (a + a⁺), a the vector from free end to knot, where μ makes the work of F equal to the
+loss of potential exactly (Gonzalez, J. Nonlinear Sci. 6 (1996) 449): μ (l + l⁺) = T with
+
+    T = (V(l⁺) − V(l))/(l⁺ − l) + θ c (l⁺ − l)/h,    V(l) = ½ k max(0, l − rest length)²,
+
+θ the stretched part of the way from l to l⁺; a string that doesn't push has T ≥ 0. Slack and taut need no search: V is smooth
+enough for its discrete gradient. The force acts on ½(r + F r) of the knot's arm, which makes angular momentum about the
+free end exact too. Attitude and spin: integrators/midpoint_spin.py.
+
+Order 2 while ω_s h is small, bounded energy at any ω_s h: a stiff string becomes an inextensible one, its unresolved swing
+along its length wrong in phase. Given μ, what remains is one equation for the mean spin (Newton); μ itself is the root of a
+monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ..motion import HAND_WORK, HEAT
+from ..problem import (
+    ACCELERATION_ADDED,
+    ACCELERATION_BODY,
+    ATTACH,
+    BILATERAL,
+    DAMPING_LINEAR,
+    HAND_VELOCITY,
+    HAS_STRING,
+    MASS,
+    MOMENTS,
+    REST_LENGTH,
+    STIFFNESS,
+    STRING_DAMPING,
+    STRING_START,
+    TRANSLATES,
+)
+from ..rotation import rotate, rotate_inverse
+from ..string import NO_DIRECTION
+from .equations import torque
+from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
+from .midpoint_spin import (
+    MAX_ITERATIONS,
+    ROUNDING,
+    cayley_turned,
+    gyroscopic_torque,
+    half_turned,
+    mean_torque,
+    newton_correction,
+)
+from .runge_kutta import is_good
+from .stepping import FixedSteps
+
+_PULL_TRIALS = 100
+"""Secant steps on the pull; about 5 are used, more only where the string turns slack or taut."""
+
+# Of the scratch array: mean spin, then what the force came to.
+_O, _FORCE, _A0, _A1 = 0, 3, 6, 9
+
+
+@njit(cache=True)
+def _momentum(y, p, h, mu, rho, s):
+    """I(ω⁺ − ω) from the mean spin s[0:3] under the pull F = −μ(a + a⁺) + ρ a; keeps F, a and a⁺ in s."""
+    ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
+    qx, qy, qz, qw = y[0], y[1], y[2], y[3]
+    mx, my, mz, mw = half_turned(qx, qy, qz, qw, ox, oy, oz, h)
+    tx, ty, tz = torque(mx, my, mz, mw, ox, oy, oz, p)
+    tx, ty, tz = mean_torque(ox, oy, oz, tx, ty, tz, h)
+    gx, gy, gz = gyroscopic_torque(ox, oy, oz, p)
+    tx, ty, tz = tx + gx, ty + gy, tz + gz
+    if p[HAS_STRING] != 0.0:
+        R, F, G = ATTACH, ACCELERATION_BODY, ACCELERATION_ADDED
+        nx, ny, nz, nw = cayley_turned(qx, qy, qz, qw, ox, oy, oz, h)
+        arm0 = rotate(qx, qy, qz, qw, p[R], p[R + 1], p[R + 2])
+        arm1 = rotate(nx, ny, nz, nw, p[R], p[R + 1], p[R + 2])
+        push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
+        # The mean velocity is (u + ½h(push + F/m))/(1 + ½hc).
+        soft = 1.0 / (1.0 + 0.5 * h * p[DAMPING_LINEAR])
+        give = 0.5 * h * h * soft / p[MASS]
+        for k in range(3):
+            a = p[STRING_START + k] + y[7 + k] + arm0[k]
+            free = a + h * soft * (y[10 + k] + 0.5 * h * (push[k] + p[G + k])) + (arm1[k] - arm0[k])
+            total = (a + free + give * rho * a) / (1.0 + give * mu)
+            s[_A0 + k] = a
+            s[_A1 + k] = total - a
+            s[_FORCE + k] = rho * a - mu * total
+        # The arm's mean in the axes of the step's start; the torque there, and its ½h ω̄ × t.
+        bx, by, bz = rotate_inverse(qx, qy, qz, qw, arm1[0], arm1[1], arm1[2])
+        bx, by, bz = 0.5 * (bx + p[R]), 0.5 * (by + p[R + 1]), 0.5 * (bz + p[R + 2])
+        fx, fy, fz = rotate_inverse(qx, qy, qz, qw, s[_FORCE], s[_FORCE + 1], s[_FORCE + 2])
+        sx, sy, sz = by * fz - bz * fy, bz * fx - bx * fz, bx * fy - by * fx
+        tx += sx - 0.5 * h * (oy * sz - oz * sy)
+        ty += sy - 0.5 * h * (oz * sx - ox * sz)
+        tz += sz - 0.5 * h * (ox * sy - oy * sx)
+    return h * tx, h * ty, h * tz
+
+
+@njit(cache=True)
+def _solve_spin(y, p, h, mu, rho, s):
+    """The mean spin under a given pull, from the one in s; returns whether it was found."""
+    A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    change = 0.0
+    # How the knot resists: h² μ/(1 + give μ) per unit of its displacement.
+    give = 0.5 * h * h / p[MASS]
+    extra = h * h * mu / (1.0 + give * mu) if p[HAS_STRING] != 0.0 and mu > 0.0 else 0.0
+    rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    for _ in range(MAX_ITERATIONS):
+        ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
+        kx, ky, kz = _momentum(y, p, h, mu, rho, s)
+        dx, dy, dz = 2.0 * A * (ox - y[4]) - kx, 2.0 * B * (oy - y[5]) - ky, 2.0 * C * (oz - y[6]) - kz
+        ex, ey, ez = newton_correction(ox, oy, oz, dx, dy, dz, h, p, extra, rx, ry, rz)
+        s[_O], s[_O + 1], s[_O + 2] = ox + ex, oy + ey, oz + ez
+        before, change = change, max(abs(ex), abs(ey), abs(ez))
+        size = max(abs(s[_O]), abs(s[_O + 1]), abs(s[_O + 2]))
+        if change <= ROUNDING * size or (change <= 64.0 * ROUNDING * size and before != 0.0 and change >= 0.5 * before):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _length(s, at):
+    return math.sqrt(s[at] * s[at] + s[at + 1] * s[at + 1] + s[at + 2] * s[at + 2])
+
+
+@njit(cache=True)
+def _tension(l0, l1, h, p):
+    """T over a step from length l0 to l1, and the part of the way θ in which the damper works."""
+    k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
+    x0, x1 = l0 - rest, l1 - rest
+    if p[BILATERAL] != 0.0:
+        return 0.5 * k * (x0 + x1) + c * (x1 - x0) / h, 1.0
+    if x0 <= 0.0 and x1 <= 0.0:
+        return 0.0, 0.0
+    if x0 >= 0.0 and x1 >= 0.0:
+        spring, part = 0.5 * k * (x0 + x1), 1.0
+    else:
+        # Part of the way is slack: ½k x²/|x₁ − x₀| with the stretched end's x.
+        inside = max(x0, x1)
+        part = inside / abs(x1 - x0)
+        spring = 0.5 * k * inside * part
+    return max(0.0, spring + part * c * (x1 - x0) / h), part
+
+
+@njit(cache=True)
+def _excess(y, p, h, mu, s):
+    """μ(l + l⁺) − T(l⁺): rises with μ. NaN where the spin was not found."""
+    if not _solve_spin(y, p, h, mu, 0.0, s):
+        return math.nan
+    l0, l1 = _length(s, _A0), _length(s, _A1)
+    tension, _ = _tension(l0, l1, h, p)
+    return mu * (l0 + l1) - tension
+
+
+@njit(cache=True)
+def _solve_pull(y, p, h, s):
+    """μ, the spin with it left in s; NaN when there is none."""
+    lower, upper = -math.inf, math.inf
+    mu = 0.0
+    f = _excess(y, p, h, mu, s)
+    l0, l1 = _length(s, _A0), _length(s, _A1)
+    if not math.isfinite(f) or f == 0.0:
+        return f
+    if p[BILATERAL] != 0.0:
+        # A push so strong that 1 + ½h²μ/m vanishes is no solution.
+        lower = -2.0 * p[MASS] / (h * h)
+    # The slope of μ(l + l⁺) − T without the body's turning, which makes the knot only lighter.
+    give = 0.5 * h * h / p[MASS]
+    stiff = 0.5 * p[STIFFNESS] + p[STRING_DAMPING] / h
+    slope = (l0 + l1) * (1.0 + give * stiff)
+    old_mu, old_f = mu, f
+    for _ in range(_PULL_TRIALS):
+        lower, upper = (lower, mu) if f > 0.0 else (mu, upper)
+        new = mu - f / slope
+        bracketed = not (math.isinf(lower) or math.isinf(upper))
+        if not lower < new < upper:
+            new = 0.5 * (lower + upper) if bracketed else mu - 2.0 * f / slope
+        if new == mu:
+            return mu
+        old_mu, old_f, mu = mu, f, new
+        f = _excess(y, p, h, mu, s)
+        if not math.isfinite(f):
+            return math.nan
+        l0, l1 = _length(s, _A0), _length(s, _A1)
+        # What one rounding of the lengths does to T: below it f has no sign.
+        if abs(f) <= 2.0 * ROUNDING * (stiff + abs(mu)) * (l0 + l1):
+            return mu
+        slope = (f - old_f) / (mu - old_mu)
+        if abs(f) > 0.5 * abs(old_f) and bracketed:
+            # The secant stalls at a kink: halve the bracket next.
+            slope = math.nan
+        elif not slope > 0.0:
+            slope = (l0 + l1) * (1.0 + give * stiff)
+    return mu
+
+
+@njit(cache=True)
+def _step(y, p, h, out, s):
+    """One step from y into out; returns whether a solution was found."""
+    s[_O], s[_O + 1], s[_O + 2] = y[4], y[5], y[6]
+    mu, rho = 0.0, 0.0
+    found = True
+    if p[HAS_STRING] == 0.0 or p[REST_LENGTH] == 0.0:
+        if p[HAS_STRING] != 0.0:
+            # −½k(a + a⁺) − c(a⁺ − a)/h, as −μ(a + a⁺) + ρ a.
+            mu, rho = 0.5 * p[STIFFNESS] + p[STRING_DAMPING] / h, 2.0 * p[STRING_DAMPING] / h
+        found = _solve_spin(y, p, h, mu, rho, s)
+    else:
+        mu = _solve_pull(y, p, h, s)
+        found = math.isfinite(mu)
+        if found and max(_length(s, _A0), _length(s, _A1)) < NO_DIRECTION * p[REST_LENGTH]:
+            mu = 0.0
+            found = _solve_spin(y, p, h, mu, rho, s)
+    if not found:
+        return False
+    kx, ky, kz = _momentum(y, p, h, mu, rho, s)
+    out[4], out[5], out[6] = y[4] + kx / p[MOMENTS], y[5] + ky / p[MOMENTS + 1], y[6] + kz / p[MOMENTS + 2]
+    ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
+    out[0], out[1], out[2], out[3] = cayley_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
+    out[13], out[14] = y[13], y[14]
+    if p[TRANSLATES] != 0.0:
+        _translate(y, p, h, out, s)
+    return True
+
+
+@njit(cache=True)
+def _translate(y, p, h, out, s):
+    """Displacement, velocity and the string's energies from the force in s."""
+    ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
+    F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
+    mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
+    push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
+    work = 0.0
+    for k in range(3):
+        force = s[_FORCE + k] if p[HAS_STRING] != 0.0 else 0.0
+        a = push[k] + p[G + k] + force / p[MASS]
+        mean = (y[10 + k] + 0.5 * h * a) / (1.0 + 0.5 * h * c)
+        out[7 + k] = y[7 + k] + h * mean
+        out[10 + k] = y[10 + k] + h * (a - c * mean)
+        work += force * p[HAND_VELOCITY + k]
+    if p[HAS_STRING] == 0.0:
+        return
+    out[HAND_WORK] = y[HAND_WORK] + h * work
+    if p[REST_LENGTH] == 0.0:
+        d0, d1, d2 = s[_A1] - s[_A0], s[_A1 + 1] - s[_A0 + 1], s[_A1 + 2] - s[_A0 + 2]
+        out[HEAT] = y[HEAT] + p[STRING_DAMPING] / h * (d0 * d0 + d1 * d1 + d2 * d2)
+        return
+    # What the pull took beyond the change of potential.
+    l0, l1 = _length(s, _A0), _length(s, _A1)
+    tension, _ = _tension(l0, l1, h, p)
+    x0, x1 = l0 - p[REST_LENGTH], l1 - p[REST_LENGTH]
+    if p[BILATERAL] == 0.0:
+        x0, x1 = max(x0, 0.0), max(x1, 0.0)
+    if p[STRING_DAMPING] != 0.0:
+        out[HEAT] = y[HEAT] + (tension * (l1 - l0) - 0.5 * p[STIFFNESS] * (x1 - x0) * (x1 + x0))
+
+
+@njit(cache=True)
+def discrete_gradient_steps(y, p, h, n):
+    """Up to n steps of h seconds in place; returns the number of good ones."""
+    new, scratch = y.copy(), np.zeros(12)
+    for done in range(n):
+        if not _step(y, p, h, new, scratch) or not is_good(new):
+            return done
+        y[:] = new
+    return n
+
+
+DISCRETE_GRADIENT = Integrator(
+    name="discrete_gradient",
+    order=2,
+    evaluations=12,
+    source="Gonzalez, J. Nonlinear Sci. 6 (1996) 449, with the midpoint rule of Simo and Wong (1991)",
+    limits="Bounded energy at any stiffness; a swing along the string that the step doesn't resolve has the wrong phase.",
+    stability_limit=1.0,
+    carries=LOADS | {ANGULAR_DAMPING, STRING},
+    kernel=discrete_gradient_steps,
+    stepper=FixedSteps,
+    stiff=True,
+)

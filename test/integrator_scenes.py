@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""Scenes that exercise everything an integrator can carry, and their high-precision motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from flights import SECOND
+from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
+
+from rigid_proto_ros.core.body import make_body
+from rigid_proto_ros.core.integrators import INTEGRATORS
+from rigid_proto_ros.core.integrators.integrator import (
+    ANGULAR_DAMPING,
+    BODY_FORCE,
+    BODY_TORQUE,
+    NO_GYROSCOPIC_TERM,
+    STRING,
+    WORLD_TORQUE,
+    Integrator,
+)
+from rigid_proto_ros.core.loads import LoadSum, cross
+from rigid_proto_ros.core.problem import make_problem
+from rigid_proto_ros.core.segment import Segment
+from rigid_proto_ros.core.state import State
+from rigid_proto_ros.core.string import StringSettings, Tied, tie
+
+TENSOR = ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9))
+MASS = 2.0
+ROW = (0.3, -0.2, 0.1, *(v / 1.0 for v in (0.2, -0.4, 0.4, 0.8)), 0.4, 0.1, -0.3, 0.9, 1.3, -0.6)
+POINT = (0.2, 0.1, -0.15)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What acts: keys of the integrators' needs, and always gravity and linear damping unless ``damped`` is False."""
+
+    needs: frozenset
+    damped: bool = True
+    string: StringSettings | None = None
+    row: tuple = ROW
+    extra: dict = field(default_factory=dict)
+
+    def problem_and_start(self) -> tuple[np.ndarray, State]:
+        """The core's problem and the state it starts from."""
+        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(self.row))
+        loads, wanted = LoadSum(), self._values()
+        loads.force_world += wanted["force_world"]
+        loads.force_body += wanted["force_body"]
+        loads.torque_world += wanted["torque_world"]
+        loads.torque_body += wanted["torque_body"]
+        loads.moment += wanted["moment"]
+        problem = make_problem(
+            body,
+            loads,
+            wanted["gravity"],
+            wanted["linear_damping"],
+            wanted["angular_damping"],
+            wanted["gyroscopic"],
+            state,
+            self.tied(body, state),
+        )
+        return problem, state
+
+    def tied(self, body, state) -> Tied | None:
+        return tie(self.string, self.string.attach, self.string.target, body, state, 0) if self.string else None
+
+    def reference(self, times) -> list:
+        """Rows of 13 mpf at the times [s]."""
+        return _reference(self, tuple(times))
+
+    def _values(self) -> dict:
+        force_world, force_body = np.array((0.4, -0.7, 0.5)), np.array((0.5, -0.3, 0.8))
+        world, body = WORLD_TORQUE in self.needs, BODY_FORCE in self.needs
+        torque = BODY_TORQUE in self.needs
+        point = np.array(POINT)
+        return {
+            "gravity": np.array((0.0, 0.0, -9.81)),
+            "force_world": force_world,
+            "force_body": force_body if body else np.zeros(3),
+            "torque_world": np.array((0.2, 0.3, -0.4)) if world else np.zeros(3),
+            "torque_body": (cross(point, force_body) if body else 0.0) + np.array((-0.3, 0.2, 0.4)) if torque else np.zeros(3),
+            "moment": point[:, None] * force_world if world else np.zeros((3, 3)),
+            "linear_damping": 0.3 if self.damped else 0.0,
+            "angular_damping": 0.2 if ANGULAR_DAMPING in self.needs else 0.0,
+            "gyroscopic": NO_GYROSCOPIC_TERM not in self.needs,
+        }
+
+
+@lru_cache(maxsize=64)
+def _reference_rows(key, times):
+    problem, row = key
+    return reference_motion(problem, row, times, digits=30)
+
+
+def _reference(scene: Scene, times):
+    values, string = scene._values(), None
+    if scene.string is not None:
+        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(scene.row))
+        tied = scene.tied(body, state)
+        string = ReferenceString(
+            tied.attach,
+            tuple(tied.target),
+            tied.stiffness,
+            tied.damping,
+            tied.rest_length,
+            tied.bilateral,
+        )
+    problem = ReferenceProblem(
+        mass=MASS,
+        inertia=TENSOR,
+        moment=tuple(tuple(float(x) for x in row) for row in values.pop("moment")),
+        **{k: tuple(float(x) for x in v) if isinstance(v, np.ndarray) else v for k, v in values.items()},
+        string=string,
+    )
+    return _reference_rows((problem, tuple(scene.row)), times)
+
+
+def scene_for(integrator: Integrator, **changes) -> Scene:
+    """Everything that the integrator carries except a string and a dropped gyroscopic term."""
+    return Scene(integrator.carries - {STRING, NO_GYROSCOPIC_TERM}, **changes)
+
+
+def flown(integrator: Integrator | str, scene: Scene, step_ns: int, until_ns: int) -> State:
+    """The state at ``until_ns`` by fixed steps."""
+    integrator = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
+    problem, start = scene.problem_and_start()
+    segment = Segment(start, problem, integrator, step_ns)
+    segment.advance(until_ns)
+    return segment.look(until_ns)
+
+
+def error(state: State, reference) -> float:
+    """Largest of attitude angle [rad] and absolute errors of position, velocity and spin against a row of mpf."""
+    from reference_motion import angle_between, rotation_of
+
+    angle = angle_between(state.orientation_xyzw, rotation_of(reference[3:7]))
+    others = [abs(float(reference[i] - float(state.row[i]))) for i in (0, 1, 2, 7, 8, 9, 10, 11, 12)]
+    return max(angle, *others)
+
+
+__all__ = ["SECOND", "Scene", "error", "flown", "scene_for"]
