@@ -5,6 +5,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from reference_double_double import attitude_angle, free_step
 from reference_motion import angle_between, free_motion, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
@@ -97,3 +98,24 @@ def test_angle_between_sees_angles_far_below_epsilon():
         half = mpf("1e-25")
         R = rotation_of((half, 0, 0, 1))
     assert angle_between((0, 0, 0, 1), R) == pytest.approx(2e-25, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("moments", "spin", "time"),
+    [
+        ((1.0, 2.0, 3.0), (0.3, 1.0, -0.2), 2.0),
+        ((1.0, 2.0, 3.0), (1e-3, 1.0, 1e-3), 2.5),
+        ((1e-6, 1.0, 1.0 + 5e-7), (1000 / 3, 2000 / 3, 2000 / 3), 2.5e-3),
+        ((1.0, 1.0 + 1e-9, 1.5), (1e-180, 2e-180, 5e-181), 7e179),
+    ],
+)
+def test_double_double_series_agree_with_the_closed_form_to_30_digits(moments, spin, time):
+    turned = free_step(np.array(moments), np.array([0.0, 0.0, 0.0, 1.0]), np.array(spin), time)
+    R, w = free_motion(np.diag(moments), spin, time)
+    with mp.workdps(50):
+        pairs = [mpf(float(high)) + mpf(float(low)) for high, low in turned]
+        assert largest_difference(rotation_of(pairs[:4]), R) < mpf("1e-30")  # measured 5e-32
+        size = max(abs(c) for c in spin)
+        assert max(abs(a - b) for a, b in zip(pairs[4:], w, strict=True)) < mpf("1e-30") * mpf(size)
+        rounded = turned[:4, 0]
+        assert attitude_angle(rounded, turned[:4]) == pytest.approx(angle_between(rounded, R), rel=1e-6)
