@@ -68,7 +68,7 @@ def _package_folder(package: str) -> Path | None:
 
         try:
             return Path(get_package_share_directory(package))
-        except (PackageNotFoundError, ValueError):
+        except (PackageNotFoundError, ValueError, OSError):  # OSError: no ROS environment is set up
             pass
     except ImportError:
         pass

@@ -19,13 +19,15 @@ from rigid_proto_ros.core.mass_properties import MassProperties, scale_vector
 from rigid_proto_ros.inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from rigid_proto_ros.mesh_body import FALLBACKS, mesh_body
 from rigid_proto_ros.mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
-from rigid_proto_ros.mesh_io import MAX_TRIANGLES, load_mesh
+from rigid_proto_ros.mesh_io import MAX_TRIANGLES, load_mesh, resolve_mesh
 
 if TYPE_CHECKING:
     from rigid_proto_ros.inertia_doctor import LinkDiagnosis
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
+LARGE_FILE, LARGE_MESH = 10_000_000, 100_000
+"""Bytes and triangles from which work may take longer than a second."""
 VERIFIED = 1e-13
 """Largest error against rational arithmetic with which ``--verify`` is content."""
 
@@ -151,9 +153,10 @@ def run(args: argparse.Namespace) -> int:
     scale_vector(scale)
     if args.max_triangles < 1:
         raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
-    with Progress(f"reading {mesh_name}"):
+    path = resolve_mesh(mesh_name)
+    with Progress(f"reading {mesh_name}", path.stat().st_size > LARGE_FILE):
         mesh = load_mesh(mesh_name, max_triangles=args.max_triangles)
-    with Progress(f"examining {len(mesh.triangles)} triangles"):
+    with Progress(f"examining {len(mesh.triangles)} triangles", len(mesh.triangles) > LARGE_MESH):
         body = mesh_body(mesh, repair=args.repair, fallback=args.fallback)
         inspection = inspect_mesh(
             body, model=args.model, scale=scale, mass=args.mass, density=density, ballast=args.ballast
@@ -165,7 +168,7 @@ def run(args: argparse.Namespace) -> int:
         raise inspection.refusal
     status = 0
     if args.verify:
-        with Progress("checking in rational arithmetic") as progress:
+        with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
             report["verification"] = verify(body, inspection.scale, progress.fraction)
         if max(report["verification"].values()) > VERIFIED:
             print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)

@@ -15,10 +15,12 @@ EVERY_S = 2.0
 
 class Progress:
     """``with Progress("reading cow.obj"):`` tells every two seconds what is under way, and how far it is if the work
-    calls ``fraction``. A thread tells it, so that work inside one long call is seen, too."""
+    calls ``fraction``. A thread tells it, so that work inside one long call is seen, too. ``large`` False keeps quiet: what
+    is small is done before anybody wonders, and a slow start of the interpreter is no news."""
 
-    def __init__(self, what: str) -> None:
+    def __init__(self, what: str, large: bool = True) -> None:
         self.what = what
+        self.large = large
         self._done: tuple[int, int] | None = None
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._tell, daemon=True)
@@ -36,9 +38,11 @@ class Progress:
             print(f"{self.what}{far} ... {time.monotonic() - started:.0f} s", file=sys.stderr, flush=True)
 
     def __enter__(self) -> Progress:
-        self._thread.start()
+        if self.large:
+            self._thread.start()
         return self
 
     def __exit__(self, *_) -> None:
         self._end.set()
-        self._thread.join()
+        if self.large:
+            self._thread.join()

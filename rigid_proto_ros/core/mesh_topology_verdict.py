@@ -268,12 +268,13 @@ def judge_surface(
     _judge_edges(verdict, topology, vertices, triangles, half)
     if topology.unbalanced == 0:
         volume = component_volumes(vertices, triangles, np.zeros(len(triangles), np.int64), 1)[0][0]
-        if abs(volume) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal):
-            verdict.add("zero_volume", ERROR, "encloses no volume: flat, or folded onto itself")
-        else:
+        empty = abs(volume) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
+        if topology.components > 1 or not empty:
             _judge_components(verdict, topology, vertices, triangles)
-            if abs(volume) < THIN * diagonal**3:
-                verdict.add("thin", INFO, f"thin: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
+        if empty and verdict.closed:
+            verdict.add("zero_volume", ERROR, "encloses no volume: flat, or folded onto itself")
+        elif not empty and abs(volume) < THIN * diagonal**3:
+            verdict.add("thin", INFO, f"thin: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
     if polygon_starts is not None:
         deviation, spread = _polygon_planarity(vertices, triangles, polygon_starts, 0.5 * lower + 0.5 * upper)
         if deviation > NONPLANAR * diagonal:

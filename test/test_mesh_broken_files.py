@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""Broken mesh files: each gets its verdict, its exit status and one line that says what is wrong. No silent number."""
+
+import json
+
+import numpy as np
+import pytest
+from mesh_files import (
+    CUBE_QUADS,
+    CUBE_TRIANGLES,
+    CUBE_VERTICES,
+    moebius,
+    obj,
+    off,
+    ply,
+    ply_binary,
+    stl,
+    stl_text,
+)
+
+from rigid_proto_ros.cli.main import main
+
+JUNK = bytes(np.random.default_rng(5).integers(0, 256, 4096, dtype=np.uint8))
+TEXT = b"The quick brown fox jumps over the lazy dog.\n" * 40
+V, T = CUBE_VERTICES, CUBE_TRIANGLES
+FLIPPED = T.copy()
+FLIPPED[::4] = FLIPPED[::4, ::-1]
+WITH_NAN = V.copy()
+WITH_NAN[3, 1] = np.nan
+TWO = np.vstack([V, V + 3.0])
+
+
+def replaced(data: bytes, old: bytes, new: bytes) -> bytes:
+    assert old in data
+    return data.replace(old, new, 1)
+
+
+# file name, bytes, what the one line says; the file can't be read, so there is no verdict
+UNREADABLE = [
+    ("empty.obj", b"", "empty"),
+    ("blank.obj", b"\n \n\t\n", "empty"),
+    ("empty.stl", b"", "empty"),
+    ("short.stl", b"x" * 50, "84 bytes"),
+    ("empty.ply", b"", "empty"),
+    ("empty.off", b"", "empty"),
+    ("junk.obj", JUNK, "text"),
+    ("junk.stl", JUNK, "announces"),
+    ("junk.ply", JUNK, "a .ply file"),
+    ("junk.off", JUNK, "OFF"),
+    ("junk.glb", JUNK, "trimesh"),
+    ("prose.obj", TEXT, "no faces"),
+    ("prose.stl", TEXT, "announces"),
+    ("prose.ply", TEXT, "a .ply file"),
+    ("prose.off", TEXT, "OFF"),
+    ("vertices_only.obj", obj(faces=[]), "no faces"),
+    ("no_facets.stl", stl(faces=[]), "no faces"),
+    ("no_faces.off", off(faces=[]), "no faces"),
+    ("no_faces.ply", ply(faces=[]), "no faces"),
+    ("cut.stl", stl()[:-70], "cut short"),
+    ("cut_text.stl", stl_text()[:-60], "cut short"),
+    ("cut.off", off()[:-40], "cut short"),
+    ("cut.ply", ply()[:-40], "cut short"),
+    ("cut_binary.ply", ply_binary()[:-40], "cut short"),
+    ("cut_header.ply", ply()[:60], "end_header"),
+    ("cut_vertex.obj", obj()[:9], "three coordinates"),
+    ("long.stl", stl() + b"\0" * 33, "beyond the 12 facets"),
+    ("huge.stl", stl(count=4_000_000_000), "4000000000 facets"),
+    ("huge.off", replaced(off(), b"8 12", b"8000000000 12"), "8000000000 vertices"),
+    ("huge.ply", ply(announced=2_000_000_000), "2000000000 face rows"),
+    ("negative.ply", replaced(ply(), b"element face 12", b"element face -12"), "element face -12"),
+    ("word.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0.0 zero 1.0"), "zero"),
+    ("comma.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0,0 0,0 1,0"), "0,0"),
+    ("word.off", replaced(off(), b"0.0 0.0 1.0", b"0.0 zero 1.0"), "zero"),
+    ("word.ply", replaced(ply(), b"0.0 0.0 1.0", b"0.0 zero 1.0"), "zero"),
+    ("word_text.stl", replaced(stl_text(), b"vertex 0.0 0.0 1.0", b"vertex 0.0 zero 1.0"), "zero"),
+    ("index.obj", replaced(obj(), b"f 1 2 4", b"f 1 2 99"), "vertex 99"),
+    ("index_zero.obj", replaced(obj(), b"f 1 2 4", b"f 0 2 4"), "nonzero"),
+    ("index_float.obj", replaced(obj(), b"f 1 2 4", b"f 1.5 2 4"), "nonzero integer"),
+    ("index_back.obj", replaced(obj(), b"f 1 2 4", b"f -1 -2 -99"), "counted back"),
+    ("index.off", replaced(off(), b"3 0 1 3", b"3 0 1 88"), "vertex numbers from 0 to 7"),
+    ("index.ply", replaced(ply(), b"3 0 1 3", b"3 0 1 88"), "vertex 88"),
+    ("two_corners.obj", replaced(obj(), b"f 1 2 4", b"f 1 2"), "three or more corners"),
+    ("two_corners.ply", ply(faces=[(0, 1), *T]), "three or more"),
+    ("no_z.ply", replaced(ply(), b"property double z\n", b""), "x, y, z"),
+    ("stl_named.obj", stl_text(), "looks like .stl"),
+    ("ply_named.stl", ply(), "looks like .ply"),
+    ("off_named.ply", off(), "looks like .off"),
+    ("mesh.xyz", obj(), "obj"),
+    ("noextension", obj(), "obj"),
+]
+
+# file name, bytes, code of the verdict, words of the one line; the file can be read but bounds no solid
+REFUSED = [
+    ("nan.obj", obj(WITH_NAN), "nonfinite", "1 of 8 vertices"),
+    ("nan.off", off(WITH_NAN), "nonfinite", "1 of 8 vertices"),
+    ("nan.ply", ply(WITH_NAN), "nonfinite", "1 of 8 vertices"),
+    ("nan_binary.ply", ply_binary(WITH_NAN), "nonfinite", "1 of 8 vertices"),
+    ("nan.stl", stl(WITH_NAN), "nonfinite", "not finite"),
+    ("inf.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0.0 1e999 1.0"), "nonfinite", "not finite"),
+    ("open.obj", obj(faces=T[:-1]), "open", "3 boundary edges"),
+    ("open.stl", stl(faces=T[:-1]), "open", "3 boundary edges"),
+    ("open.off", off(faces=T[:-1]), "open", "3 boundary edges"),
+    ("open.ply", ply_binary(faces=T[:-1]), "open", "3 boundary edges"),
+    ("cut_between_lines.obj", obj()[:-8], "open", "boundary edge"),
+    ("one_triangle.obj", obj(faces=T[:1]), "open", "3 boundary edges"),
+    ("one_triangle.stl", stl(faces=T[:1]), "open", "3 boundary edges"),
+    ("quarter_flipped.obj", obj(faces=FLIPPED), "inconsistent_winding", "inconsistent winding"),
+    ("quarter_flipped.stl", stl(faces=FLIPPED), "inconsistent_winding", "inconsistent winding"),
+    ("one_flipped_quad.off", off(faces=[CUBE_QUADS[0][::-1], *CUBE_QUADS[1:]]), "inconsistent_winding", "4 edges"),
+    ("one_body_inward.obj", obj(TWO, [*T, *(T + 8)[:, ::-1]]), "component_inward", "1 of 2 components"),
+    ("all_twice.obj", obj(faces=[*T, *T]), "duplicate_faces", "12 faces twice"),
+    ("one_twice.stl", stl(faces=[*T, T[0]]), "duplicate_faces", "1 face twice"),
+    ("both_sides.obj", obj(faces=[*T, *T[:, ::-1]]), "zero_volume", "no volume"),
+    ("moebius.obj", obj(*moebius()), "inconsistent_winding", "boundary edges"),
+    ("flat.obj", obj(V * [1.0, 1.0, 0.0]), "zero_volume", "no volume"),
+    ("line.obj", obj(V * [1.0, 0.0, 0.0]), "zero_volume", "no volume"),
+    ("point.obj", obj(V * 0.0), "zero_volume", "one point"),
+    ("fin.obj", obj(np.vstack([V, [[2.0, 2.0, 2.0]]]), [*T, (6, 7, 8)]), "open", "boundary edge"),
+]
+
+
+def inspect(capsys, *arguments: str) -> tuple[int, str, str]:
+    status = main(["inspect", *arguments])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def one_line(err: str) -> str:
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    return err
+
+
+def test_the_tables_hold_what_they_promise():
+    assert len(UNREADABLE) + len(REFUSED) >= 40
+
+
+@pytest.mark.parametrize(("name", "data", "words"), UNREADABLE, ids=[row[0] for row in UNREADABLE])
+def test_a_file_that_cannot_be_read_says_why_in_one_line(tmp_path, capsys, name, data, words):
+    (tmp_path / name).write_bytes(data)
+    status, out, err = inspect(capsys, str(tmp_path / name), "--json")
+    assert status == 2
+    assert out == ""
+    assert words in one_line(err)
+    assert name in err
+
+
+@pytest.mark.parametrize(("name", "data", "code", "words"), REFUSED, ids=[row[0] for row in REFUSED])
+def test_a_readable_file_without_a_solid_gets_its_verdict_and_no_number(tmp_path, capsys, name, data, code, words):
+    (tmp_path / name).write_bytes(data)
+    status, out, err = inspect(capsys, str(tmp_path / name), "--json")
+    assert status == 2
+    report = json.loads(out)
+    errors = {finding["code"]: finding["message"] for finding in report["verdict"] if finding["severity"] == "error"}
+    assert code in errors
+    assert words in " ".join(errors.values())
+    assert all(value is None for key, value in report.items() if key != "verdict")
+    line = one_line(err)
+    if code not in ("nonfinite",) and "one point" not in words:
+        assert "--repair" in line
+        assert "--fallback" in line
+
+
+def test_a_limit_that_can_be_raised_says_how(tmp_path, capsys):
+    for name, data in (("a.obj", obj()), ("a.stl", stl()), ("a.off", off()), ("a.ply", ply()), ("b.ply", ply_binary())):
+        path = tmp_path / name
+        path.write_bytes(data)
+        status, out, err = inspect(capsys, str(path), "--max-triangles", "11")
+        assert (status, out) == (2, "")
+        assert "--max-triangles raises the limit" in one_line(err)
+        assert inspect(capsys, str(path), "--max-triangles", "12")[0] == 0
+
+
+def test_files_that_only_look_broken_are_read(tmp_path, capsys):
+    whole = {
+        "crlf.obj": obj().replace(b"\n", b"\r\n"),
+        "mac.obj": obj().replace(b"\n", b"\r"),
+        "no_last_newline.obj": obj()[:-1],
+        "utf8.obj": "# bär\no Gehäuse\n".encode() + obj(),
+        "inverted.obj": obj(faces=T[:, ::-1]),
+        "inverted.stl": stl(faces=T[:, ::-1]),
+        "zero_area.obj": obj(np.vstack([V, V[:1] / 2]), [*T, (0, 1, 0), (2, 2, 3)]),
+        "solid_in_header.stl": b"solid but binary".ljust(80) + stl()[80:],
+    }
+    for name, data in whole.items():
+        path = tmp_path / name
+        path.write_bytes(data)
+        status, out, err = inspect(capsys, str(path), "--json")
+        assert (status, err) == (0, ""), name
+        assert json.loads(out)["mass"] == pytest.approx(1000.0, rel=1e-14), name
+
+
+def test_an_inverted_mesh_is_turned_with_a_warning(tmp_path, capsys):
+    (tmp_path / "inverted.obj").write_bytes(obj(faces=T[:, ::-1]))
+    _, out, _ = inspect(capsys, str(tmp_path / "inverted.obj"), "--json")
+    assert [(f["code"], f["severity"]) for f in json.loads(out)["verdict"]] == [("inward", "warning")]
+
+
+def test_a_name_that_is_no_file_lists_the_bundled_ones(capsys):
+    status, out, err = inspect(capsys, "tennis_raket")
+    assert (status, out) == (2, "")
+    assert "did you mean 'tennis_racket'" in one_line(err)
+    assert "hammer" in err
+
+
+@pytest.mark.parametrize("name", ["package://no_such_package/x.obj", "package://rigid_proto_ros/none.obj", "/", ""])
+def test_other_names_without_a_file(capsys, name):
+    status, out, err = inspect(capsys, name)
+    assert (status, out) == (2, "")
+    one_line(err)
+
+
+def test_a_file_that_may_not_be_read_says_so(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "locked.obj"
+    path.write_bytes(obj())
+
+    def refuse(_self):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.read_bytes", refuse)
+    status, _, err = inspect(capsys, str(path))
+    assert status == 2
+    assert "Permission denied" in one_line(err)
