@@ -84,6 +84,15 @@ class Observer:
     def refused(self, time_ns: int, reason: str, message: str) -> None:
         """A command was refused."""
 
+    def status(self, time_ns: int, track: str, value: str) -> None:
+        """From ``time_ns`` on ``track`` is ``value``, such as motion: flying, sleeping, paused; string: taut, slack."""
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        """A second body that gets the same commands is this one from ``time_ns`` on."""
+
+    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:
+        """One state of the ghost, after the body's own of the same time; ``row`` as for ``state``."""
+
     def reset(self) -> None:
         """Simulated time starts again at 0."""
 
