@@ -54,6 +54,9 @@ class Scenario:
     def with_changes(self, changes: Mapping[str, object]) -> Scenario:
         """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is."""
         changes = parameters.convert_all(changes)
+        for name, value in changes.items():
+            if parameters.parameter_named(name).changes == parameters.READ_ONLY:
+                raise InputError(name, value, "a parameter that can change in flight; this one is set at start only")
         values = {**self.values, **changes}
         if "density" in changes and "mass" not in changes:
             values["mass"] = 0.0
