@@ -193,8 +193,13 @@ def test_book_on_its_corner_swings_in_two_rhythms() -> None:
     rock = knot_to_com[:, 0]
     frequency = np.fft.rfftfreq(len(swing), 0.01)
     window = np.hanning(len(swing))
-    strongest = [frequency[np.argmax(np.abs(np.fft.rfft(window * (x - x.mean()))))] for x in (swing, rock)]
-    assert abs(strongest[0] - strongest[1]) > 0.5
+    strongest = []
+    for x in (swing, rock):
+        amplitude = np.abs(np.fft.rfft(window * (x - x.mean())))
+        # The book also turns slowly about the vertical, below 0.5 Hz.
+        strongest.append(frequency[np.argmax(np.where(frequency > 0.5, amplitude, 0.0))])
+    assert strongest[0] == pytest.approx(0.73, abs=0.05)
+    assert strongest[1] > 4.0 * strongest[0]  # measured 3.4 Hz
 
 
 def test_top_on_a_string_walks_at_the_rate_of_its_weight_over_its_momentum() -> None:
