@@ -112,7 +112,7 @@ def _warm_up(node) -> None:
         zero = (0.0, 0.0, 0.0)
         trial.submit(WrenchCommand(False, parse_frame(frame), zero, zero, 0, frame, b""))
     state = trial.advance(2 * node.physics.scenario.setup.step_ns + 1)
-    node.states.publish(state)
+    node.states.pack_all(state)
 
 
 class _saying_when_slow:
@@ -121,7 +121,11 @@ class _saying_when_slow:
     def __enter__(self):
         self._started = time.monotonic()
         self._timer = threading.Timer(
-            2.0, lambda: print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
+            2.0,
+            lambda: print(
+                "rigid_body_node: still starting; a first start compiles kernels, which takes a while ...",
+                file=sys.stderr,
+            ),
         )
         self._timer.daemon = True
         self._timer.start()

@@ -44,6 +44,7 @@ class RigidBodyNode(Node):
         self.world_frame = scenario.values["world_frame"]
         self.body_frame = scenario.values["body_frame"] or self.get_name()
         viewer = make_observer(scenario, self.get_name()) if make_observer else Observer()
+        self._is_viewed = type(viewer) is not Observer
         self.observer = Observers(EventPublisher(self, self.body_frame, self._mesh_path), viewer)
         self.states = StatePublisher(self, self.world_frame, self.body_frame, self._specific_force)
         self.states.configure(scenario.values)
@@ -54,6 +55,7 @@ class RigidBodyNode(Node):
             self._take_commands,
             self._motion_failed,
             self._followed_clock(scenario),
+            self._anybody_listens,
         )
         self.intake = CommandIntake(
             self,
@@ -91,8 +93,11 @@ class RigidBodyNode(Node):
 
     # Commands, on the physics thread
 
-    def _take_commands(self) -> None:
-        self.intake.take(self.physics.simulation, self.physics.scenario)
+    def _anybody_listens(self) -> bool:
+        return self.states.look_for_subscribers() or self._is_viewed
+
+    def _take_commands(self, wall_ns: int) -> None:
+        self.intake.take(self.physics.simulation, self.physics.scenario, wall_ns, self.physics.catch_up)
 
     def _command_refused(self, refusal: CommandRefused) -> None:
         self.get_logger().warning(f"refused: {refusal}", throttle_duration_sec=1.0)

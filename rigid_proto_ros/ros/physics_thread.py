@@ -27,6 +27,9 @@ PAUSED_NS = 100_000_000
 FOLLOW_NS = 1_000_000
 """A followed clock is looked at this often [ns of wall time]."""
 
+SHORT_NS = 3_000_000
+"""Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
+
 MAX_LAG_NS = 250_000_000
 """A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
 
@@ -41,8 +44,10 @@ class Timekeeping:
 
 
 class PhysicsThread:
-    """publish(state) is called for every publication; take_commands() at every tick, to submit what has arrived.
+    """publish(state) is called for every publication; take_commands(wall_ns) at every tick, to submit what has arrived.
 
+    anybody_listens() says whether publications reach anybody; while they don't, none is made and the body crosses the
+    time between two looks at the commands at once.
     on_failure(message) is called when the motion stopped in its last good state. followed_clock() gives nanoseconds of a clock
     that simulated time follows instead of the wall's.
     """
@@ -52,9 +57,10 @@ class PhysicsThread:
         scenario: Scenario,
         observer: Observer,
         publish: Callable[[State], None],
-        take_commands: Callable[[], None],
+        take_commands: Callable[[int], None],
         on_failure: Callable[[str], None],
         followed_clock: Callable[[], int] | None = None,
+        anybody_listens: Callable[[], bool] = lambda: True,
     ) -> None:
         self.scenario = scenario
         self.observer = observer
@@ -64,6 +70,8 @@ class PhysicsThread:
         self._take_commands = take_commands
         self._on_failure = on_failure
         self._followed_clock = followed_clock
+        self._anybody_listens = anybody_listens
+        self._listeners = True
         self._requests: list[tuple[Callable, Future]] = []
         self._wake = threading.Event()
         self._stopping = False
@@ -110,6 +118,12 @@ class PhysicsThread:
             self.simulation.log("pause", {"data": paused})
             self._anchor()
 
+    def catch_up(self) -> None:
+        """Advance to this tick's present: what a command means by now. Without commands nobody needs it."""
+        if not self.timekeeping.paused and self._present_ns > self.simulation.time_ns:
+            self.simulation.advance(self._present_ns)
+            self._check_failure()
+
     def step(self) -> int:
         """While paused, advance to the next publication; returns its time [ns]."""
         self.simulation.log("step", {})
@@ -128,6 +142,7 @@ class PhysicsThread:
 
     def _run(self) -> None:
         self._publication = 0
+        self._present_ns = 0
         self._anchor()
         while not self._stopping:
             self._wait_until(self._next_wake_ns())
@@ -139,7 +154,13 @@ class PhysicsThread:
 
     def _tick_running(self) -> None:
         """Advance to the present: publish what is due, then take the commands that have arrived."""
+        wall_ns = time.monotonic_ns()
+        if wall_ns >= self._next_look_ns:
+            self._next_look_ns = wall_ns + DRAIN_NS
+            self._listeners = self._anybody_listens()
         present_ns = self._simulated_present_ns()
+        if not self._listeners:
+            self._pass_over(present_ns)
         due_ns = self._publication_ns()
         while due_ns <= present_ns and not self._stopping:
             if not self._publish_next():
@@ -147,18 +168,28 @@ class PhysicsThread:
             due_ns = self._publication_ns()
             if due_ns <= present_ns and self._factor > 0.0:
                 self.timekeeping.overruns += 1
-        if present_ns > self.simulation.time_ns:
-            self.simulation.advance(present_ns)
-            self._check_failure()
-        self._take_commands()
-        self._last_drain_ns = time.monotonic_ns()
+        self._last_drain_ns = wall_ns
+        self._present_ns = present_ns
+        self._take_commands(wall_ns)
+        if not self._listeners:
+            self.catch_up()
+
+    def _pass_over(self, present_ns: int) -> None:
+        """Make no publication up to the present, but for what a run without pacing goes by."""
+        if self._factor > 0.0 or self._followed_clock:
+            numerator, denominator = self.scenario.values["publish_rate"].as_integer_ratio()
+            # One early, and then on: the estimate is floored and publications are rounded.
+            self._publication = max(self._publication, present_ns * numerator // (1_000_000_000 * denominator) - 1)
+            while self._publication_ns() <= present_ns:
+                self._publication += 1
 
     def _tick_paused(self) -> None:
-        self._take_commands()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
+        self._take_commands(now_ns)
         if now_ns >= self._paused_publication_ns:
             self._paused_publication_ns = now_ns + PAUSED_NS
+            self._listeners = self._anybody_listens()
             self._publish(self.simulation.state)
 
     def _publish_next(self) -> bool:
@@ -199,6 +230,7 @@ class PhysicsThread:
         self._anchor_wall_ns = self._followed_clock() if self._followed_clock else self._last_drain_ns
         self._anchor_simulated_ns = self.simulation.time_ns
         self._paused_publication_ns = 0
+        self._next_look_ns = 0
 
     def _simulated_present_ns(self) -> int:
         """Simulated time that the wall clock asks for; time lost beyond MAX_LAG_NS is given up and counted."""
@@ -226,16 +258,26 @@ class PhysicsThread:
             return latest_ns
         if self._factor == 0.0:
             return 0
+        if not self._listeners:
+            return latest_ns
         ahead_ns = self._publication_ns() - self._anchor_simulated_ns
         return min(latest_ns, self._anchor_wall_ns + int(ahead_ns / self._factor) + 1)
 
     def _wait_until(self, wall_ns: int) -> None:
         rest_ns = wall_ns - time.monotonic_ns()
-        if rest_ns > 0 and not self._requests:
+        if rest_ns <= 0 or self._requests:
+            return
+        if rest_ns < SHORT_NS:
+            time.sleep(rest_ns * 1e-9)
+        else:
             self._wake.wait(rest_ns * 1e-9)
-        self._wake.clear()
+            self._wake.clear()
 
     def _serve_requests(self) -> None:
+        if self._requests and not self.timekeeping.paused:
+            self._present_ns = self._simulated_present_ns()
+            if self._present_ns < self._publication_ns():
+                self.catch_up()
         while self._requests:
             function, future = self._requests.pop(0)
             if future.set_running_or_notify_cancel():
