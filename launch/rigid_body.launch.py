@@ -42,18 +42,18 @@ def nodes(context) -> list[Node]:
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
     parameters = {"viewer": given["viewer"], "use_sim_time": given["use_sim_time"].lower() in ("true", "1", "yes")}
     parameters.update({name: given[name] for name in ("mesh", "record") if given[name]})
+    target = "/".join(["", *filter(None, [given["namespace"].strip("/"), given["name"]])])
     body = Node(
         package=PACKAGE,
         executable="rigid_body_node",
         name=given["name"],
         namespace=given["namespace"],
-        parameters=[*_for_node(str(scene_file(given["scene"])), given["name"]), parameters],
+        parameters=[*_for_node(str(scene_file(given["scene"])), target), parameters],
         output="screen",
     )
     if not given["script"]:
         return [body]
     script = given["script"] if "/" in given["script"] else str(example_path(given["script"].removesuffix(".yaml")))
-    target = "/".join(["", *filter(None, [given["namespace"].strip("/"), given["name"]])])
     options = ["--node", target, "--timeout", "60"]
     if given["reset"].lower() in ("true", "1", "yes"):
         options.append("--reset")
@@ -61,9 +61,9 @@ def nodes(context) -> list[Node]:
     return [body, client]
 
 
-def _for_node(scene: str, name: str) -> list:
-    """The scene as launch takes it: as the file, or as its values where a renamed node wouldn't find its section."""
-    if name == "rigid_body":
+def _for_node(scene: str, target: str) -> list:
+    """The scene as launch takes it: as the file, or as its values where a node of another name wouldn't find its section."""
+    if target == "/rigid_body":
         return [scene]
     from rigid_proto_ros.scene_file import read_scene_file
 
