@@ -78,7 +78,7 @@ class SceneWriter:
         if self._body is None:
             return
         now, wall = self._last_time_ns, time.time_ns()
-        send_styles(stream, self._size, self._initial_view)
+        send_styles(stream, self._size, self._view_size, self._initial_view)
         send_body(stream, now, wall, self._body, self._scene)
         self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
@@ -168,7 +168,7 @@ class SceneWriter:
         self._tell_body()
         for stream in self.streams:
             if self._size != before:
-                send_styles(stream, self._size, self._initial_view)
+                send_styles(stream, self._size, self._view_size, self._initial_view)
             send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene)
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
@@ -181,6 +181,7 @@ class SceneWriter:
         if self._body is None:
             return
         self._size = self._scene.size(self._body) if self._scene is not None else 1.0
+        self._view_size = self._scene.view_size(self._body) if self._scene is not None else self._size
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
 
