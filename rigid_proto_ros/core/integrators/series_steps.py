@@ -82,8 +82,11 @@ def _bisect(c, p, degree, low, high, taut):
 
 
 @njit(cache=True, error_model="numpy")
-def _walk(y, p, control, longest_ns, c, out):
-    """From y one step into out, or ``longest_ns`` if that is shorter; returns its length [ns], 0 when there is none."""
+def _walk(y, p, control, longest_ns, look, c, out):
+    """From y one step into out, or ``longest_ns`` if that is shorter; returns its length [ns], 0 when there is none.
+
+    look: it is known to reach that far.
+    """
     degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
     longest = longest_ns * 1e-9
     weights = scales(y, p, control[ctl.ELAPSED_NS] * 1e-9)
@@ -107,23 +110,29 @@ def _walk(y, p, control, longest_ns, c, out):
             return 0
         if accuracy * h < FLOOR or rate_of_error > accuracy:
             control[ctl.FLOOR_BINDS] = 1.0
+        arrives = h >= longest - gone
         h = min(h, longest - gone)
         switch = _switch(c, p, degree, h, taut) if one_sided and parts < _MAX_PARTS else -1.0
         if switch < 0.0:
             break
+        before_ns = int(math.floor((gone + switch) * 1e9))
+        if parts > 1 and before_ns * 1e-9 > gone and not look:
+            # One switch a step: each multiplies what the step has erred before it.
+            h = before_ns * 1e-9 - gone
+            break
         _move(c, p, degree, switch, one_sided and not taut, out)
         gone += switch
         taut = not taut
-        if jump_of_rounding(p, weights[1], weights[3]) > accuracy * gone:
-            control[ctl.FLOOR_BINDS] = 1.0
         if gone >= longest:
             return longest_ns
     length_ns = longest_ns
-    if gone + h < longest:
+    if not arrives:
         length_ns = int(math.floor((gone + h) * 1e9))
         if length_ns * 1e-9 <= gone:
             length_ns += 1
     _move(c, p, degree, length_ns * 1e-9 - gone, one_sided and not taut, out)
+    if gone > 0.0 and jump_of_rounding(p, weights[1], weights[3]) > accuracy * length_ns * 1e-9:
+        control[ctl.FLOOR_BINDS] = 1.0
     return length_ns
 
 
@@ -144,7 +153,7 @@ def series_advance(y, p, control, following, span_ns):
     advanced = 0
     while True:
         if control[ctl.ACCEPTED_NS] == 0.0:
-            length = _walk(y, p, control, int(ctl.LONGEST * 1e9), c, following)
+            length = _walk(y, p, control, int(ctl.LONGEST * 1e9), False, c, following)
             if length < 1 or not is_good(following):
                 control[ctl.FAILED] = 1.0
                 return advanced
@@ -162,7 +171,7 @@ def series_look(y, p, control, span_ns):
     """The one step to span_ns, shorter than the one that is accepted, in y; returns whether it was good."""
     c, out = np.zeros((int(control[ctl.DEGREE]) + 2, COLUMNS)), np.zeros(15)
     spent = control[ctl.PENDING]
-    length = _walk(y, p, control, span_ns, c, out)
+    length = _walk(y, p, control, span_ns, True, c, out)
     control[ctl.PENDING] = spent
     y[:] = out
     return length == span_ns and is_good(y)
