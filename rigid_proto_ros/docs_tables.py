@@ -71,7 +71,7 @@ def integrators() -> str:
         if integrator.kernel is None:  # it picks others
             order = evaluations = "-"
         cells = (_code(integrator.name), order, evaluations, "; ".join(lacks))
-        rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".")))
+        rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".").replace("``", "`")))
     return _table(("name", "order", "evaluations a step", "can't carry", "good for, and what breaks it"), rows)
 
 
