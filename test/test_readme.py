@@ -177,14 +177,14 @@ def _submit(run: OfflineRun, topic: str, message) -> None:
 
 
 @pytest.mark.slow
-def test_three_things_to_try_reach_a_running_node(ros_environment: dict[str, str], in_a_copy: Path) -> None:
+def test_three_things_to_try_reach_a_running_node(ros_environment: dict[str, str]) -> None:
     pytest.importorskip("rclpy")
     text = README.read_text("utf-8")
     section = text[text.index("### Three things to try") : text.index("### Frames and units")]
     lines = [line.strip() for line in section.splitlines() if line.strip().startswith("poke_client")]
     assert len(lines) == 3
     scene = ["--ros-args", "--params-file", "config/t_handle.yaml"]
-    node = subprocess.Popen([sys.executable, "-m", "rigid_proto_ros.ros.main", *scene], env=ros_environment)
+    node = subprocess.Popen([sys.executable, "-m", "rigid_proto_ros.ros.main", *scene], env=ros_environment, cwd=SOURCE)
     try:
         for line in lines:
             command = [sys.executable, "-m", "rigid_proto_ros.ros.poke_client", *words(line)[1:], "--timeout", "60"]
