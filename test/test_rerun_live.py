@@ -127,7 +127,8 @@ def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(v
     observer.close()
 
 
-def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path):
+def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(viewers.ViewerProcess, "stop", lambda self: (self.process.kill(), self.process.wait()))
     path = tmp_path / "session.rrd"
     states = flight.rows(600)
     observer = RerunObserver(record=str(path), viewer="serve")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,9 @@ TRAIL_RADIUS = 0.004
 AXIS_LENGTH = 0.25
 """In body sizes."""
 
+VIEW_PER_REACH = 1.7
+"""A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
+
 
 @dataclass
 class Scene:
@@ -37,6 +41,12 @@ class Scene:
         if self.vertices is not None and self.triangles is not None and len(self.triangles):
             self.surface = shaded_surface(self.vertices, self.triangles)
 
+    def with_text(self, text: str) -> Scene:
+        """The same mesh under other parameters."""
+        other = copy(self)
+        other.text = text
+        return other
+
     def size(self, body: BodySnapshot) -> float:
         """A length [m] that stands for the body: the diagonal of its box, or of the box of equal inertia."""
         if self.surface is not None:
@@ -51,6 +61,12 @@ class Scene:
             return None
         at = self.vertices * body.scale - body.center_of_mass
         return at[np.argmax(np.einsum("ij,ij->i", at, at))]
+
+    def view_size(self, body: BodySnapshot) -> float:
+        """The length [m] that the camera must keep in sight: bodies are shown around their COM, wherever it lies."""
+        tip = self.farthest_point(body)
+        reach = 0.0 if tip is None else float(np.linalg.norm(tip))
+        return max(self.size(body), VIEW_PER_REACH * reach)
 
 
 def drawn_mesh(surface: tuple[np.ndarray, np.ndarray, np.ndarray], colour: tuple[int, ...]) -> Any:
@@ -82,8 +98,8 @@ def send_scene(stream: Stream, scene: Scene) -> None:
     )
 
 
-def send_styles(stream: Stream, size: float, initial_view: str) -> None:
-    """Colours, names and thicknesses for a body of this size [m], and the layout."""
+def send_styles(stream: Stream, size: float, view_size: float, initial_view: str) -> None:
+    """Colours, names and thicknesses for a body of this size [m], and the layout with its camera."""
     for entity, series in e.SERIES.items():
         names, colours = zip(*series, strict=True)
         stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
@@ -95,6 +111,8 @@ def send_styles(stream: Stream, size: float, initial_view: str) -> None:
             arrow_colour = colour if part == "force" else e.TORQUE_COLOUR
             style = rr.Arrows3D.from_fields(colors=arrow_colour, radii=0.012 * size)
             stream.log_static(load_entity(kind, part), style)
+    stream.log_static(e.STRING, rr.LineStrips3D.from_fields(radii=0.0035 * size))
+    stream.log_static(e.HAND, rr.Points3D.from_fields(colors=e.STRING_COLOUR, radii=0.02 * size))
     _arrow_style(stream, e.ANGULAR_VELOCITY, e.OMEGA_COLOUR, 0.009 * size, "ω")
     _arrow_style(stream, e.MOMENTUM, e.MOMENTUM_COLOUR, 0.009 * size, "L")
     line = 0.0025 * size
@@ -107,7 +125,7 @@ def send_styles(stream: Stream, size: float, initial_view: str) -> None:
         e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=e.GREEN, line_radii=0.6 * line, fill_mode=wire)
     )
     _send_poinsot_styles(stream)
-    stream.send_blueprint(layout(size, initial_view))
+    stream.send_blueprint(layout(view_size, initial_view))
 
 
 def _send_poinsot_styles(stream: Stream) -> None:

@@ -100,7 +100,7 @@ class OneStep:
 
 
 class AdaptiveSteps:
-    """Steps as long as the error allows. kernel(y, p, control, following, span_ns) commits them; look(y, p, control, h)
+    """Steps as long as the error allows. kernel(y, p, control, following, span_ns) commits them; look(y, p, control, span_ns)
     takes one of a given length.
     """
 
@@ -132,7 +132,7 @@ class AdaptiveSteps:
         return int(advanced_ns), not self._control[ctl.FAILED]
 
     def look(self, y: np.ndarray, p: np.ndarray, rest_ns: int) -> bool:
-        return bool(self._look(y, p, self._control, rest_ns * 1e-9))
+        return bool(self._look(y, p, self._control, rest_ns))
 
     def cut(self) -> None:
         self._cuts += 1

@@ -17,6 +17,10 @@ from .error_measure import FLOOR, scales
 from .runge_kutta import is_good
 from .taylor import ROWS, series, sum_series
 
+PART = 0.5
+"""Of what is allowed, a remainder gets this part: the last coefficients are no bound on those to come. Measured over random
+scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed."""
+
 
 def degree_for(accuracy: float) -> int:
     """The degree at which work per time is smallest for this accuracy."""
@@ -40,14 +44,13 @@ def _growth(c, degree, weights):
 
 
 @njit(cache=True, error_model="numpy")
-def _step_length(growth, accuracy, degree):
-    """h with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor)."""
+def step_length(growth, accuracy, degree, part):
+    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``."""
     if growth == 0.0:
         return ctl.LONGEST
     x = 0.5
     for _ in range(3):
-        # Half of what is allowed: the last coefficients are no bound on those to come.
-        allowed = 0.5 * max(accuracy * x / growth, FLOOR) * (1.0 - x)
+        allowed = part * max(accuracy * x / growth, FLOOR) * (1.0 - x)
         x = min(math.exp(math.log(allowed) / (degree + 1)), 0.9)
     return min(x / growth, ctl.LONGEST)
 
@@ -62,7 +65,7 @@ def taylor_advance(y, p, control, following, span_ns):
         if control[ctl.ACCEPTED_NS] == 0.0:
             series(y, p, degree, c)
             growth = _growth(c, degree, scales(y, p, control[ctl.ELAPSED_NS] * 1e-9))
-            length_ns = math.floor(_step_length(growth, control[ctl.ACCURACY], degree) * 1e9)
+            length_ns = math.floor(step_length(growth, control[ctl.ACCURACY], degree, PART) * 1e9)
             if not length_ns >= 1.0:
                 control[ctl.FAILED] = 1.0
                 return advanced
@@ -84,10 +87,10 @@ def taylor_advance(y, p, control, following, span_ns):
 
 
 @njit(cache=True, error_model="numpy")
-def taylor_look(y, p, control, h):
-    """One step of h seconds in y; returns whether it was good."""
+def taylor_look(y, p, control, span_ns):
+    """One step of span_ns in y; returns whether it was good."""
     degree = int(control[ctl.DEGREE])
     c = np.zeros((ROWS, degree + 1))
     series(y, p, degree, c)
-    sum_series(c, p, degree, h, y)
+    sum_series(c, p, degree, span_ns * 1e-9, y)
     return is_good(y)
