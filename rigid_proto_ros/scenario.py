@@ -148,6 +148,7 @@ def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario
             bilateral=values["string.bilateral"],
             timeout_ns=nanoseconds(values["string.timeout"]),
         ),
+        accuracy=values["accuracy"],
         initial=state_row(values["initial.position"], quaternion, values["initial.linear_velocity"], omega_body),
     )
     return Scenario(values, body_mesh, setup, tuple(properties.warnings))
