@@ -15,7 +15,7 @@ from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.rerun_view import RerunObserver, ports, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.snapshot import DRIVERS, headless_viewer, show, complaints
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, complaints, headless_viewer, show
 
 WAIT_S = 30.0
 
