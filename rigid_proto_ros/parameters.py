@@ -173,6 +173,8 @@ _DECLARED = (
     Parameter("publish_clock", "bool", False, "Publish simulated time on /clock."),
     Parameter("publish_tf", "bool", False, "Publish the body's frame on /tf (where tf2_msgs is installed)."),
     Parameter("imu_contact", "string", "", "Contact at which ~/imu measures; empty means the centre of mass."),
+    Parameter("ghost.inertia_model", "string", "", "Show a ghost beside the body that gets the same commands under this inertia model.", choices=("", *INERTIA_MODELS)),
+    Parameter("ghost.integrator", "string", "", "Show a ghost that gets the same commands under this integrator.", choices=("", *INTEGRATORS)),
     Parameter("world_frame", "string", "world", "Name of the world frame in published messages.", changes=READ_ONLY),
     Parameter("body_frame", "string", "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY),
     Parameter("record", "string", "", "Record the session to this .rrd file; empty records nothing."),

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from ..core.observer import Observer
 from ..core.simulation import Simulation
 from ..core.state import State
+from ..ghost import Ghost, ghost_of
 from ..scenario import Scenario, publication_ns
 
 DRAIN_NS = 10_000_000
@@ -60,6 +61,7 @@ class Flight:
         on_failure: Callable[[str], None],
         followed_clock: Callable[[], int] | None = None,
         anybody_listens: Callable[[], bool] = lambda: True,
+        is_viewed: bool = False,
     ) -> None:
         self.scenario = scenario
         self.observer = observer
@@ -71,6 +73,8 @@ class Flight:
         self._followed_clock = followed_clock
         self._anybody_listens = anybody_listens
         self._listeners = True
+        self._is_viewed = is_viewed
+        self._ghost: Ghost | None = None
         self._lively = False
         self._publication = 0
         self._present_ns = 0
@@ -83,6 +87,10 @@ class Flight:
         rate_changed = scenario.values["publish_rate"] != self.scenario.values["publish_rate"]
         pace_changed = scenario.values["real_time_factor"] != self.scenario.values["real_time_factor"]
         self.scenario = scenario
+        if self._ghost is not None:
+            self._ghost.change(self.simulation.time_ns, scenario)
+        elif self._is_viewed and scenario.ghost is not None:
+            self._ghost = ghost_of(scenario, self.simulation, self.observer)
         if rate_changed:
             self._find_next_publication()
         if pace_changed:
@@ -93,6 +101,7 @@ class Flight:
         if paused != self.timekeeping.paused:
             self.timekeeping.paused = paused
             self.simulation.log("pause", {"data": paused})
+            self.simulation.tell_status(paused)
             self._anchor()
 
     def catch_up(self) -> None:
@@ -112,6 +121,8 @@ class Flight:
         """Time 0 and the initial state; paused or running stays."""
         # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
         self.simulation.reset(self.scenario.setup)
+        if self._ghost is not None:
+            self._ghost.reset(self.scenario)
         self._publication = 0
         self._anchor()
 
@@ -119,6 +130,8 @@ class Flight:
 
     def start(self) -> None:
         """Simulated time begins now."""
+        if self._is_viewed:
+            self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
         self._anchor()
 
     def tick(self) -> None:
@@ -181,6 +194,9 @@ class Flight:
             return False
         self._publication += 1
         self.observer.state(state.time_ns, state.row)
+        self.simulation.tell_status()
+        if self._ghost is not None:
+            self._ghost.advance(state.time_ns)
         self._publish(state)
         return True
 

@@ -64,6 +64,7 @@ class RigidBodyNode(Node):
             self._motion_failed,
             self._followed_clock(scenario),
             self._anybody_listens,
+            self._is_viewed,
         )
         self.intake = CommandIntake(
             self,
