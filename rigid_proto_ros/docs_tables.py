@@ -67,8 +67,11 @@ def integrators() -> str:
     for integrator in INTEGRATORS.values():
         lacks = [need for need in needs if need not in integrator.carries]
         order = "exact" if integrator.order is None else str(integrator.order)
-        cells = (_code(integrator.name), order, str(integrator.evaluations), "; ".join(lacks))
-        rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".")))
+        evaluations = str(integrator.evaluations)
+        if integrator.kernel is None:  # it picks others
+            order = evaluations = "-"
+        cells = (_code(integrator.name), order, evaluations, "; ".join(lacks))
+        rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".").replace("``", "`")))
     return _table(("name", "order", "evaluations a step", "can't carry", "good for, and what breaks it"), rows)
 
 
