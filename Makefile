@@ -32,7 +32,7 @@ lint: setup ## ruff and mypy
 	$(PY) -m mypy
 
 pictures: run ## fly, and draw the README's picture anew from the recording (needs mesa-vulkan-drivers)
-	.venv/bin/rigid_proto snapshot out/session.rrd --at 4 -o docs/flight.png
+	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
 	$(PY) -m colcon build --packages-select rigid_proto_ros

@@ -13,16 +13,18 @@ import rerun as rr
 from ..core.observer import BodySnapshot
 from . import entities as e
 from .arrows import ArrowScale, arrow_length
-from .columns import Ticks, scalar_columns, time_columns
+from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .lanes import Lanes
+from .layout import layout
 from .load_arrows import LoadArrows
 from .mailbox import Block, Mark
 from .plots import Plots
 from .poinsot_picture import PoinsotPicture
-from .statics import TRAIL_RADIUS, Scene, drawn_mesh, send_body, send_scene, send_styles
+from .statics import TRAIL_RADIUS, Scene, drawn_mesh, hide_mesh, send_body, send_mesh, send_scene, send_styles
 from .streams import Stream
+from .string_picture import StringPicture
 from .trail import Trail
 from .words import Words
 
@@ -49,14 +51,19 @@ class SceneWriter:
         self._scene: Scene | None = None
         self._body: BodySnapshot | None = None
         self._ghost_body: BodySnapshot | None = None
+        self._scene_in_force = ""
         self.restart()
 
     # What holds for a whole run
 
     def restart(self) -> None:
-        """A new run: simulated time starts again at 0; scene, mesh and body stay."""
+        """A new run: simulated time starts again at 0; the parameters in force, mesh and body stay."""
+        if self._scene is not None and self._scene_in_force:
+            self._scene = self._scene.with_text(self._scene_in_force)
         self.moved = False
         self._last_time_ns = 0
+        self._mesh_number = 0
+        self._began_wall_ns = time.time_ns()
         self._ticks = Ticks(PICTURE_RATE)
         self._trail = Trail()
         self._plots = Plots()
@@ -64,6 +71,7 @@ class SceneWriter:
         self._loads = LoadArrows()
         self._ghost = Ghost()
         self._words = Words()
+        self._string = StringPicture()
         self._lanes = Lanes()
         self._load_changes: list[tuple[int, bool]] = []
         self._acted = self._touched = False
@@ -74,12 +82,12 @@ class SceneWriter:
         """Send a stream what holds at all times, and the body as it is now; then it gets whatever follows."""
         self.streams.append(stream)
         if self._scene is not None:
-            send_scene(stream, self._scene)
+            send_scene(stream, self._scene, self._mesh_number)
         if self._body is None:
             return
         now, wall = self._last_time_ns, time.time_ns()
-        send_styles(stream, self._size, self._initial_view)
-        send_body(stream, now, wall, self._body, self._scene)
+        self._send_styles(stream)
+        send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
             self._send_ghost_mesh(stream)
@@ -96,7 +104,7 @@ class SceneWriter:
         self._skip_live = skip_live
         sent = shown = 0
         for mark in block.marks:
-            self._loads.rows(block, shown, mark.after_rows)
+            self._show_loads(block, shown, mark.after_rows)
             shown = mark.after_rows
             self._note_time(mark.time_ns)
             handler = _ALONG_WITH_ROWS.get(mark.kind)
@@ -110,12 +118,16 @@ class SceneWriter:
                 handler(self, mark)
             else:
                 on_mark(mark)
-        self._loads.rows(block, shown, block.count)
+        self._show_loads(block, shown, block.count)
         self._send_upto(block, sent, block.count)
 
     def write_ghost(self, block: Block, begin: int, end: int) -> None:
         """Send states begin..end of the ghost, after the body's of the same times."""
         self._ghost.rows(block, begin, end, self._send_rows)
+
+    def _show_loads(self, block: Block, begin: int, end: int) -> None:
+        self._loads.rows(block, begin, end)
+        self._string.rows(block, begin, end)
 
     def _note_time(self, time_ns: int) -> None:
         self.moved = self.moved or time_ns > 0
@@ -124,6 +136,7 @@ class SceneWriter:
     def _send_upto(self, block: Block, begin: int, end: int) -> None:
         self._write_rows(block, begin, end)
         self._loads.send(self._send)
+        self._string.send(self._send)
         self._words.send(self._send)
         self._lanes.send(self._send)
 
@@ -139,8 +152,19 @@ class SceneWriter:
 
     def _loads_changed(self, mark: Mark) -> None:
         kinds = self._loads.kinds_acting
-        self._load_changes.append((mark.after_rows, bool(kinds)))
+        self._load_changes.append((mark.after_rows, bool(kinds) or self._string.tied))
         self._lane(mark, "loads", " + ".join(kinds) or "none")
+
+    def _string_changed(self, mark: Mark) -> None:
+        (string,) = mark.content
+        self._string.change(mark.time_ns, mark.wall_ns, string)
+        self._load_changes.append((mark.after_rows, bool(self._loads.kinds_acting) or string is not None))
+
+    def _scene_changed(self, mark: Mark) -> None:
+        (self._scene_in_force,) = mark.content
+        if self._scene is None or self._scene_in_force != self._scene.text:
+            document = rr.TextDocument.columns(text=[self._scene_in_force], media_type=["text/plain"])
+            self._send(e.SCENE_IN_FORCE, one_time(mark.time_ns, mark.wall_ns), document)
 
     def _status(self, mark: Mark) -> None:
         self._lane(mark, *mark.content)
@@ -159,8 +183,16 @@ class SceneWriter:
     def _started(self, mark: Mark) -> None:
         self._scene = Scene(*mark.content)
         for stream in self.streams:
-            send_scene(stream, self._scene)
+            send_scene(stream, self._scene, self._mesh_number)
         self._tell_body()
+
+    def _mesh_changed(self, mark: Mark) -> None:
+        self._scene = (self._scene or Scene("", None, None, "")).with_mesh(*mark.content)
+        before, self._mesh_number = self._mesh_number, self._mesh_number + 1
+        for stream in self.streams:
+            hide_mesh(stream, mark.time_ns, mark.wall_ns, before)
+            hide_mesh(stream, 0, self._began_wall_ns, self._mesh_number)
+            send_mesh(stream, self._scene, self._mesh_number)
 
     def _body_changed(self, mark: Mark) -> None:
         before = self._size if self._body is not None else None
@@ -168,8 +200,8 @@ class SceneWriter:
         self._tell_body()
         for stream in self.streams:
             if self._size != before:
-                send_styles(stream, self._size, self._initial_view)
-            send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene)
+                self._send_styles(stream)
+            send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
         if before is None:
@@ -181,6 +213,7 @@ class SceneWriter:
         if self._body is None:
             return
         self._size = self._scene.size(self._body) if self._scene is not None else 1.0
+        self._view_size = self._scene.view_size(self._body) if self._scene is not None else self._size
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
 
@@ -189,7 +222,13 @@ class SceneWriter:
         (self._ghost_body,) = mark.content
         for stream in self.streams if first else ():
             self._send_ghost_mesh(stream)
+            if self._body is not None:
+                self._send_styles(stream)
         self._ghost.change(mark.time_ns, mark.wall_ns, self._ghost_body, self._send)
+
+    def _send_styles(self, stream: Stream) -> None:
+        send_styles(stream, self._size)
+        stream.send_blueprint(layout(self._view_size, self._initial_view, self._ghost_body is not None))
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None:
@@ -281,12 +320,15 @@ def _drawn(vectors: np.ndarray, reference: float, size: float) -> np.ndarray:
 _ALONG_WITH_ROWS = {
     "load_began": SceneWriter._load_began,
     "load_ended": SceneWriter._load_ended,
+    "string_changed": SceneWriter._string_changed,
+    "scene_changed": SceneWriter._scene_changed,
     "status": SceneWriter._status,
     "event": SceneWriter._event,
     "refused": SceneWriter._refused,
 }
 _BETWEEN_ROWS = {
     "started": SceneWriter._started,
+    "mesh_changed": SceneWriter._mesh_changed,
     "body_changed": SceneWriter._body_changed,
     "ghost_began": SceneWriter._ghost_began,
 }

@@ -6,11 +6,11 @@
 | nothing moves, nothing pulls | none: the body sleeps |
 | no spin, no torque | closed form |
 | spin, no torque, no force that turns along | one exact step, however long |
-| a body-axes wrench, damping | Taylor series, steps from their coefficients |
-| loads that depend on the attitude, a string | DOP853, steps from its error estimate |
+| a body-axes wrench, damping | Taylor series of the spin and what it carries along |
+| loads that depend on the attitude, a string | Taylor series of the whole motion |
 | a string too stiff to resolve | discrete_gradient at the fixed step, accuracy not met and said so |
 
-The choice is a function of the segment's problem and start; steps are functions of what they start from.
+Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's problem and start; steps are functions of what they start from.
 """
 
 from __future__ import annotations
@@ -42,15 +42,14 @@ from ..problem import (
 from ..rotation import multiply, normalize, rotate
 from . import control as ctl
 from .discrete_gradient import DISCRETE_GRADIENT
-from .dop853 import DOP853
-from .dop853_adaptive import dop853_advance, first_trial
 from .equations import stretch
 from .exponential import exponential
 from .free_body import free_body_steps
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
+from .series_steps import series_steps
 from .stepping import AdaptiveSteps, FixedSteps, OneStep, Stepper
-from .taylor_adaptive import degree_for, taylor_advance, taylor_look
+from .taylor_adaptive import degree_for, taylor_adaptive_steps
 
 FASTEST_STRING = 1e6
 """rad/s; above it resolving the string's swing would take millions of steps a second."""
@@ -95,12 +94,15 @@ def _choose(integrator: Integrator, p: np.ndarray, y: np.ndarray, step_ns: int, 
             return OneStep("auto: closed form, nothing changes the spin", steady_steps, 1)
         if not p[TRANSLATES]:
             return OneStep("auto: free_body, one exact step without torque", free_body_steps, 1)
-    if not p[HAS_WORLD_TORQUE]:
-        degree = degree_for(accuracy)
-        control = ctl.new_control(accuracy, degree=degree)
-        choice = f"auto: taylor of degree {degree}, the loads turn with the body"
-        return AdaptiveSteps(choice, control, taylor_advance, taylor_look, 1)
-    return _resolved("auto: dop853, loads that depend on the attitude", p, y, accuracy, 0.0)
+    if p[HAS_WORLD_TORQUE]:
+        return _series("loads that depend on the attitude", accuracy, series_steps)
+    return _series("the loads turn with the body", accuracy, taylor_adaptive_steps)
+
+
+def _series(why: str, accuracy: float, kernel) -> Stepper:
+    degree = degree_for(accuracy)
+    control = ctl.new_control(accuracy, degree)
+    return AdaptiveSteps(f"auto: taylor of degree {degree}, {why}", control, kernel, 1)
 
 
 def _choose_for_string(p, y, turns: bool, step_ns: int, accuracy: float) -> Stepper:
@@ -117,17 +119,7 @@ def _choose_for_string(p, y, turns: bool, step_ns: int, accuracy: float) -> Step
         stepper.choice = f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
         stepper.floor_binds = True
         return stepper
-    return _resolved(f"auto: dop853, a string of up to {fastest:.3g} rad/s", p, y, accuracy, fastest)
-
-
-def _resolved(choice: str, p, y, accuracy: float, string_frequency: float) -> Stepper:
-    first = first_trial(y, p, accuracy, string_frequency)
-    kernel = DOP853.kernel_for(p)
-
-    def look(y, p, control, h) -> bool:
-        return kernel(y, p, h, 1) == 1
-
-    return AdaptiveSteps(choice, ctl.new_control(accuracy, first), dop853_advance, look, DOP853.evaluations)
+    return _series(f"a string of up to {fastest:.3g} rad/s", accuracy, series_steps)
 
 
 AUTO = Integrator(

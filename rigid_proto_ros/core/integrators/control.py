@@ -11,25 +11,24 @@ import numpy as np
 from numba import njit
 
 ACCURACY = 0  # local error rate asked for [1/s]
-NEXT_S = 1  # length of the next trial [s]
+DEGREE = 1  # of the series
 ACCEPTED_NS = 2  # length of the step that waits for its commitment; 0 for none
 ELAPSED_NS = 3  # committed since the segment's start
 STEPS = 4  # committed
-EVALUATIONS = 5  # in committed steps, rejected trials included
+EVALUATIONS = 5  # in committed steps, one for each series
 PENDING = 6  # evaluations spent on the step that waits
 FLOOR_BINDS = 7  # 1 once rounding, not the accuracy, set the allowance of a step
-FAILED = 8  # 1 when no step was short enough, or the motion ran away
-DEGREE = 9  # of a Taylor series
-SIZE = 10
+FAILED = 8  # 1 when a nanosecond would be too long a step, or the motion ran away
+SIZE = 9
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
 
 
-def new_control(accuracy: float, first_s: float = 0.0, degree: int = 0) -> np.ndarray:
+def new_control(accuracy: float, degree: int) -> np.ndarray:
     """The array at a segment's start."""
     control = np.zeros(SIZE)
-    control[ACCURACY], control[NEXT_S], control[DEGREE] = accuracy, first_s, degree
+    control[ACCURACY], control[DEGREE] = accuracy, degree
     return control
 
 

@@ -23,6 +23,7 @@ from ..problem import (
     REFERENCE_VELOCITY,
     REST_LENGTH,
     STIFFNESS,
+    STRING_DAMPING,
     TRANSLATES,
 )
 
@@ -58,11 +59,39 @@ def size(e, attitude, spin, place, speed):
 
 
 @njit(cache=True, error_model="numpy")
-def jerk_of_rounding(p, spin, speed):
-    """Error rate [1/s] that one rounding of the knot's place causes through the string; times h it is a floor too."""
-    if p[HAS_STRING] == 0.0:
-        return 0.0
+def _response(p, spin, speed):
+    """What a force at the knot does to the measured velocities, per newton and second."""
     A = ATTACH
     arm = math.sqrt(p[A] * p[A] + p[A + 1] * p[A + 1] + p[A + 2] * p[A + 2])
-    force = p[STIFFNESS] * (arm + p[REST_LENGTH])
-    return FLOOR * force * max(speed / p[MASS], spin * arm / p[MOMENTS])
+    return max(speed / p[MASS], spin * arm / p[MOMENTS])
+
+
+@njit(cache=True, error_model="numpy")
+def _rounding_of_place(p):
+    A = ATTACH
+    arm = math.sqrt(p[A] * p[A] + p[A + 1] * p[A + 1] + p[A + 2] * p[A + 2])
+    return FLOOR * (arm + p[REST_LENGTH])
+
+
+@njit(cache=True, error_model="numpy")
+def jerk_of_rounding(p, spin, speed):
+    """Error rate [1/s] that one rounding of the knot's place causes through the spring; times h it is a floor too."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    return p[STIFFNESS] * _rounding_of_place(p) * _response(p, spin, speed)
+
+
+@njit(cache=True, error_model="numpy")
+def jump_of_rounding(p, spin, speed):
+    """Error that one rounding of the knot's place causes when a damped string jerks taut that much too early or late."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    return p[STRING_DAMPING] * _rounding_of_place(p) * _response(p, spin, speed)
+
+
+@njit(cache=True, error_model="numpy")
+def jump_of_displacement(p, spin, speed):
+    """The same for a displacement of one unit of the measure."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    return p[STRING_DAMPING] * p[LENGTH] * _response(p, spin, speed)

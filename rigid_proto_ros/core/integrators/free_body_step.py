@@ -67,6 +67,9 @@ def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
     _, f = math.frexp(i3)
     wx, wy, wz, h = math.ldexp(wx, -e), math.ldexp(wy, -e), math.ldexp(wz, -e), math.ldexp(h, e)
     i1, i2, i3 = math.ldexp(i1, -f), math.ldexp(i2, -f), math.ldexp(i3, -f)
+    if not math.isfinite(wx + wy + wz + h):
+        # A runaway of the scheme around it; the iterations below would never end.
+        return math.nan, math.nan, math.nan, math.nan, wx, wy, wz
     wx = 0.0 if abs(wx) < NO_SPIN else wx
     wy = 0.0 if abs(wy) < NO_SPIN else wy
     wz = 0.0 if abs(wz) < NO_SPIN else wz

@@ -85,7 +85,7 @@ def judge(s, trial, p):
         s[_EDGE] = 0.0
         return False
     if phase == _WHOLE and right:
-        hidden = _extremum(s[_X], s[_RATE], x, rate, s[TRIAL], s[TAUT] != 0.0)
+        hidden = extremum(s[_X], s[_RATE], x, rate, s[TRIAL], s[TAUT] != 0.0)
         if hidden <= 0.0:
             return _accept(s, trial, p, x, rate, margin, False)
         s[_PHASE] = _PEEK
@@ -147,7 +147,7 @@ def _accept(s, trial, p, x, rate, margin, switches):
 
 
 @njit(cache=True, error_model="numpy")
-def _extremum(x0, rate0, x1, rate1, h, taut):
+def extremum(x0, rate0, x1, rate1, h, taut):
     """Time in (0, h) at which the cubic through both ends dips below zero (taut) or rises above it (slack); else 0."""
     sign = -1.0 if taut else 1.0
     if not (sign * rate0 > 0.0 and sign * rate1 < 0.0):
