@@ -154,7 +154,7 @@ class RosClient(Process):
         return self.set_named({n.replace("__", "."): v for n, v in values.items()}, atomically)
 
     def set_named(self, values: dict, atomically: bool = False) -> list:
-        pairs = [[n, [float(x) for x in v] if isinstance(v, (list, tuple)) else v] for n, v in values.items()]
+        pairs = [[name, _doubles(value)] for name, value in values.items()]
         return self.do("set_parameters", node=self.node, values=pairs, atomically=atomically)
 
     def get(self, *names: str) -> dict:
@@ -216,6 +216,12 @@ class RosClient(Process):
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+
+
+def _doubles(value):
+    """Lists of numbers as lists of doubles: rclpy takes no mixed ones."""
+    numbers = isinstance(value, (list, tuple)) and all(type(x) in (int, float) for x in value)
+    return [float(x) for x in value] if numbers else value
 
 
 def _text(value) -> str:

@@ -91,7 +91,8 @@ class Client:
         messages = self.received.setdefault(topic, [])
         subscription = self.node.create_subscription(TYPES[type], topic, messages.append, profile(**qos))
         if wait:
-            _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}")
+            # A first start compiles its kernels.
+            _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}", 300.0)
 
     def heard(self, topic, clear=False, last=0, stamp=None):
         """What has come on a topic; only the ``last`` ones, or those with this stamp [ns], if that is given."""
@@ -191,7 +192,7 @@ class Client:
         return found
 
 
-def _until(condition, what, timeout=30.0):
+def _until(condition, what, timeout=60.0):
     deadline = time.monotonic() + timeout
     while not condition():
         if time.monotonic() > deadline:

@@ -15,7 +15,6 @@ import yaml
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from .. import cdr
@@ -25,7 +24,7 @@ from ..core.frames import parse_frame
 from ..poke_script import MAX_TIME_S, MESH_FRAME, core_command, parse_script, string_attach, string_target
 from ..scenario import check_inertia, nanoseconds
 from . import qos
-from .message_bytes import read_wrench_stamped
+from .message_bytes import read_message, read_wrench_stamped
 from .stamps import effective_time
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
@@ -159,10 +158,7 @@ class CommandIntake:
         self._submit_wrench(False, data, simulation, scenario)
 
     def _submit_wrench(self, held: bool, data: bytes, simulation, scenario) -> None:
-        try:
-            stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
-        except UnicodeDecodeError:
-            raise CommandRefused("frame", "frame_id", "bytes that aren't UTF-8", "text") from None
+        stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
         frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
@@ -179,7 +175,7 @@ class CommandIntake:
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
     def _inertia(self, data: bytes, simulation, scenario) -> None:
-        message = deserialize_message(data, InertiaStamped)
+        message = read_message(data, InertiaStamped)
         stamp, given = message.header.stamp, message.inertia
         stamp_ns, frame_id = stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id
         body = self._frames[1]
@@ -198,7 +194,7 @@ class CommandIntake:
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
     def _schedule(self, data, simulation, scenario) -> None:
-        text = deserialize_message(data, String).data
+        text = read_message(data, String).data
         if len(text) > MAX_SCHEDULE_LENGTH:
             raise CommandRefused("schedule", "schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
         try:
@@ -230,6 +226,6 @@ class CommandIntake:
 
 
 def _read_point_stamped(data: bytes) -> tuple[int, str, tuple[float, float, float]]:
-    message = deserialize_message(data, PointStamped)
+    message = read_message(data, PointStamped)
     stamp, point = message.header.stamp, message.point
     return stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id, (point.x, point.y, point.z)
