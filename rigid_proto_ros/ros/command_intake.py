@@ -21,10 +21,10 @@ from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
 from ..core.frames import parse_frame
-from ..poke_script import MAX_TIME_S, MESH_FRAME, core_command, parse_script, string_attach, string_target
+from ..poke_script import MESH_FRAME, core_command, parse_script, string_attach, string_target
 from ..scenario import check_inertia, nanoseconds
 from . import qos
-from .message_bytes import read_message, read_wrench_stamped
+from .message_bytes import read_message, read_wrench_stamped, whole_stamp
 from .stamps import effective_time
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
@@ -36,8 +36,11 @@ QUIET_NS = 4_000_000
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
 
-MAX_SCHEDULE_LENGTH = 100_000
+MAX_SCHEDULE_LENGTH = 10_000
 """Characters of one schedule entry."""
+
+MAX_BRACKETS = 100
+"""Lists and mappings opened in one: the YAML reader takes seconds over thousands, and the body would wait for it."""
 
 
 class _TakenByHand(CallbackGroup):
@@ -177,7 +180,7 @@ class CommandIntake:
     def _inertia(self, data: bytes, simulation, scenario) -> None:
         message = read_message(data, InertiaStamped)
         stamp, given = message.header.stamp, message.inertia
-        stamp_ns, frame_id = stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id
+        stamp_ns, frame_id = whole_stamp(stamp.sec, stamp.nanosec), message.header.frame_id
         body = self._frames[1]
         if frame_id not in ("", "body", body, MESH_FRAME, f"{body}/mesh"):
             raise CommandRefused("frame", "frame_id", frame_id[:80], f"{body}/mesh, or {body} (from the present COM)")
@@ -197,13 +200,15 @@ class CommandIntake:
         text = read_message(data, String).data
         if len(text) > MAX_SCHEDULE_LENGTH:
             raise CommandRefused("schedule", "schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
+        if text.count("[") + text.count("{") > MAX_BRACKETS:
+            raise CommandRefused("schedule", "schedule", text[:80], f"at most {MAX_BRACKETS} opening brackets")
         try:
             entry = yaml.safe_load(text)
             (command,) = parse_script(yaml.safe_dump([entry]), "schedule") if isinstance(entry, dict) else (None,)
             if command is None or command.topic != "schedule":
                 accepted = "one entry {t, set}, {t, string: release} or {t, service: clear_wrench}"
                 raise InputError("schedule", text[:80], accepted)
-            stamp_ns = nanoseconds(min(float(entry["t"]), MAX_TIME_S))
+            stamp_ns = command.t_ns
             if command.kind == "set":
                 scenario.with_changes(command.changes)
         except CommandRefused:
@@ -228,4 +233,4 @@ class CommandIntake:
 def _read_point_stamped(data: bytes) -> tuple[int, str, tuple[float, float, float]]:
     message = read_message(data, PointStamped)
     stamp, point = message.header.stamp, message.point
-    return stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id, (point.x, point.y, point.z)
+    return whole_stamp(stamp.sec, stamp.nanosec), message.header.frame_id, (point.x, point.y, point.z)

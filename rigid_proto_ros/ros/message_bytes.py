@@ -30,11 +30,11 @@ def read_wrench_stamped(data: bytes) -> tuple[int, str, tuple, tuple]:
                 frame_id = data[16 : end - 1].decode()
             except UnicodeDecodeError:
                 raise CommandRefused("frame", "frame_id", "bytes that aren't UTF-8", "text") from None
-            return seconds * 1_000_000_000 + nanoseconds, frame_id, values[:3], values[3:]
+            return whole_stamp(seconds, nanoseconds), frame_id, values[:3], values[3:]
     message = read_message(data, WrenchStamped)
     stamp, wrench = message.header.stamp, message.wrench
     return (
-        stamp.sec * 1_000_000_000 + stamp.nanosec,
+        whole_stamp(stamp.sec, stamp.nanosec),
         message.header.frame_id,
         (wrench.force.x, wrench.force.y, wrench.force.z),
         (wrench.torque.x, wrench.torque.y, wrench.torque.z),
@@ -48,3 +48,10 @@ def read_message(data: bytes, message_type):
     except Exception:  # rclpy's own error types differ between versions and middlewares
         accepted = f"a serialized {message_type.__name__}"
         raise CommandRefused("frame", "message", f"{len(data)} bytes that are none", accepted) from None
+
+
+def whole_stamp(seconds: int, nanoseconds: int) -> int:
+    """A stamp [ns]; raises CommandRefused (``stamp``) unless the nanoseconds are less than a second."""
+    if nanoseconds >= 1_000_000_000:
+        raise CommandRefused("stamp", "header.stamp", f"{nanoseconds} nanosec", "nanosec below 1000000000")
+    return seconds * 1_000_000_000 + nanoseconds
