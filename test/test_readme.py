@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -32,7 +33,7 @@ DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if READ
 OWN = ("rigid_proto", "poke_client")
 # Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
 NOT_RUN = {"sudo", "source", "cd", "rosdep", "colcon", "pip", "git", "ros2", "python", "rerun", "rigid_body_node"}
-STAYS_UP = ("rigid_proto up",)
+STAYS_UP = ("rigid_proto up", "rigid_body_node --bodies")
 
 
 def blocks(path: Path, *languages: str) -> list[str]:
@@ -104,6 +105,34 @@ def test_rigid_proto_commands_run(in_a_copy: Path, capsys: pytest.CaptureFixture
         if words(command)[1] == "snapshot" and not os.path.isdir("/usr/share/vulkan/icd.d"):
             continue  # the snapshot's own test says what is missing
         assert rigid_proto(words(command)[1:]) == 0, (command, capsys.readouterr().err)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith(STAYS_UP)])
+def test_command_that_stays_up_gets_ready_and_ends_cleanly(command: str, ros_environment: dict[str, str]) -> None:
+    pytest.importorskip("rclpy")
+    module = {"rigid_proto": "rigid_proto_ros.cli.main", "rigid_body_node": "rigid_proto_ros.ros.main"}
+    program, *arguments = words(command)
+    if program == "rigid_proto":
+        arguments += ["--viewer", "none"]  # the last one counts: no window, no port
+    process = subprocess.Popen(
+        [sys.executable, "-m", module[program], *arguments],
+        env=ros_environment,
+        cwd=SOURCE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        # Ends with the process, which the suite's own timeout would end too.
+        ready = any("is flying" in line for line in process.stderr)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10.0) == 0
+        assert ready
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.parametrize("command", of("poke_client"))
