@@ -274,6 +274,21 @@ def test_picture_is_there_and_small() -> None:
     assert 20_000 < picture.stat().st_size < 300_000
 
 
+def test_frames_of_the_readme_are_read_and_are_what_it_says() -> None:
+    from rigid_proto_ros.core.frames import parse_frame
+
+    text = README.read_text("utf-8")
+    section = text[text.index("### Frames and units") : text.index("## Is it right?")]
+    rows = [line.split("|")[2] for line in section.splitlines() if line.startswith("| a ")]
+    frames = [code for row in rows for code in re.findall(r"`([^`]+)`", row) if code != "force.x"]
+    assert len(frames) >= 10
+    for frame in frames:
+        parse_frame(frame, {"tip"})
+    # What stands alone means what stands before it.
+    for short, whole in (("world", "world@com"), ("", "world@com"), ("body", "body@com"), ("tip", "body@tip")):
+        assert parse_frame(short, {"tip"}) == parse_frame(whole, {"tip"})
+
+
 def test_tables_are_the_codes(capsys: pytest.CaptureFixture) -> None:
     assert docs_tables.main(["--check"]) == 0, capsys.readouterr().err
     text = README.read_text("utf-8")
