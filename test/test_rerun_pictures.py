@@ -282,6 +282,23 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
         assert np.isclose(length, max(0.4, 0.4 + stretch[k]), rtol=5e-3)
 
 
+def test_effort_is_plotted_as_a_rate_since_it_was_told_before(tmp_path):
+    path = tmp_path / "effort.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, flight.rows(10))
+    for time_ns, steps in ((0, 0), (50_000_000, 50), (100_000_000, 50), (100_000_000, 51)):
+        observer.effort(time_ns, steps, 4 * steps)
+    observer.reset()
+    observer.effort(0, 0, 0)
+    observer.effort(50_000_000, 5, 20)
+    observer.close()
+    assert cells(tmp_path / "effort.run1.rrd", e.EFFORT, "Scalars:scalars") == (
+        [50_000_000, 100_000_000],
+        [[1000.0, 4000.0], [0.0, 0.0]],
+    )
+    assert cells(path, e.EFFORT, "Scalars:scalars") == ([50_000_000], [[100.0, 400.0]])
+
+
 def test_the_next_run_starts_from_the_parameters_then_in_force(tmp_path):
     path = tmp_path / "scene.rrd"
     rows = flight.rows(20)

@@ -52,6 +52,7 @@ ANGULAR_MOMENTUM = "plots/angular_momentum"
 ANGULAR_MOMENTUM_ANGLE = "plots/angular_momentum_angle"
 ANGULAR_VELOCITY_BODY = "plots/angular_velocity_body"
 DRIFT = "plots/drift"
+EFFORT = "plots/effort"
 GHOST_ANGLE = "plots/ghost_angle"
 
 STATUS = "status"
@@ -85,6 +86,7 @@ SERIES = {
     ANGULAR_MOMENTUM: (("Lx", RED), ("Ly", GREEN), ("Lz", BLUE), ("|L|", GREY)),
     ANGULAR_MOMENTUM_ANGLE: (("angle of L to its start", VIOLET),),
     DRIFT: (("energy, relative", ORANGE), ("L as a vector, relative", VIOLET)),
+    EFFORT: (("steps", BLUE), ("force evaluations", ORANGE)),
     STRING_TENSION: (("string", ORANGE),),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
     ANGULAR_VELOCITY_BODY: (("ω1", RED), ("ω2", GREEN), ("ω3", BLUE)),

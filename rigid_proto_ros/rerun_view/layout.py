@@ -68,6 +68,7 @@ def debugging(size: float) -> Any:
             plot(e.DRIFT, "Drift since the last command"),
             plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]"),
             plot(e.STRING_TENSION, "Tension of the string [N]"),
+            plot(e.EFFORT, "Effort per simulated second"),
             grid_columns=2,
         ),
         name="Debugging",
