@@ -274,6 +274,8 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
     _, tensions = cells(path, e.STRING_TENSION, "Scalars:scalars")
     stretch = 0.8 - 0.1 - rows[:50, 2] - 0.4
     assert np.allclose(np.ravel(tensions)[:50], np.maximum(50.0 * stretch, 0.0), atol=1e-12)
+    _, energies = cells(path, e.STRING_ENERGY, "Scalars:scalars")
+    assert np.allclose(np.ravel(energies)[:50], 25.0 * np.maximum(stretch, 0.0) ** 2, atol=1e-12)
     for k in range(50):
         points = np.array(strips[k][0])
         assert np.allclose(points[0], hand, atol=1e-6) and np.allclose(points[-1], rows[k, 0:3] + knot, atol=1e-6)

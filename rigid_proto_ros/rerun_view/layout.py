@@ -58,7 +58,7 @@ def debugging(size: float) -> Any:
                 command_view(),
                 rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
             ),
-            row_shares=[3, 1, 1],
+            row_shares=[5, 3, 2],
         ),
         rrb.Grid(
             plot(e.ENERGY, "Energy [J]"),
