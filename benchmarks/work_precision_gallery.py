@@ -29,7 +29,7 @@ from rigid_proto_ros.core.body import make_body
 from rigid_proto_ros.core.mass_properties import MeshMoments
 from rigid_proto_ros.mesh_io import load_mesh
 
-DURATION, SAMPLES = 20.0, 400
+DURATION, SAMPLES = 20.0, 160
 SPIN = 10.0
 """rad/s beside the middle axis, where the handle flips."""
 DEFAULT_STEPS = {"mujoco": 2e-3, "bullet": 1.0 / 240.0}
