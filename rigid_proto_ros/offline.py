@@ -92,6 +92,8 @@ class OfflineRun:
 
     def _apply_changes(self, changes: dict):
         self.scenario = self.scenario.with_changes(changes)
+        if self.observer is not None:
+            self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
         return self.scenario.setup
 
     def advance(self, until_ns: int) -> bool:
