@@ -19,7 +19,7 @@ from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.inertia_tensor import check_tensor, six_from_tensor
 from rigid_proto_ros.core.mass_properties import MassProperties
 from rigid_proto_ros.core.mesh_topology_hull import convex_hull
-from rigid_proto_ros.core.moments import solid_moments
+from rigid_proto_ros.core.moments import referenced_vertices, solid_moments
 from rigid_proto_ros.inertia_robot import LinkInertial, MeshUse, read_robot
 from rigid_proto_ros.mesh_body import MeshBody, mesh_body
 from rigid_proto_ros.mesh_io import load_mesh
@@ -96,7 +96,7 @@ def _difference(given: np.ndarray, expected: np.ndarray) -> float:
 
 def _hull_properties(body: MeshBody, scale: np.ndarray, mass: float) -> MassProperties | None:
     """The convex hull as a solid of ``mass``, in mesh axes; None when it has no volume."""
-    points = body.vertices[np.unique(body.triangles)] * scale
+    points = referenced_vertices(body.vertices, body.moments.triangles) * scale
     try:
         hull = solid_moments(points, convex_hull(points))
     except InputError:
@@ -215,7 +215,7 @@ def explain_center(
     given: np.ndarray, use: MeshUse, body: MeshBody, truth: MassProperties, mass: float
 ) -> tuple[str, ...]:
     """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
-    points = body.vertices[np.unique(body.triangles)] * use.scale
+    points = referenced_vertices(body.vertices, body.moments.triangles) * use.scale
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     com = truth.center_of_mass
     bare = use.rotation.T @ (com - use.position)
@@ -275,7 +275,7 @@ def diagnose(
         wanted = body.moments.body_mass(scale=use.scale, mass=mass, density=density) if mass or density else None
     except InputError as error:
         return LinkDiagnosis(*unknown, None, str(error))
-    points = body.vertices[np.unique(body.triangles)] * use.scale
+    points = referenced_vertices(body.vertices, body.moments.triangles) * use.scale
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     center_error = float(np.max(np.abs(link.center_of_mass - truth.center_of_mass))) / diagonal
     inertia_error = _difference(link.inertia, truth.inertia)

@@ -13,6 +13,7 @@ from rigid_proto_ros.core.exact_moments import exact_solid_moments, relative_err
 from rigid_proto_ros.core.inertia_tensor import degenerate_pairs, equimomental_shapes, principal_axes
 from rigid_proto_ros.core.mass_properties import INERTIA_MODELS, MassProperties, scale_vector
 from rigid_proto_ros.core.mesh_topology_verdict import WARNING, Finding, unit_suspicion
+from rigid_proto_ros.core.moments import referenced_vertices
 from rigid_proto_ros.mesh_body import MeshBody
 
 MODELS = tuple(model for model in INERTIA_MODELS if model != "explicit")
@@ -56,7 +57,7 @@ def inspect_mesh(
         refusal = InputError(body.mesh.name, body.verdict.reason, "finite vertices that span a body")
         return Inspection(body, s, model, {}, findings, refusal, None, None, None, None, None)
     moments = body.moments
-    points = body.vertices[np.unique(body.triangles)] * s
+    points = referenced_vertices(body.vertices, body.moments.triangles) * s
     lower, upper = points.min(axis=0), points.max(axis=0)
     suspicion = unit_suspicion(float(np.max(upper - lower)))
     if suspicion:
@@ -132,7 +133,7 @@ def verify(body: MeshBody, scale: np.ndarray, progress: Callable[[int, int], Non
     vertices, triangles = moments.stand_in or (moments.vertices, moments.triangles)
     exact = exact_solid_moments(vertices, triangles, progress).outward().scaled(scale)
     unit = moments.mass_properties("solid", scale=scale, density=1.0)
-    points = vertices[np.unique(triangles)] * scale
+    points = referenced_vertices(vertices, triangles) * scale
     diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     volume = moments.moments("solid").measure * float(np.prod(np.abs(scale)))
     return relative_errors(exact, volume, unit.center_of_mass, unit.inertia, diagonal)

@@ -35,7 +35,11 @@ def read_scene(
 
     An unknown name in a section for this node raises InputError; in ``/**`` it is warned of.
     """
-    path = scene_file(name)
+    return make_scenario({**scene_values(scene_file(name), warn), **(settings or {})})
+
+
+def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, object]:
+    """The parameters that a scene file gives this node; unknown names as ``read_scene`` has it."""
     scene = read_scene_file(path)
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
@@ -47,7 +51,7 @@ def read_scene(
             warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
             continue
         values[parameter] = value
-    return make_scenario({**values, **(settings or {})})
+    return values
 
 
 def parse_setting(text: str) -> tuple[str, object]:

@@ -115,7 +115,9 @@ def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario
     scale = scale_vector(values["scale"])
     properties = _mass_properties(values, body_mesh, scale)
     check_tensor(properties.inertia)
-    body = make_body(properties.mass, properties.center_of_mass, properties.inertia, scale)
+    # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by message.
+    center_of_mass = [_divided(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]
+    body = make_body(properties.mass, center_of_mass, properties.inertia, scale)
     quaternion = unit_quaternion(values["initial.orientation_xyzw"], "initial.orientation_xyzw")
     R = matrix_from_quaternion(quaternion)
     w = np.asarray(values["initial.angular_velocity"])
@@ -178,7 +180,7 @@ def check_inertia(scenario: Scenario, content: Mapping) -> Scenario:
 
 
 def _divided(product: float, factor: float) -> float:
-    """x with x · factor == product in double precision where there is one, so that an echoed COM stays to the bit."""
+    """x with x · factor == product in double precision where there is one, else the nearest."""
     x = product / factor
     for near in (x, math.nextafter(x, math.inf), math.nextafter(x, -math.inf)):
         if near * factor == product:

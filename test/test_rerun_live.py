@@ -127,7 +127,8 @@ def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(v
     observer.close()
 
 
-def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path):
+def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(viewers.ViewerProcess, "stop", lambda self: (self.process.kill(), self.process.wait()))
     path = tmp_path / "session.rrd"
     states = flight.rows(600)
     observer = RerunObserver(record=str(path), viewer="serve")
@@ -149,15 +150,18 @@ def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path):
     assert read_session(path).rows.tobytes() == states.tobytes()
 
 
-def test_a_recorded_layout_shows_every_view_without_errors(tmp_path, viewer):
+@pytest.mark.parametrize("initial_view", ["lesson", "debugging", "plain"])
+def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, initial_view):
     path = tmp_path / "session.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = RerunObserver(record=str(path), initial_view=initial_view)
     flight.fly(observer, flight.rows(80))
+    observer.ghost_began(790_000_000, flight.BODY)
+    observer.ghost_state(790_000_000, flight.rows(80)[79])
     observer.close()
     show(viewer, path)
-    for at_s in (0.0, 0.25, 0.35, 0.7):
+    for at_s in (0.0, 0.25, 0.35, 0.79):
         viewer.set_time(e.SIM_TIME, duration=at_s, play_state="paused")
         viewer.take_screenshot()
         assert view_errors(viewer) == []
-    names = {view.name for view in viewer.get_state().views if view.visible}
-    assert "Flight" in names and len(names) >= 5
+    expected = {"lesson": "Flight", "debugging": "All shapes", "plain": "Plain"}[initial_view]
+    assert expected in {view.name for view in viewer.get_state().views if view.visible}

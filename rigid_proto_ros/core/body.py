@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +27,11 @@ class Body:
     principal_moments: np.ndarray
     principal_axes: np.ndarray
     principal_quaternion: np.ndarray
+
+    @cached_property
+    def smallest_moment(self) -> float:
+        """I₁ [kg m²] as a plain float."""
+        return float(self.principal_moments[0])
 
     def point(self, mesh_point) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""

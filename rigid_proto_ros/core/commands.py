@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 
 from .errors import CommandRefused
 from .frames import Frame
+from .loads import Load
 
 FARTHEST = 1e100
 """Metres: a place beyond it has no squared distance in a double."""
@@ -165,13 +166,11 @@ def _check_point(field: str, point) -> None:
 Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
-@dataclass(order=True)
+@dataclass
 class Pending:
-    """A command waiting for its time: ordered by time, rank, message bytes; arrival decides only between equals."""
+    """A command waiting for its time, with its load where that was settled already, and for which body and surface."""
 
     time_ns: int
-    rank: int
-    message: bytes
-    arrival: int
-    command: Command = field(compare=False)
-    load: tuple | None = field(compare=False, default=None)
+    command: Command
+    load: Load | None = None
+    settled_for: tuple = ()

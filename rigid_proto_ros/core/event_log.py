@@ -29,8 +29,7 @@ class EventLog:
 
     def append(self, time_ns: int, kind: str, content: dict) -> str:
         """Add an event and return its line."""
-        event = {"time_ns": time_ns, "kind": kind, "content": content}
-        self._hash.update((json.dumps(event) + "\n").encode())
+        line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
+        self._hash.update((line + "\n").encode())
         self.count += 1
-        event["sha256"] = self.sha256
-        return json.dumps(event)
+        return f'{line[:-1]}, "sha256": "{self.sha256}"}}'

@@ -8,6 +8,7 @@ points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial v
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -55,9 +56,10 @@ class Load:
         """The force (3,) in body axes at this state."""
         if self.axes == "world":
             return _transposed_times(state.rotation, np.asarray(self.force))
-        return self._body_force(body)
+        return self.own_force(body)
 
-    def _body_force(self, body: Body) -> np.ndarray:
+    def own_force(self, body: Body) -> np.ndarray:
+        """The force (3,) in body axes, of a load whose axes turn with the body."""
         if self.axes == "normal":
             return self.force[0] * body.normal(self.mesh_normal)
         return np.asarray(self.force, dtype=float)
@@ -67,11 +69,10 @@ class Load:
 
         A world wrench is judged over all attitudes: by |r||F| and the smallest principal moment.
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            force = np.abs(self.force).max() * np.sqrt(3.0)
-            arm = np.abs(self.arm(body)).max() * np.sqrt(3.0)
-            torque = np.abs(self.torque).max() * np.sqrt(3.0) + arm * force
-            linear, angular = force / body.mass, torque / body.principal_moments[0]
+        force, torque = _norm_bound(self.force), _norm_bound(self.torque)
+        if self.mesh_point is not None:
+            torque += _norm_bound(self.arm(body).tolist()) * force
+        linear, angular = force / body.mass, torque / body.smallest_moment
         # Negated, so that an overflow to NaN is refused too.
         if not (linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION):
             raise CommandRefused(
@@ -101,7 +102,7 @@ class LoadSum:
             if load.mesh_point is not None:
                 self.moment += arm[:, None] * force
         else:
-            force = load._body_force(body)
+            force = load.own_force(body)
             self.force_body += force
             self.torque_body += load.torque
             if load.mesh_point is not None:
@@ -115,7 +116,7 @@ def apply_impulse(load: Load, body: Body, state: State) -> State:
         impulse_world = np.asarray(load.force)
         impulse_body, angular_body = _transposed_times(R, impulse_world), _transposed_times(R, np.asarray(load.torque))
     else:
-        impulse_body, angular_body = load._body_force(body), np.asarray(load.torque)
+        impulse_body, angular_body = load.own_force(body), np.asarray(load.torque)
         impulse_world = (R * impulse_body).sum(axis=1)
     if load.mesh_point is not None:
         angular_body = angular_body + cross(load.arm(body), impulse_body)
@@ -135,7 +136,7 @@ def settle(
     state None leaves a ray unsettled: it is checked again when it takes effect.
     """
     force, torque = tuple(float(f) for f in force), tuple(float(t) for t in torque)
-    if not np.isfinite([*force, *torque]).all():
+    if not all(map(math.isfinite, (*force, *torque))):
         raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
     if frame.axes == "normal" and (any(force[1:]) or any(torque)):
         raise CommandRefused("frame", "wrench", [*force, *torque], "force.x alone in normal axes")
@@ -176,6 +177,11 @@ def _mesh_point(frame, body, surface, contacts, state):
     if hit is None:
         raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
     return tuple(float(x) for x in hit[0])
+
+
+def _norm_bound(vector) -> float:
+    """√3 times the largest component: not below the length, and without its overflow."""
+    return 1.7320508075688772 * max(abs(vector[0]), abs(vector[1]), abs(vector[2]))
 
 
 def cross(a, b) -> np.ndarray:

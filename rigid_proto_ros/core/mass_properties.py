@@ -8,9 +8,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from rigid_proto_ros.core.errors import InputError, MeshError, TensorError
-from rigid_proto_ros.core.inertia_tensor import check_tensor, tensor_from_six
+from rigid_proto_ros.core.inertia_tensor import (
+    MAX_MOMENT_RATIO,
+    TRIANGLE_SLACK_COMPUTED,
+    check_tensor,
+    principal_axes_kernel,
+    tensor_from_six,
+)
 from rigid_proto_ros.core.moments import Moments, box_moments, point_moments, solid_moments
 from rigid_proto_ros.core.moments_shell import shell_moments
 
@@ -38,47 +45,91 @@ class MassProperties:
 
 def scale_vector(scale) -> np.ndarray:
     """One or three numbers as (3,); raises InputError unless each is nonzero with 1e-9 ≤ |s| ≤ 1e9."""
-    s = np.atleast_1d(np.asarray(scale, dtype=np.float64)).ravel()
-    if s.size == 1:
-        s = np.repeat(s, 3)
-    size = np.abs(s)
-    if s.size != 3 or not np.all((size >= SCALE_LIMITS[0]) & (size <= SCALE_LIMITS[1])):
-        raise InputError("scale", np.asarray(scale).tolist(), "one or three numbers, each with 1e-9 <= |s| <= 1e9")
-    return s
+    try:
+        s = [float(value) for value in np.ravel(scale).tolist()]
+    except (TypeError, ValueError):
+        s = []
+    if len(s) == 1:
+        s = s * 3
+    if len(s) != 3 or not all(SCALE_LIMITS[0] <= abs(value) <= SCALE_LIMITS[1] for value in s):
+        received = scale.tolist() if isinstance(scale, np.ndarray) else scale
+        raise InputError("scale", received, "one or three numbers, each with 1e-9 <= |s| <= 1e9")
+    return np.array(s)
 
 
-def _matrix(six) -> np.ndarray:
-    return np.array([[six[0], six[1], six[2]], [six[1], six[3], six[4]], [six[2], six[4], six[5]]])
-
-
-def _tensor_of(second: np.ndarray) -> np.ndarray:
-    """Inertia tr(C) 1 − C of second moments C (3, 3); the diagonal as sums, so that nothing cancels."""
-    inertia = 0.0 - second  # no -0
-    for k in range(3):
-        inertia[k, k] = second[(k + 1) % 3, (k + 1) % 3] + second[(k + 2) % 3, (k + 2) % 3]
-    return inertia
-
-
-def _with_ballast(mass, center, second, ballast):
-    """Add point masses (m, position relative to the same reference as ``center``) to mass, COM and second moments."""
-    total = mass + sum(m for m, _ in ballast)
-    moved = (mass * center + sum((m * p for m, p in ballast), np.zeros(3))) / total
-    offset = center - moved
-    second = second + mass * np.outer(offset, offset)
-    for m, p in ballast:
-        second = second + m * np.outer(p - moved, p - moved)
-    return total, moved, second
-
-
-def _checked_ballast(ballast: Iterable) -> list[tuple[float, np.ndarray]]:
+def _checked_ballast(ballast: Iterable) -> np.ndarray:
+    """Entries with a mass, (k, 4): m, x, y, z."""
     checked = []
     for entry in ballast:
-        m, *position = (float(value) for value in entry)
-        if len(position) != 3 or not (0.0 <= m < math.inf) or not np.all(np.isfinite(position)):
-            raise InputError("ballast", list(entry), "mass >= 0 [kg] and x, y, z, all finite")
-        if m > 0.0:
-            checked.append((m, np.array(position)))
-    return checked
+        try:
+            row = [float(value) for value in entry]
+        except (TypeError, ValueError):
+            row = []
+        if len(row) != 4 or row[0] < 0.0 or not all(map(math.isfinite, row)):
+            raise InputError("ballast", entry, "mass >= 0 [kg] and x, y, z, all finite")
+        if row[0] > 0.0:
+            checked.append(row)
+    return np.array(checked) if checked else _NO_BALLAST
+
+
+_NO_BALLAST = np.empty((0, 4))
+
+
+@njit(cache=True, nogil=True)
+def _loaded(mass, center, second, stretch, reference, points):
+    """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
+
+    mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
+    mesh coordinates, ``stretch`` and ``reference`` (3,) in mesh coordinates bring them there. Each point mass adds by
+    the parallel-axis theorem, so that nothing cancels.
+    """
+    total = mass
+    moved = mass * center
+    offset = np.empty(3)
+    for p in range(points.shape[0]):
+        total += points[p, 0]
+        for k in range(3):
+            moved[k] += points[p, 0] * stretch[k] * (points[p, 1 + k] - reference[k])
+    if points.shape[0]:
+        moved /= total
+    else:
+        moved[:] = center
+    gathered = second.copy()
+    for p in range(-1, points.shape[0]):
+        if points.shape[0] == 0:
+            break
+        m = mass if p < 0 else points[p, 0]
+        for k in range(3):
+            place = center[k] if p < 0 else stretch[k] * (points[p, 1 + k] - reference[k])
+            offset[k] = place - moved[k]
+        for i in range(3):
+            for j in range(3):
+                gathered[i, j] += m * offset[i] * offset[j]
+    inertia = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            inertia[i, j] = 0.0 - gathered[i, j]  # no -0
+        inertia[i, i] = gathered[(i + 1) % 3, (i + 1) % 3] + gathered[(i + 2) % 3, (i + 2) % 3]
+    return total, moved, inertia, principal_axes_kernel(inertia)[0]
+
+
+@njit(cache=True, nogil=True)
+def _stretched(left, center, center_low, reference, second, per_measure):
+    """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
+    a unit of measure."""
+    place = np.empty(3)
+    base = np.empty(3)
+    com = np.empty(3)
+    matrix = np.empty((3, 3))
+    slot = 0
+    for i in range(3):
+        base[i] = left[i] * reference[i] + 0.0  # no -0
+        place[i] = left[i] * center[i]
+        com[i] = base[i] + (place[i] + left[i] * center_low[i])
+        for j in range(i, 3):
+            matrix[i, j] = matrix[j, i] = second[slot] * (left[i] * left[j]) * per_measure
+            slot += 1
+    return place, base, com, matrix
 
 
 class MeshMoments:
@@ -166,7 +217,7 @@ class MeshMoments:
             return float(mass)
         if not (0.0 < density < math.inf):
             raise InputError("density", density, "a finite number > 0 [kg/m^3]")
-        body = float(density) * self.moments("solid").measure * float(np.prod(np.abs(scale_vector(scale))))
+        body = float(density) * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
         if not (1e-300 < body < math.inf):
             raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
         return body
@@ -194,20 +245,26 @@ class MeshMoments:
         own = self.body_mass(scale=s, mass=mass, density=density)
         # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
         left = np.copysign(abs(s[0]), s) if model == "shell" else s
-        center = left * moments.center
-        second = _matrix(moments.second) * np.outer(left, left) * (own / moments.measure)
-        reference = left * moments.reference + 0.0  # no -0
-        total = own
-        if points:
-            points = [(m, s * (p - moments.reference * (left / s))) for m, p in points]
-            total, center, second = _with_ballast(own, center, second, points)
-        inertia = _tensor_of(second)
-        try:
-            warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
-        except TensorError as error:
-            raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
-        low = left * moments.center_low if not points else 0.0
-        return MassProperties(total, reference + (center + low), inertia, warnings, reference, center)
+        center, reference, com, second = _stretched(
+            left, moments.center, moments.center_low, moments.reference, moments.second, own / moments.measure
+        )
+        unscaled = moments.reference * (left / s) if model == "shell" else moments.reference
+        total, center, inertia, principal = _loaded(own, center, second, s, unscaled, points)
+        if len(points):
+            com = reference + center
+        warnings = ()
+        if not _plainly_good(principal):
+            try:
+                warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
+            except TensorError as error:
+                raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
+        return MassProperties(total, com, inertia, warnings, reference, center)
+
+
+def _plainly_good(moments: np.ndarray) -> bool:
+    """Principal moments (3,) about which ``check_tensor`` would say nothing."""
+    a, b, c = moments.tolist()
+    return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
 
 
 def explicit_mass_properties(
@@ -227,11 +284,9 @@ def explicit_mass_properties(
     inertia = tensor_from_six(tensor6)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor")
     points = _checked_ballast(ballast)
-    if not points:
+    if not len(points):
         return MassProperties(float(mass), s * center, inertia, warnings, s * center, np.zeros(3))
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    points = [(m, s * (p - center)) for m, p in points]
-    total, moved, second = _with_ballast(float(mass), np.zeros(3), second, points)
-    inertia = _tensor_of(second)
+    total, moved, inertia, _ = _loaded(float(mass), np.zeros(3), second, s, center, points)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
     return MassProperties(total, s * center + moved, inertia, warnings, s * center, moved)

@@ -197,7 +197,9 @@ def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     roots, component = np.unique(parent, return_inverse=True)
     ordered = np.sort(corners, axis=1)
     first = first_equal_rows(ordered)
-    repeated = first != np.arange(len(first))
+    # A triangle with two corners in one place adds nothing, however often it is there.
+    real = (ordered[:, 0] != ordered[:, 1]) & (ordered[:, 1] != ordered[:, 2])
+    repeated = (first != np.arange(len(first))) & real
     duplicates = np.zeros(len(first), dtype=bool)
     opposites = 0
     if repeated.any():

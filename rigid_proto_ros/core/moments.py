@@ -91,59 +91,120 @@ def _bounds(points):
     return np.array(bounds[:3]), np.array(bounds[3:]), zero == 0.0
 
 
-def _as_arrays(vertices, triangles) -> tuple[np.ndarray, np.ndarray]:
+def as_arrays(vertices, triangles, *, check: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for what is no mesh."""
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         raise MeshError("mesh", "no faces", "a surface of at least one triangle")
-    if int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]:
-        raise MeshError("mesh", "a face's vertex number out of range", f"0 to {vertices.shape[0] - 1}")
+    if check and (int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]):
+        raise _out_of_range(vertices)
     return vertices, triangles
+
+
+def _out_of_range(vertices: np.ndarray) -> MeshError:
+    return MeshError("mesh", "a face's vertex number out of range", f"0 to {vertices.shape[0] - 1}")
+
+
+@njit(cache=True, nogil=True)
+def _reference(lower, upper):
+    """As ``exact_reference``: (reference (3,), factor, size); size 0 when the box is a point."""
+    reference = np.zeros(3)
+    size = 0.0
+    extent = 0.0
+    for k in range(3):
+        middle = 0.5 * lower[k] + 0.5 * upper[k]
+        half = 0.5 * upper[k] - 0.5 * lower[k]
+        if half <= 0.25 * abs(middle):
+            reference[k] = middle
+        extent = max(extent, half)
+        size = max(size, abs(lower[k] - reference[k]), abs(upper[k] - reference[k]))
+    if not extent > 0.0:
+        return reference, 1.0, 0.0
+    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
 def exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
     """A point near the bounding box's centre from which no vertex differs by more than a double holds exactly.
 
-    Per axis: the centre c if the box's half extent is at most |c|/2, since v − c is then exact (Sterbenz), otherwise
+    Per axis: the centre c if the box's half extent is at most |c|/4, since v − c is then exact (Sterbenz), otherwise
     0. Returns (reference (3,), power of two that brings the largest |v − reference| to about 1, that largest).
     Raises MeshError for coordinates that are not finite, or all equal.
     """
     lower, upper, finite = _bounds(vertices)
     if not finite:
         raise MeshError("mesh", "a vertex that is not finite", "finite coordinates")
-    middle = 0.5 * lower + 0.5 * upper
-    half = 0.5 * upper - 0.5 * lower
-    reference = np.where(half <= 0.25 * np.abs(middle), middle, 0.0)
-    size = float(np.max(np.maximum(np.abs(lower - reference), np.abs(upper - reference))))
-    if not float(np.max(half)) > 0.0:
+    reference, factor, size = _reference(lower, upper)
+    if size == 0.0:
         raise MeshError("mesh", "all vertices in one point", "a body with an extent")
-    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
+    return reference, factor, size
 
 
-def _central(sums, low, reference, factor, measure_divisor, first_divisor, second_divisor, path) -> Moments:
-    """Moments about the centroid from raw sums; the cancelling subtraction is done in pair arithmetic."""
-    volume = pair_divide(sums[0], low[0], measure_divisor, 0.0)
-    if volume[0] == 0.0:
-        raise MeshError("mesh", "a surface that encloses no volume", "a closed surface with a volume")
-    first = [pair_divide(sums[1 + k], low[1 + k], first_divisor, 0.0) for k in range(3)]
-    center = [pair_divide(*first[k], *volume) for k in range(3)]
-    second = np.empty(6)
+@njit(cache=True, nogil=True)
+def _central(sums, low, factor, measure_divisor, first_divisor, second_divisor):
+    """Measure, centroid from the reference with its low part, and second moments about it, from raw sums: (13,).
+
+    The subtraction that cancels is done in pair arithmetic. A measure of 0 leaves the rest undefined.
+    """
+    out = np.zeros(13)
+    volume, volume_low = pair_divide(sums[0], low[0], measure_divisor, 0.0)
+    if volume == 0.0:
+        return out
+    inverse = 1.0 / factor
+    cubed = inverse * inverse * inverse
+    out[0] = volume * cubed
+    first = np.empty((3, 2))
+    center = np.empty((3, 2))
+    for k in range(3):
+        first[k, 0], first[k, 1] = pair_divide(sums[1 + k], low[1 + k], first_divisor, 0.0)
+        center[k, 0], center[k, 1] = pair_divide(first[k, 0], first[k, 1], volume, volume_low)
+        out[1 + k] = center[k, 0] * inverse
+        out[4 + k] = center[k, 1] * inverse
     slot = 0
     for i in range(3):
         for j in range(i, 3):
-            raw = pair_divide(sums[4 + slot], low[4 + slot], second_divisor, 0.0)
-            moved = pair_multiply(*first[i], *center[j])
-            second[slot] = pair_add(*raw, -moved[0], -moved[1])[0]
+            raw, raw_low = pair_divide(sums[4 + slot], low[4 + slot], second_divisor, 0.0)
+            moved, moved_low = pair_multiply(first[i, 0], first[i, 1], center[j, 0], center[j, 1])
+            out[7 + slot] = pair_add(raw, raw_low, -moved, -moved_low)[0] * cubed * inverse * inverse
             slot += 1
-    inverse = 1.0 / factor
-    return Moments(
-        measure=volume[0] * inverse**3,
-        reference=reference,
-        center=np.array([c[0] * inverse for c in center]),
-        center_low=np.array([c[1] * inverse for c in center]),
-        second=second * inverse**5,
-        path=path,
-    )
+    return out
+
+
+def central_moments(sums, low, reference, factor, divisors: tuple[float, float, float], path: str) -> Moments:
+    """Moments about the centroid from raw sums of 1, x and x xᵀ, taken as (v − reference)·factor, each to be divided by
+    its divisor. Raises MeshError when the measure is zero."""
+    return _moments(_central(sums, low, factor, *divisors), reference, path)
+
+
+def _moments(out: np.ndarray, reference: np.ndarray, path: str) -> Moments:
+    if out[0] == 0.0:
+        raise MeshError("mesh", "a surface that encloses no volume", "a closed surface with a volume")
+    return Moments(float(out[0]), reference, out[1:4], out[4:7], out[7:], path)
+
+
+_DONE, _NOT_FINITE, _ONE_POINT, _NO_SUCH_VERTEX = 0, 1, 2, 3
+
+
+@njit(cache=True, nogil=True)
+def _solid(vertices, triangles, try_blocked, only_blocked):
+    """Returns (status, whether the compensated sums were taken, reference (3,), numbers (13,) as ``_central``)."""
+    lower, upper, finite = _bounds(vertices)
+    reference, factor, size = _reference(lower, upper)
+    if not finite:
+        return _NOT_FINITE, False, reference, np.zeros(13)
+    if size == 0.0:
+        return _ONE_POINT, False, reference, np.zeros(13)
+    if try_blocked:
+        sums, low, edges = blocked_sums(vertices, triangles, reference, factor)
+        if edges < 0.0:
+            return _NO_SUCH_VERTEX, False, reference, np.zeros(13)
+        rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
+        if only_blocked or rounding <= ROUNDING_LIMIT * abs(sums[0]):
+            return _DONE, False, reference, _central(sums, low, factor, 6.0, 24.0, 120.0)
+    sums, low, there = compensated_sums(vertices, triangles, reference, factor)
+    if not there:
+        return _NO_SUCH_VERTEX, True, reference, np.zeros(13)
+    return _DONE, True, reference, _central(sums, low, factor, 6.0, 24.0, 120.0)
 
 
 def solid_moments(vertices, triangles, *, path: str = "auto") -> Moments:
@@ -152,17 +213,18 @@ def solid_moments(vertices, triangles, *, path: str = "auto") -> Moments:
     Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles;
     where the estimated rounding ε·size·Σ|edge|²/V is too large (thin bodies, few triangles) a second path in pair
     arithmetic takes over. ``path`` "blocked" or "compensated" asks for one of them. Source: ``moments_solid``.
-    Raises MeshError for an empty or non-finite mesh, or zero volume.
+    Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or zero volume.
     """
-    vertices, triangles = _as_arrays(vertices, triangles)
-    reference, factor, size = exact_reference(vertices)
-    if path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH):
-        sums, low, edges = blocked_sums(vertices, triangles, reference, factor)
-        rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
-        if path == "blocked" or rounding <= ROUNDING_LIMIT * abs(sums[0]):
-            return _central(sums, low, reference, factor, 6.0, 24.0, 120.0, "blocked")
-    sums, low = compensated_sums(vertices, triangles, reference, factor)
-    return _central(sums, low, reference, factor, 6.0, 24.0, 120.0, "compensated")
+    vertices, triangles = as_arrays(vertices, triangles, check=False)
+    try_blocked = path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH)
+    status, compensated, reference, numbers = _solid(vertices, triangles, try_blocked, path == "blocked")
+    if status == _NOT_FINITE:
+        raise MeshError("mesh", "a vertex that is not finite", "finite coordinates")
+    if status == _ONE_POINT:
+        raise MeshError("mesh", "all vertices in one point", "a body with an extent")
+    if status == _NO_SUCH_VERTEX:
+        raise _out_of_range(vertices)
+    return _moments(numbers, reference, "compensated" if compensated else "blocked")
 
 
 def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -194,11 +256,11 @@ def _point_sums(points, reference, factor):
 
 def point_moments(vertices, triangles) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
-    vertices, triangles = _as_arrays(vertices, triangles)
+    vertices, triangles = as_arrays(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
     reference, factor, _ = exact_reference(points)
     sums, low = _point_sums(points, reference, factor)
-    moments = _central(sums, low, reference, factor, 1.0, 1.0, 1.0, "closed form")
+    moments = central_moments(sums, low, reference, factor, (1.0, 1.0, 1.0), "closed form")
     return Moments(
         float(points.shape[0]),
         reference,
@@ -211,7 +273,7 @@ def point_moments(vertices, triangles) -> Moments:
 
 def box_moments(vertices, triangles) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
-    vertices, triangles = _as_arrays(vertices, triangles)
+    vertices, triangles = as_arrays(vertices, triangles)
     lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))
     if not finite:
         raise MeshError("mesh", "a vertex that is not finite", "finite coordinates")

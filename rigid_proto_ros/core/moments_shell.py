@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from rigid_proto_ros.core.exact_arithmetic import pair_add
-from rigid_proto_ros.core.moments import Moments, _as_arrays, _central, exact_reference
+from rigid_proto_ros.core.moments import Moments, as_arrays, central_moments, exact_reference
 
 
 @njit(cache=True, nogil=True)
@@ -72,11 +72,11 @@ def shell_moments(vertices, triangles, polygon_starts=None) -> Moments:
     vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles make up a polygon, None that
     each triangle is one. Raises MeshError for an empty mesh, non-finite vertices, or zero area.
     """
-    vertices, triangles = _as_arrays(vertices, triangles)
+    vertices, triangles = as_arrays(vertices, triangles)
     reference, factor, _ = exact_reference(vertices)
     starts = np.empty(0, np.int64) if polygon_starts is None else np.ascontiguousarray(polygon_starts, np.int64)
     sums, low = _shell_sums(vertices, triangles, starts, reference, factor)
-    moments = _central(sums, low, reference, factor, 1.0, 3.0, 12.0, "blocked")
+    moments = central_moments(sums, low, reference, factor, (1.0, 3.0, 12.0), "closed form")
     return Moments(
         moments.measure * factor,
         reference,

@@ -70,8 +70,10 @@ def blocked_sums(vertices, triangles, reference, factor):
     """The ten sums in plain doubles, block by block; blocks are combined without error.
 
     vertices (n, 3), triangles (m, 3), reference (3,), factor a power of two: corners enter as (v − reference)·factor.
-    Returns (sums (10,), their low parts (10,), Σ(|b − a|² + |c − a|²)); the last measures how much d can round.
+    Returns (sums (10,), their low parts (10,), Σ(|b − a|² + |c − a|²)); the last measures how much d can round, and is
+    −1 when a triangle names a vertex that isn't there.
     """
+    known = np.uint64(vertices.shape[0])
     count = triangles.shape[0]
     rx, ry, rz = reference[0], reference[1], reference[2]
     total = np.zeros(11)
@@ -82,6 +84,8 @@ def blocked_sums(vertices, triangles, reference, factor):
         for t in range(size):
             for corner in range(3):
                 i = triangles[start + t, corner]
+                if np.uint64(i) >= known:  # negative numbers wrap to large ones
+                    return total[:10], carry[:10], -1.0
                 w[3 * corner, t] = (vertices[i, 0] - rx) * factor
                 w[3 * corner + 1, t] = (vertices[i, 1] - ry) * factor
                 w[3 * corner + 2, t] = (vertices[i, 2] - rz) * factor
@@ -119,12 +123,16 @@ def _pair_sum3(a, b, c):
 def compensated_sums(vertices, triangles, reference, factor):
     """The ten sums in pair arithmetic (about 104 bits), for bodies so thin that a double's products round too much.
 
-    Arguments as for ``blocked_sums``; (v − reference) must be exact. Returns (sums (10,), low parts (10,)).
+    Arguments as for ``blocked_sums``; (v − reference) must be exact. Returns (sums (10,), low parts (10,),
+    whether every vertex named is there).
     """
+    known = np.uint64(vertices.shape[0])
     total = np.zeros(10)
     low = np.zeros(10)
     for t in range(triangles.shape[0]):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if max(np.uint64(i), np.uint64(j), np.uint64(k)) >= known:
+            return total, low, False
         a = (
             (vertices[i, 0] - reference[0]) * factor,
             (vertices[i, 1] - reference[1]) * factor,
@@ -162,4 +170,4 @@ def compensated_sums(vertices, triangles, reference, factor):
                 p, e = pair_multiply(d, d_low, p, e)
                 total[slot], low[slot] = pair_add(total[slot], low[slot], p, e)
                 slot += 1
-    return total, low
+    return total, low, True

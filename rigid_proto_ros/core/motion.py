@@ -36,7 +36,7 @@ HEAT = 14
 VARIABLES = 15
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def damping_functions(z):
     """φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 + e⁻ᶻ)/z², z ≥ 0, to rounding."""
     if z < 0.5:
@@ -49,7 +49,7 @@ def damping_functions(z):
     return phi1, (1.0 - phi1) / z
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def to_variables(row, p, y):
     """State row (13,) to variables y (15,) at the start of the segment with problem p."""
     P, Q = PRINCIPAL_AXES, PRINCIPAL_QUATERNION
@@ -62,7 +62,7 @@ def to_variables(row, p, y):
     y[HEAT] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def to_row(y, p, elapsed, row):
     """Variables y (15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = PRINCIPAL_AXES, PRINCIPAL_QUATERNION

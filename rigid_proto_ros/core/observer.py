@@ -75,14 +75,23 @@ class Observer:
     def load_ended(self, time_ns: int, load_id: int) -> None:
         """The load with this id acts no longer."""
 
-    def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
-        """A wrench or poke (``kind``) as it took effect: its point settled on the body, its axes world or body."""
+    def applied(self, time_ns: int, command, load, body) -> None:
+        """A wrench or poke took effect: the WrenchCommand, the Load that it settled to, and the Body it acts on."""
 
     def event(self, time_ns: int, line: str) -> None:
         """One JSON line of the event log (command, parameter change, service), as applied."""
 
     def refused(self, time_ns: int, reason: str, message: str) -> None:
         """A command was refused."""
+
+    def status(self, time_ns: int, track: str, value: str) -> None:
+        """From ``time_ns`` on ``track`` is ``value``, such as motion: flying, sleeping, paused; string: taut, slack."""
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        """A second body that gets the same commands is this one from ``time_ns`` on."""
+
+    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:
+        """One state of the ghost, after the body's own of the same time; ``row`` as for ``state``."""
 
     def reset(self) -> None:
         """Simulated time starts again at 0."""
@@ -92,21 +101,28 @@ class Observer:
 
 
 class Observers(Observer):
-    """Several observers as one."""
+    """Several observers as one; a method that only one of them implements is that one's own."""
 
     def __init__(self, *observers: Observer) -> None:
-        self.observers = observers
+        for name in _METHODS:
+            methods = [getattr(observer, name) for observer in observers if listens(observer, name)]
+            if len(methods) == 1:
+                setattr(self, name, methods[0])
+            elif methods:
+                setattr(self, name, _in_turn(methods))
 
 
-def _forward(name: str):
-    def call(self, *args):
-        for observer in self.observers:
-            getattr(observer, name)(*args)
+def listens(observer: Observer, method: str) -> bool:
+    """Whether the observer does anything with a method of the interface."""
+    return method in vars(observer) or getattr(type(observer), method) is not getattr(Observer, method)
 
-    call.__name__ = name
-    call.__doc__ = getattr(Observer, name).__doc__
+
+def _in_turn(methods):
+    def call(*arguments) -> None:
+        for method in methods:
+            method(*arguments)
+
     return call
 
 
-for _name in [n for n in vars(Observer) if not n.startswith("_")]:
-    setattr(Observers, _name, _forward(_name))
+_METHODS = [name for name in vars(Observer) if not name.startswith("_")]

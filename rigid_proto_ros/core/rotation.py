@@ -44,7 +44,7 @@ def rotate_inverse(qx, qy, qz, qw, vx, vy, vz):
     return rotate(-qx, -qy, -qz, qw, vx, vy, vz)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def normalize(qx, qy, qz, qw):
     """Scale to unit length."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)

@@ -30,7 +30,7 @@ from .event_log import EventLog
 from .integrators import check_carried
 from .integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, STRING, needs_of_load
 from .loads import Load, LoadSum, apply_impulse, cross, settle
-from .observer import BodySnapshot, Observer, ShownLoad
+from .observer import BodySnapshot, Observer, ShownLoad, listens
 from .problem import make_problem
 from .segment import IntegrationFailed, Segment
 from .setup import Setup
@@ -62,6 +62,7 @@ class Simulation:
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
         self.observer = observer or Observer()
+        self._shows_loads = listens(self.observer, "load_began")
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
@@ -183,9 +184,11 @@ class Simulation:
         elif isinstance(command, MoveString):
             check_carried(self.setup.integrator, frozenset({STRING}))
         self._arrivals += 1
-        pending = Pending(when_ns, command.rank, command.message, self._arrivals, command)
-        pending.load = None if load is None or command.frame.point[0] == "ray" else (load, self.setup.surface)
-        heapq.heappush(self._pending, pending)
+        pending = Pending(when_ns, command)
+        if load is not None and command.frame.point[0] != "ray":
+            pending.load, pending.settled_for = load, (self.setup.body, self.setup.surface)
+        # Time, rank, message: arrival decides only between messages that are equal to the byte.
+        heapq.heappush(self._pending, (when_ns, command.rank, command.message, self._arrivals, pending))
         return when_ns
 
     def refuse(self, error: CommandRefused) -> None:
@@ -242,7 +245,7 @@ class Simulation:
     # What happens at an event
 
     def _next_event_ns(self) -> int:
-        event_ns = self._pending[0].time_ns if self._pending else NEVER
+        event_ns = self._pending[0][0] if self._pending else NEVER
         for acting in self._acting():
             event_ns = min(event_ns, acting.end_ns)
         return min(event_ns, self._string.next_event_ns(self._segment.start.time_ns, NEVER))
@@ -255,8 +258,8 @@ class Simulation:
         self.time_ns, self.state = now_ns, state
         changed = self._end_loads(lambda acting: acting.end_ns <= now_ns)
         changed |= self._string.end_due(now_ns)
-        while self._pending and self._pending[0].time_ns == now_ns:
-            pending = heapq.heappop(self._pending)
+        while self._pending and self._pending[0][0] == now_ns:
+            pending = heapq.heappop(self._pending)[-1]
             try:
                 self._apply(pending)
                 changed = True
@@ -287,11 +290,11 @@ class Simulation:
 
     def _load_of(self, pending: Pending) -> Load:
         """The load settled at submission, or settled anew when it was a ray or the mesh has changed since."""
-        if pending.load is not None and pending.load[1] is self.setup.surface:
-            load = pending.load[0]
-            load.check_magnitude(self.setup.body)
-            self._check_carried(pending.command, load)
-            return load
+        if pending.load is not None and pending.settled_for[1] is self.setup.surface:
+            if pending.settled_for[0] is not self.setup.body:
+                pending.load.check_magnitude(self.setup.body)
+            self._check_carried(pending.command, pending.load)
+            return pending.load
         return self._settled(pending.command, self.state)
 
     def _settled(self, command: WrenchCommand, state: State | None) -> Load:
@@ -308,13 +311,11 @@ class Simulation:
 
     def _begin_load(self, command: WrenchCommand, load: Load) -> None:
         self._load_ids += 1
-        force = load.force_body(self.setup.body, self.state) if load.axes == "normal" else np.asarray(load.force)
-        self.observer.applied(
-            self.time_ns, load.frame_id + command.frame.options, command.kind, force, np.asarray(load.torque)
-        )
+        self.observer.applied(self.time_ns, command, load, self.setup.body)
         if command.frame.impulse:
             self.state = apply_impulse(load, self.setup.body, self.state)
-            self.observer.load_began(self.time_ns, self._load_ids, self._shown("impulse", load))
+            if self._shows_loads:
+                self.observer.load_began(self.time_ns, self._load_ids, self._shown("impulse", load))
             return
         if command.held:
             self._end_loads(lambda acting: acting is self._held)
@@ -325,7 +326,7 @@ class Simulation:
             duration_s = command.frame.duration_s
             duration_ns = self.setup.poke_duration_ns if duration_s is None else round(duration_s * 1e9)
             self._pulses.append(_Acting(load, self.time_ns, self.time_ns + duration_ns, self._load_ids))
-        if not load.is_zero or not command.held:
+        if self._shows_loads and not (load.is_zero and command.held):
             self.observer.load_began(self.time_ns, self._load_ids, self._shown(command.kind, load))
 
     def _set_held_end(self) -> None:
@@ -394,7 +395,7 @@ class Simulation:
         return loads
 
     def _start_over(self) -> None:
-        self._pending: list[Pending] = []
+        self._pending: list[tuple] = []
         self._held: _Acting | None = None
         self._pulses: list[_Acting] = []
         self._finished_steps = 0

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-POINTS = 181
-"""Points of a closed curve: every 2 degrees."""
+POINTS = 121
+"""Points of a closed curve: every 3 degrees."""
 
 EQUAL_MOMENTS = 1e-9
 """Moments closer than this, relatively, have no separatrix between them: the body is a symmetric top."""

@@ -20,8 +20,8 @@ from .poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
 RATE = 100
 """[1/s, simulated] of the picture's moving parts."""
 
-REDRAWN_PER_S = 25
-"""[1/s, simulated] How often ellipsoid, curves and plane are drawn anew while a torque changes T and L."""
+REDRAWN_PER_S = 20
+"""[1/s, simulated] How often curve and plane are drawn anew while a torque changes T and L."""
 
 CHANGE = 1e-6
 """Relative change of T or L beyond which they are."""
@@ -39,14 +39,24 @@ class PoinsotPicture:
         self._redraw = Ticks(REDRAWN_PER_S)
         self._frame: PrincipalFrame | None = None
         self._drawn: tuple[float, np.ndarray] | None = None
-        self._scale = 1.0
 
     def change_body(self, time_ns: int, wall_ns: int, body: BodySnapshot, send: Send) -> None:
-        """Another tensor: another ellipsoid, in other axes."""
+        """Another tensor: another ellipsoid, in other axes. At this scale it is the same for every spin."""
         self._frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
         self._drawn = None
-        columns = rr.Transform3D.columns(mat3x3=[self._frame.axes])
-        send(e.POINSOT_PRINCIPAL, one_time(time_ns, wall_ns), columns)
+        times = one_time(time_ns, wall_ns)
+        moments = self._frame.moments
+        scale = self._scale(0.5)
+        send(e.POINSOT_PRINCIPAL, times, rr.Transform3D.columns(mat3x3=[self._frame.axes]))
+        send(e.POINSOT_ELLIPSOID, times, rr.Ellipsoids3D.columns(half_sizes=[scale * semi_axes(moments, 0.5)]))
+        curves = [scale * curve for curve in separatrix(moments, 0.5)]
+        strips = rr.LineStrips3D.columns(strips=curves).partition([len(curves)])
+        send(e.POINSOT_SEPARATRIX, times, strips)
+
+    def _scale(self, energy: float) -> float:
+        """What ω is multiplied with to be drawn."""
+        longer = semi_axes(self._frame.moments, energy)[:2]
+        return 1.0 / float(np.sqrt(longer[0] * longer[1]))
 
     def rows(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, L: np.ndarray, send: Send) -> None:
         """States (n, 13) with their angular momenta (n, 3) in world axes."""
@@ -54,15 +64,17 @@ class PoinsotPicture:
         if not len(chosen) or self._frame is None:
             return
         times_ns, walls, rows, L = times_ns[chosen], walls[chosen], rows[chosen], L[chosen]
-        w_principal = rows[:, 10:13] @ self._frame.axes
-        energy = 0.5 * np.einsum("ni,i,ni->n", w_principal, self._frame.moments, w_principal)
-        for k in self._changes(times_ns, energy, L):
-            self._draw(int(times_ns[k]), int(walls[k]), float(energy[k]), w_principal[k], L[k], send)
+        w = np.einsum("ij,ni->nj", self._frame.axes, rows[:, 10:13])
+        energy = 0.5 * np.einsum("ni,i,ni->n", w, self._frame.moments, w)
+        changes = self._changes(times_ns, energy, L)
+        if changes:
+            self._draw(times_ns[changes], walls[changes], energy[changes], w[changes], L[changes], send)
+        scales = np.array([self._scale(T) if T > 0.0 else 0.0 for T in energy])
+        tips = scales[:, np.newaxis] * to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
         times = time_columns(times_ns, walls)
-        w = self._scale * to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
         send(e.POINSOT_BODY, times, rr.Transform3D.columns(quaternion=rows[:, 3:7]))
-        send(e.POINSOT_OMEGA, times, rr.Arrows3D.columns(vectors=w))
-        send(e.POINSOT_HERPOLHODE, times, rr.Points3D.columns(positions=w))
+        send(e.POINSOT_OMEGA, times, rr.Arrows3D.columns(vectors=tips))
+        send(e.POINSOT_HERPOLHODE, times, rr.Points3D.columns(positions=tips))
 
     def _changes(self, times_ns: np.ndarray, energy: np.ndarray, L: np.ndarray) -> list[int]:
         """Indices of the states at which T and L are no longer those drawn."""
@@ -77,29 +89,27 @@ class PoinsotPicture:
             changed.append(int(k))
         return changed
 
-    def _draw(self, time_ns: int, wall_ns: int, energy: float, w: np.ndarray, L: np.ndarray, send: Send) -> None:
-        times = one_time(time_ns, wall_ns)
-        if np.linalg.norm(w) < REST:
-            for entity in (e.POINSOT_ELLIPSOID, e.POINSOT_POLHODE, e.POINSOT_SEPARATRIX, e.POINSOT_PLANE):
-                send(entity, times, rr.Clear.columns(is_recursive=[False]))
-            send(e.POINSOT_MOMENTUM, times, rr.Clear.columns(is_recursive=[False]))
-            return
-        moments = self._frame.moments
-        axes = semi_axes(moments, energy)
-        self._scale = s = 1.0 / float(np.sqrt(axes[0] * axes[1]))
-        send(e.POINSOT_ELLIPSOID, times, rr.Ellipsoids3D.columns(half_sizes=[s * axes]))
-        send(e.POINSOT_POLHODE, times, rr.LineStrips3D.columns(strips=[s * polhode(moments, energy, w)]))
-        curves = separatrix(moments, energy)
-        if curves:
-            strips = rr.LineStrips3D.columns(strips=[s * curve for curve in curves]).partition([len(curves)])
-            send(e.POINSOT_SEPARATRIX, times, strips)
-        momentum = float(np.linalg.norm(L))
-        distance, direction = s * 2.0 * energy / momentum, L / momentum
+    def _draw(
+        self, times_ns: np.ndarray, walls: np.ndarray, energy: np.ndarray, w: np.ndarray, L: np.ndarray, send: Send
+    ) -> None:
+        """Polhode, plane and L from each of these times on; a body at rest has none."""
+        turns = np.linalg.norm(w, axis=1) > REST
+        counts = turns.astype(int)
+        curves, distances, directions = [], [], []
+        for T, spin, momentum in zip(energy[turns], w[turns], L[turns], strict=True):
+            scale, norm = self._scale(T), float(np.linalg.norm(momentum))
+            curves.append(scale * polhode(self._frame.moments, T, spin))
+            distances.append(scale * 2.0 * T / norm)
+            directions.append(momentum / norm)
+        reach = np.array(distances)[:, np.newaxis] * np.array(directions).reshape(-1, 3)
+        times = time_columns(times_ns, walls)
+        send(e.POINSOT_POLHODE, times, rr.LineStrips3D.columns(strips=curves).partition(counts))
         plane = rr.Boxes3D.columns(
-            half_sizes=[[PLANE_HALF_SIZE, PLANE_HALF_SIZE, 0.002]],
-            centers=[distance * direction],
-            quaternions=[plane_rotation(L)],
+            half_sizes=np.tile([PLANE_HALF_SIZE, PLANE_HALF_SIZE, 0.002], (len(reach), 1)),
+            centers=reach,
+            quaternions=np.array([plane_rotation(d) for d in directions]).reshape(-1, 4),
         )
-        send(e.POINSOT_PLANE, times, plane)
-        send(e.POINSOT_UPRIGHT, times, rr.Transform3D.columns(quaternion=[inverse(plane_rotation(-L))]))
-        send(e.POINSOT_MOMENTUM, times, rr.Arrows3D.columns(vectors=[1.35 * distance * direction]))
+        send(e.POINSOT_PLANE, times, plane.partition(counts))
+        send(e.POINSOT_MOMENTUM, times, rr.Arrows3D.columns(vectors=1.35 * reach).partition(counts))
+        upright = np.array([inverse(plane_rotation(-d)) for d in directions]).reshape(-1, 4)
+        send(e.POINSOT_UPRIGHT, times, rr.Transform3D.columns(quaternion=upright).partition(counts))

@@ -22,6 +22,9 @@ TRAIL_RADIUS = 0.004
 AXIS_LENGTH = 0.25
 """In body sizes."""
 
+VIEW_PER_REACH = 1.7
+"""A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
+
 
 @dataclass
 class Scene:
@@ -51,6 +54,12 @@ class Scene:
             return None
         at = self.vertices * body.scale - body.center_of_mass
         return at[np.argmax(np.einsum("ij,ij->i", at, at))]
+
+    def view_size(self, body: BodySnapshot) -> float:
+        """The length [m] that the camera must keep in sight: bodies are shown around their COM, wherever it lies."""
+        tip = self.farthest_point(body)
+        reach = 0.0 if tip is None else float(np.linalg.norm(tip))
+        return max(self.size(body), VIEW_PER_REACH * reach)
 
 
 def drawn_mesh(surface: tuple[np.ndarray, np.ndarray, np.ndarray], colour: tuple[int, ...]) -> Any:
@@ -82,8 +91,8 @@ def send_scene(stream: Stream, scene: Scene) -> None:
     )
 
 
-def send_styles(stream: Stream, size: float, initial_view: str) -> None:
-    """Colours, names and thicknesses for a body of this size [m], and the layout."""
+def send_styles(stream: Stream, size: float, view_size: float, initial_view: str) -> None:
+    """Colours, names and thicknesses for a body of this size [m], and the layout with its camera."""
     for entity, series in e.SERIES.items():
         names, colours = zip(*series, strict=True)
         stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
@@ -107,7 +116,7 @@ def send_styles(stream: Stream, size: float, initial_view: str) -> None:
         e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=e.GREEN, line_radii=0.6 * line, fill_mode=wire)
     )
     _send_poinsot_styles(stream)
-    stream.send_blueprint(layout(size, initial_view))
+    stream.send_blueprint(layout(view_size, initial_view))
 
 
 def _send_poinsot_styles(stream: Stream) -> None:

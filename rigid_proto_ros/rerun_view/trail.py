@@ -7,7 +7,7 @@ import numpy as np
 
 from .derived import rotation_matrices, to_world
 
-POINTS_PER_PIECE_MAX = 32
+POINTS_PER_PIECE_MAX = 16
 
 
 class Trail:

@@ -26,8 +26,8 @@ from .streams import Stream
 from .trail import Trail
 from .words import Words
 
-PICTURE_RATE = 200
-"""[1/s, simulated] of what is only looked at: a picture needn't have every state."""
+PICTURE_RATE = 250
+"""[1/s, simulated] of what is only looked at, plots and arrows: the states themselves are all logged, exactly."""
 
 MIDDLING_SPIN = 5.0
 """[rad/s] whose arrow is of middling length."""
@@ -67,6 +67,7 @@ class SceneWriter:
         self._lanes = Lanes()
         self._load_changes: list[tuple[int, bool]] = []
         self._acted = self._touched = False
+        self._disturbed_unseen = 0
         self._tell_body()
 
     def attach(self, stream: Stream) -> None:
@@ -77,7 +78,7 @@ class SceneWriter:
         if self._body is None:
             return
         now, wall = self._last_time_ns, time.time_ns()
-        send_styles(stream, self._size, self._initial_view)
+        send_styles(stream, self._size, self._view_size, self._initial_view)
         send_body(stream, now, wall, self._body, self._scene)
         self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
@@ -167,7 +168,7 @@ class SceneWriter:
         self._tell_body()
         for stream in self.streams:
             if self._size != before:
-                send_styles(stream, self._size, self._initial_view)
+                send_styles(stream, self._size, self._view_size, self._initial_view)
             send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene)
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
@@ -180,6 +181,7 @@ class SceneWriter:
         if self._body is None:
             return
         self._size = self._scene.size(self._body) if self._scene is not None else 1.0
+        self._view_size = self._scene.view_size(self._body) if self._scene is not None else self._size
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
 
@@ -213,9 +215,14 @@ class SceneWriter:
         self._send_rows(e.CENTRE, times, rr.Transform3D.columns(translation=rows[:, 0:3]))
         if self._body is None:
             return
-        L = self._plots.rows(times, rows, self._body, disturbed, self._send_rows)
-        self._poinsot.rows(times_ns, walls, rows, L, self._send_rows)
-        self._write_pictures(times_ns, walls, rows, L)
+        chosen = self._ticks.choose(times_ns)
+        times_ns, walls, rows = times_ns[chosen], walls[chosen], rows[chosen]
+        disturbed = self._gathered(disturbed, chosen)
+        if len(chosen):
+            times = time_columns(times_ns, walls)
+            L = self._plots.rows(times, rows, self._body, disturbed, self._send_rows)
+            self._poinsot.rows(times_ns, walls, rows, L, self._send_rows)
+            self._write_pictures(times, times_ns, rows, L)
 
     def _disturbed(self, begin: int, end: int) -> np.ndarray:
         """Per row begin..end, whether a load acts there or did since the row before."""
@@ -232,12 +239,15 @@ class SceneWriter:
         self._load_changes.clear()
         return disturbed
 
-    def _write_pictures(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, L: np.ndarray) -> None:
+    def _gathered(self, disturbed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Per chosen row, whether a load acted at any row since the one chosen before."""
+        so_far = np.cumsum(disturbed) + self._disturbed_unseen
+        at_chosen = so_far[chosen]
+        self._disturbed_unseen = int(so_far[-1] - at_chosen[-1]) if len(chosen) else int(so_far[-1])
+        return np.diff(at_chosen, prepend=0) > 0
+
+    def _write_pictures(self, times: list[Any], times_ns: np.ndarray, rows: np.ndarray, L: np.ndarray) -> None:
         """Arrows of ω and L at the COM, and the trail: a dense line along the path of the farthest vertex."""
-        chosen = self._ticks.choose(times_ns)
-        if not len(chosen):
-            return
-        times, rows, L = time_columns(times_ns[chosen], walls[chosen]), rows[chosen], L[chosen]
         w = to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
         spin_of_middling = MIDDLING_SPIN * float(np.trace(self._body.inertia)) / 3.0
         for entity, vectors, reference in (
@@ -247,7 +257,7 @@ class SceneWriter:
             self._send_rows(entity, times, rr.Arrows3D.columns(vectors=_drawn(vectors, reference, self._size)))
         if self._tip is not None:
             spacing = 1.5 * TRAIL_RADIUS * self._size
-            points, counts = self._trail.between(times_ns[chosen], rows, self._tip, spacing)
+            points, counts = self._trail.between(times_ns, rows, self._tip, spacing)
             self._send_rows(e.TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
 
     def _row_streams(self) -> list[Stream]:

@@ -31,6 +31,12 @@ from .stamps import effective_time
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
 
+QUIET_NS = 4_000_000
+"""How often topics are looked at that carried nothing lately [ns of wall time]."""
+
+LIVELY_NS = 5_000_000_000
+"""A topic is looked at in every tick for this long after a message [ns of wall time]."""
+
 MAX_SCHEDULE_LENGTH = 100_000
 """Characters of one schedule entry."""
 
@@ -70,6 +76,7 @@ class CommandIntake:
         self._apply_inertia = apply_inertia
         self.queue_full = 0
         self.sequence_gaps = 0
+        self._next_quiet_look_ns = 0
         self._last_sequence: dict[int, int] = {}
         self._on_refusal = on_refusal
         group = _TakenByHand()
@@ -93,10 +100,20 @@ class CommandIntake:
             ("inertia", subscribe(InertiaStamped, "inertia/set"), InertiaStamped, self._inertia),
             ("schedule", subscribe(String, "schedule"), String, self._schedule),
         )
+        self._lively_until_ns = [0] * len(self._sources)
 
-    def take(self, simulation, scenario) -> None:
-        """Submit everything that has arrived; what is refused is counted and told, and the rest goes on."""
-        for topic, subscription, message_type, read in self._sources:
+    def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None]) -> None:
+        """Submit everything that has arrived; what is refused is counted and told, and the rest goes on.
+
+        catch_up() is called before the first message of a tick, so that now is the tick's own time. Topics that carried something lately are looked at in every tick, quiet ones every QUIET_NS.
+        """
+        caught_up = False
+        look_at_quiet = wall_ns >= self._next_quiet_look_ns
+        if look_at_quiet:
+            self._next_quiet_look_ns = wall_ns + QUIET_NS
+        for source, (topic, subscription, message_type, read) in enumerate(self._sources):
+            if not look_at_quiet and wall_ns > self._lively_until_ns[source]:
+                continue
             with subscription.handle:
                 # Bounded, so that a flood can't hold up the motion for ever.
                 for count in range(qos.COMMAND_DEPTH):
@@ -105,7 +122,11 @@ class CommandIntake:
                         break
                     if count == qos.COMMAND_DEPTH - 1:
                         self.queue_full += 1
+                    if not caught_up:
+                        caught_up = True
+                        catch_up()
                     self.received[topic] += 1
+                    self._lively_until_ns[source] = wall_ns + LIVELY_NS
                     self._count_gap(subscription, taken[1].get("publication_sequence_number"))
                     try:
                         read(taken[0], simulation, scenario)

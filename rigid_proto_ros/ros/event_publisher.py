@@ -6,12 +6,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from xml.sax.saxutils import quoteattr
 
-import numpy as np
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
 from std_msgs.msg import String
 
 from .. import cdr
+from ..core.body import Body
+from ..core.commands import WrenchCommand
+from ..core.loads import Load
 from ..core.mass_properties import MassProperties
 from ..core.observer import BodySnapshot, Observer
 from ..inertial_export import urdf_inertial
@@ -51,10 +53,12 @@ class EventPublisher(Observer):
         self._inertia.publish(message)
         self._description.publish(String(data=self._urdf(body)))
 
-    def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
-        """A wrench or poke as it took effect."""
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
+        """A wrench or poke as it took effect: its point settled on the body, its axes world or body."""
         if self._applied.get_subscription_count():
-            self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force.tolist(), torque.tolist()))
+            force = load.force if load.axes == "world" else load.own_force(body).tolist()
+            frame_id = load.frame_id + command.frame.options
+            self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
 
     def event(self, time_ns: int, line: str) -> None:
         """A line of the event log."""

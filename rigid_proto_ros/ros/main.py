@@ -28,29 +28,49 @@ def main(argv: list[str] | None = None) -> int:
 
 def _run(argv: list[str], stop: threading.Event) -> int:
     from .arguments import check_arguments
+    from .bodies import bodies_of
     from .node_name import remapped_node_name
 
+    argv, bodies = bodies_of(argv)
     name = remapped_node_name(argv)
-    check_arguments(argv, name, lambda warning: print(f"rigid_body_node: {warning}", file=sys.stderr))
+    check_arguments(argv, name, _warn)
 
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions
 
     from .node import RigidBodyNode
+    from .parameter_server import given_parameters
+    from .physics_thread import PhysicsThread
 
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy's own error types differ between versions
         raise InputError("ROS arguments", " ".join(argv[1:]), " ".join(str(error).split())) from None
-    node = None
+    nodes: list[RigidBodyNode] = []
     executor = SingleThreadedExecutor()
-    thread = None
+    executor_thread = None
+    crashed = threading.Event()
+
+    def on_crash() -> None:
+        crashed.set()
+        stop.set()
+
+    physics = None
     try:
         with _saying_when_slow():
-            node = RigidBodyNode(_make_observer)
-            _warm_up(node)
-        executor.add_node(node)
+            if bodies:
+                for body_name, values in bodies.items():
+                    overrides = given_parameters(values)
+                    nodes.append(RigidBodyNode(_make_observer, body_name, parameter_overrides=overrides))
+            else:
+                nodes.append(RigidBodyNode(_make_observer))
+            for node in nodes:
+                _warm_up(node)
+        physics = PhysicsThread([node.flight for node in nodes], on_crash)
+        for node in nodes:
+            node.thread = physics
+            executor.add_node(node)
 
         def spin() -> None:
             try:
@@ -59,21 +79,28 @@ def _run(argv: list[str], stop: threading.Event) -> int:
                 pass
             stop.set()
 
-        thread = threading.Thread(target=spin, name="executor", daemon=True)
-        thread.start()
-        node.start()
-        node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
+        executor_thread = threading.Thread(target=spin, name="executor", daemon=True)
+        executor_thread.start()
+        physics.start()
+        for node in nodes:
+            node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
         stop.wait()
     finally:
-        if node is not None:
-            node.stop()
+        if physics is not None:
+            physics.stop()
+        for node in nodes:
+            node.close()
         executor.shutdown(timeout_sec=0.5)
-        if thread is not None:
-            thread.join(timeout=0.5)
-        if node is not None:
+        if executor_thread is not None:
+            executor_thread.join(timeout=0.5)
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+    return 1 if crashed.is_set() else 0
+
+
+def _warn(warning: str) -> None:
+    print(f"rigid_body_node: {warning}", file=sys.stderr)
 
 
 def _make_observer(scenario, node_name: str):
@@ -107,12 +134,12 @@ def _warm_up(node) -> None:
     from ..core.frames import parse_frame
     from ..core.simulation import Simulation
 
-    trial = Simulation(node.physics.scenario.setup)
+    trial = Simulation(node.flight.scenario.setup)
     for frame in ("world@point/0,0,0;duration=0.001", "body@point/0,0,0;impulse"):
         zero = (0.0, 0.0, 0.0)
         trial.submit(WrenchCommand(False, parse_frame(frame), zero, zero, 0, frame, b""))
-    state = trial.advance(2 * node.physics.scenario.setup.step_ns + 1)
-    node.states.publish(state)
+    state = trial.advance(2 * node.flight.scenario.setup.step_ns + 1)
+    node.states.pack_all(state)
 
 
 class _saying_when_slow:
@@ -121,7 +148,11 @@ class _saying_when_slow:
     def __enter__(self):
         self._started = time.monotonic()
         self._timer = threading.Timer(
-            2.0, lambda: print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
+            2.0,
+            lambda: print(
+                "rigid_body_node: still starting; a first start compiles kernels, which takes a while ...",
+                file=sys.stderr,
+            ),
         )
         self._timer.daemon = True
         self._timer.start()
@@ -131,7 +162,7 @@ class _saying_when_slow:
 
 
 def _described(node) -> str:
-    scenario = node.physics.scenario
+    scenario = node.flight.scenario
     mesh = scenario.values["mesh"] or "a body without a mesh"
     return f"{mesh}: {scenario.setup.body.mass:.6g} kg, integrator {scenario.setup.integrator.name}"
 

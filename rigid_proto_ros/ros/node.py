@@ -24,6 +24,7 @@ from .arguments import is_ros_parameter
 from .command_intake import TOPICS, CommandIntake
 from .diagnostics import REFUSAL_REASONS, Diagnostics
 from .event_publisher import EventPublisher
+from .flight import Flight
 from .node_name import NODE_NAME
 from .parameter_server import converted, declare_parameters, descriptor, ros_parameter
 from .physics_thread import PhysicsThread
@@ -31,29 +32,38 @@ from .state_publisher import StatePublisher
 
 
 class RigidBodyNode(Node):
-    """make_observer(scenario, node name) gives the viewer and recorder, or a null Observer.
+    """make_observer(scenario, node name) gives the viewer and recorder, or a null Observer. thread: the physics thread that
+    carries ``flight``, to be set before anything is asked of the running node.
 
     Raises InputError when a parameter given at start is refused.
     """
 
-    def __init__(self, make_observer: Callable[[Scenario, str], Observer] | None = None, **node_options) -> None:
-        super().__init__(NODE_NAME, **node_options)
+    def __init__(
+        self,
+        make_observer: Callable[[Scenario, str], Observer] | None = None,
+        node_name: str = NODE_NAME,
+        **node_options,
+    ) -> None:
+        super().__init__(node_name, **node_options)
+        self.thread: PhysicsThread | None = None
         scenario = make_scenario(declare_parameters(self))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
         self.world_frame = scenario.values["world_frame"]
         self.body_frame = scenario.values["body_frame"] or self.get_name()
         viewer = make_observer(scenario, self.get_name()) if make_observer else Observer()
+        self._is_viewed = type(viewer) is not Observer
         self.observer = Observers(EventPublisher(self, self.body_frame, self._mesh_path), viewer)
         self.states = StatePublisher(self, self.world_frame, self.body_frame, self._specific_force)
         self.states.configure(scenario.values)
-        self.physics = PhysicsThread(
+        self.flight = Flight(
             scenario,
             self.observer,
             self.states.publish,
             self._take_commands,
             self._motion_failed,
             self._followed_clock(scenario),
+            self._anybody_listens,
         )
         self.intake = CommandIntake(
             self,
@@ -70,16 +80,17 @@ class RigidBodyNode(Node):
         self.create_service(Trigger, "~/string/release", self._on_string_release)
         self._diagnostics = Diagnostics(self, self._diagnostic_values)
         tell_start(self.observer, scenario)
-        self.physics.simulation.announce()
+        self.flight.simulation.announce()
         self._tell_scene(scenario)
 
-    def start(self) -> None:
-        """Begin simulated time."""
-        self.physics.start()
+    def call(self, function: Callable):
+        """Run a function on the physics thread; returns what it returns."""
+        if self.thread is None:
+            return function()
+        return self.thread.call(self.flight, function)
 
-    def stop(self) -> None:
-        """End simulated time; whatever the observers hold goes out."""
-        self.physics.stop()
+    def close(self) -> None:
+        """After the physics thread has ended: whatever the observers hold goes out."""
         self.observer.close()
 
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
@@ -91,8 +102,11 @@ class RigidBodyNode(Node):
 
     # Commands, on the physics thread
 
-    def _take_commands(self) -> None:
-        self.intake.take(self.physics.simulation, self.physics.scenario)
+    def _anybody_listens(self) -> bool:
+        return self.states.look_for_subscribers() or self._is_viewed
+
+    def _take_commands(self, wall_ns: int) -> None:
+        self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
 
     def _command_refused(self, refusal: CommandRefused) -> None:
         self.get_logger().warning(f"refused: {refusal}", throttle_duration_sec=1.0)
@@ -102,29 +116,29 @@ class RigidBodyNode(Node):
 
     def _specific_force(self):
         """At the contact that ~/imu is mounted at, or the COM."""
-        contact, simulation = self.physics.scenario.values["imu_contact"], self.physics.simulation
+        contact, simulation = self.flight.scenario.values["imu_contact"], self.flight.simulation
         body = simulation.setup.body
         point = body.point(simulation.setup.contacts[contact]) if contact else np.zeros(3)
         return simulation.specific_force(point)
 
     def _apply_scheduled(self, changes: dict):
         """A scheduled ``set`` takes effect: the ROS parameters follow on the executor's thread."""
-        return self._take_on(self.physics.scenario.with_changes(changes))
+        return self._take_on(self.flight.scenario.with_changes(changes))
 
     def _apply_inertia(self, content: dict):
         """An inertia message takes effect."""
-        return self._take_on(check_inertia(self.physics.scenario, content))
+        return self._take_on(check_inertia(self.flight.scenario, content))
 
     def _mesh_path(self) -> str:
-        mesh = self.physics.scenario.body_mesh
+        mesh = self.flight.scenario.body_mesh
         return mesh.mesh.path if mesh else ""
 
     def _tell_scene(self, scenario: Scenario) -> None:
-        self.observer.scene_changed(self.physics.simulation.time_ns, scenario.text)
+        self.observer.scene_changed(self.flight.simulation.time_ns, scenario.text)
 
     def _take_on(self, scenario: Scenario):
-        self.physics.simulation.check_change(scenario.setup)
-        self.physics.change(scenario)
+        self.flight.simulation.check_change(scenario.setup)
+        self.flight.change(scenario)
         self._tell_scene(scenario)
         self._parameters_guard.trigger()
         return scenario.setup
@@ -163,25 +177,25 @@ class RigidBodyNode(Node):
 
     def _change(self, changes: dict) -> None:
         # Loading a mesh takes time that the physics thread hasn't got: this fills the caches before it.
-        self.physics.scenario.with_changes(changes)
+        self.flight.scenario.with_changes(changes)
 
         def change() -> None:
-            scenario = self.physics.scenario.with_changes(changes)
+            scenario = self.flight.scenario.with_changes(changes)
             try:
-                self.physics.simulation.check_change(scenario.setup)
+                self.flight.simulation.check_change(scenario.setup)
             except CommandRefused as refusal:
-                self.physics.simulation.refuse(refusal)
+                self.flight.simulation.refuse(refusal)
                 raise
-            self.physics.change(scenario)
-            self.physics.simulation.submit(Change(changes, lambda: scenario.setup))
+            self.flight.change(scenario)
+            self.flight.simulation.submit(Change(changes, lambda: scenario.setup))
             self._tell_scene(scenario)
 
-        self.physics.call(change)
-        self.states.configure(self.physics.scenario.values)
+        self.call(change)
+        self.states.configure(self.flight.scenario.values)
 
     def _store_parameters(self) -> None:
         """Bring the ROS parameters up to what scheduled commands and inertia messages have changed."""
-        values = self.physics.scenario.values
+        values = self.flight.scenario.values
         self._declare_new(values)
         behind = {n: v for n, v in values.items() if _plain(self.get_parameter(n).value) != v}
         if behind:
@@ -194,40 +208,40 @@ class RigidBodyNode(Node):
     # Services, on the executor's thread
 
     def _on_reset(self, request, response):
-        physics = self.physics
-        physics.call(physics.reset)
+        flight = self.flight
+        self.call(flight.reset)
         return _answer(response, "simulated time is 0")
 
     def _on_step(self, request, response):
-        physics = self.physics
-        if not physics.timekeeping.paused:
+        flight = self.flight
+        if not flight.timekeeping.paused:
             return _answer(response, "step: the simulation is running; pause it first", success=False)
-        reached_ns = physics.call(physics.step)
+        reached_ns = self.call(flight.step)
         return _answer(response, f"simulated time is {reached_ns / 1e9:.9g} s")
 
     def _on_pause(self, request, response):
-        physics = self.physics
-        physics.call(lambda: physics.pause(request.data))
+        flight = self.flight
+        self.call(lambda: flight.pause(request.data))
         return _answer(response, "paused" if request.data else "running")
 
     def _on_string_release(self, request, response):
-        self.physics.call(lambda: self.physics.simulation.submit(ReleaseString()))
+        self.call(lambda: self.flight.simulation.submit(ReleaseString()))
         return _answer(response, "the string is loose")
 
     def _on_clear_wrench(self, request, response):
-        self.physics.call(lambda: self.physics.simulation.submit(ClearWrench()))
+        self.call(lambda: self.flight.simulation.submit(ClearWrench()))
         return _answer(response, "no wrench acts; scheduled ones stay")
 
     # Reports
 
     def _diagnostic_values(self) -> dict:
-        physics, intake = self.physics, self.intake
-        simulation, timekeeping = physics.simulation, physics.timekeeping
+        flight, intake = self.flight, self.intake
+        simulation, timekeeping = flight.simulation, flight.timekeeping
         momentum = simulation.angular_momentum
         refused = dict(simulation.refused)
         return {
             "sim_time_ns": simulation.time_ns,
-            "publish_rate": physics.scenario.values["publish_rate"],
+            "publish_rate": flight.scenario.values["publish_rate"],
             "overruns": timekeeping.overruns,
             "real_time_lost_s": timekeeping.real_time_lost_s,
             **{f"{topic}_received": intake.received[topic] for topic in TOPICS},
@@ -247,7 +261,7 @@ class RigidBodyNode(Node):
             "steps": simulation.steps,
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
-            "recording": physics.scenario.values["record"],
+            "recording": flight.scenario.values["record"],
             "warning": simulation.failure or simulation.too_coarse,
         }
 

@@ -74,6 +74,11 @@ def ros_parameter(parameter: Parameter, value: object) -> RosParameter:
     return RosParameter(parameter.name, _ROS_TYPES[parameter.type], value)
 
 
+def given_parameters(values: dict[str, object]) -> list[RosParameter]:
+    """Values by name, as a scene file gives them, for a node's ``parameter_overrides``; raises InputError."""
+    return [ros_parameter(parameter_named(name), parameter_named(name).convert(v)) for name, v in values.items()]
+
+
 def converted(changes: list[RosParameter]) -> list[RosParameter]:
     """Parameters as a client sent them, each in its declared type; raises InputError."""
     result = []

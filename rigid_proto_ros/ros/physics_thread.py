@@ -1,244 +1,84 @@
 # SPDX-License-Identifier: MIT
-"""The thread that owns the simulation: it wakes at absolute deadlines, advances, publishes and takes commands.
+"""The thread that owns the flights: it wakes at absolute deadlines and lets each one do what is due.
 
-Everybody else hands work over with ``call``. Simulated time follows the wall clock by the real-time factor from an anchor,
-never by adding up periods, so that a late wake-up isn't carried on.
+Everybody else hands work over with ``call``; nothing else touches a simulation.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
 
-from ..core.observer import Observer
-from ..core.simulation import Simulation
-from ..core.state import State
-from ..scenario import Scenario, publication_ns
+from .flight import Flight
 
-DRAIN_NS = 10_000_000
-"""Commands are taken at least this often [ns of wall time]."""
-
-PAUSED_NS = 100_000_000
-"""States go out at 10 Hz while paused [ns of wall time]."""
-
-FOLLOW_NS = 1_000_000
-"""A followed clock is looked at this often [ns of wall time]."""
-
-MAX_LAG_NS = 250_000_000
-"""A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
-
-
-@dataclass
-class Timekeeping:
-    """overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up."""
-
-    overruns: int = 0
-    real_time_lost_s: float = 0.0
-    paused: bool = False
+SHORT_NS = 3_000_000
+"""Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
 
 
 class PhysicsThread:
-    """publish(state) is called for every publication; take_commands() at every tick, to submit what has arrived.
+    """flights: the bodies that it carries. on_crash() is called should the thread end by a fault of the program."""
 
-    on_failure(message) is called when the motion stopped in its last good state. followed_clock() gives nanoseconds of a clock
-    that simulated time follows instead of the wall's.
-    """
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        observer: Observer,
-        publish: Callable[[State], None],
-        take_commands: Callable[[], None],
-        on_failure: Callable[[str], None],
-        followed_clock: Callable[[], int] | None = None,
-    ) -> None:
-        self.scenario = scenario
-        self.observer = observer
-        self.simulation = Simulation(scenario.setup, observer)
-        self.timekeeping = Timekeeping(paused=scenario.values["start_paused"])
-        self._publish = publish
-        self._take_commands = take_commands
-        self._on_failure = on_failure
-        self._followed_clock = followed_clock
-        self._requests: list[tuple[Callable, Future]] = []
+    def __init__(self, flights: Sequence[Flight], on_crash: Callable[[], None] = lambda: None) -> None:
+        self._flights = list(flights)
+        self._on_crash = on_crash
+        self._requests: list[tuple[Flight, Callable, Future]] = []
         self._wake = threading.Event()
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="physics", daemon=True)
-
-    # For other threads
 
     def start(self) -> None:
         """Begin simulated time."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; requests that still wait fail."""
+        """End the thread; requests that still wait are cancelled."""
         self._stopping = True
         self._wake.set()
         if self._thread.ident is not None:
             self._thread.join(timeout=5.0)
-        for _, future in self._requests:
+        for _, _, future in self._requests:
             future.cancel()
 
-    def call(self, function: Callable, timeout_s: float = 10.0):
+    def call(self, flight: Flight, function: Callable, timeout_s: float = 10.0):
         """Run ``function`` on the physics thread between two ticks and return what it returns, or raise what it raises."""
         future: Future = Future()
-        self._requests.append((function, future))
+        self._requests.append((flight, function, future))
         self._wake.set()
         return future.result(timeout_s)
 
-    # For functions given to ``call``
-
-    def change(self, scenario: Scenario) -> None:
-        """Take on another scenario's time settings; its setup reaches the motion by a command."""
-        rate_changed = scenario.values["publish_rate"] != self.scenario.values["publish_rate"]
-        pace_changed = scenario.values["real_time_factor"] != self.scenario.values["real_time_factor"]
-        self.scenario = scenario
-        if rate_changed:
-            self._find_next_publication()
-        if pace_changed:
-            self._anchor()
-
-    def pause(self, paused: bool) -> None:
-        """Stop or resume simulated time."""
-        if paused != self.timekeeping.paused:
-            self.timekeeping.paused = paused
-            self.simulation.log("pause", {"data": paused})
-            self._anchor()
-
-    def step(self) -> int:
-        """While paused, advance to the next publication; returns its time [ns]."""
-        self.simulation.log("step", {})
-        self._find_next_publication()
-        self._publish_next()
-        return self.simulation.time_ns
-
-    def reset(self) -> None:
-        """Time 0 and the initial state; paused or running stays."""
-        # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
-        self.simulation.reset(self.scenario.setup)
-        self._publication = 0
-        self._anchor()
-
-    # The thread
-
     def _run(self) -> None:
-        self._publication = 0
-        self._anchor()
-        while not self._stopping:
-            self._wait_until(self._next_wake_ns())
-            self._serve_requests()
-            if self.timekeeping.paused:
-                self._tick_paused()
-            else:
-                self._tick_running()
-
-    def _tick_running(self) -> None:
-        """Advance to the present: publish what is due, then take the commands that have arrived."""
-        present_ns = self._simulated_present_ns()
-        due_ns = self._publication_ns()
-        while due_ns <= present_ns and not self._stopping:
-            if not self._publish_next():
-                return
-            due_ns = self._publication_ns()
-            if due_ns <= present_ns and self._factor > 0.0:
-                self.timekeeping.overruns += 1
-        if present_ns > self.simulation.time_ns:
-            self.simulation.advance(present_ns)
-            self._check_failure()
-        self._take_commands()
-        self._last_drain_ns = time.monotonic_ns()
-
-    def _tick_paused(self) -> None:
-        self._take_commands()
-        now_ns = time.monotonic_ns()
-        self._last_drain_ns = now_ns
-        if now_ns >= self._paused_publication_ns:
-            self._paused_publication_ns = now_ns + PAUSED_NS
-            self._publish(self.simulation.state)
-
-    def _publish_next(self) -> bool:
-        state = self.simulation.advance(self._publication_ns())
-        if self._check_failure():
-            return False
-        self._publication += 1
-        self.observer.state(state.time_ns, state.row)
-        self._publish(state)
-        return True
-
-    def _check_failure(self) -> bool:
-        if not self.simulation.failure:
-            return False
-        if not self.timekeeping.paused:
-            self.timekeeping.paused = True
-            self._on_failure(self.simulation.failure)
-        return True
-
-    # Time
-
-    @property
-    def _factor(self) -> float:
-        return self.scenario.values["real_time_factor"]
-
-    def _publication_ns(self) -> int:
-        return publication_ns(self._publication, self.scenario.values["publish_rate"])
-
-    def _find_next_publication(self) -> None:
-        """The first publication after the present."""
-        now_ns = self.simulation.time_ns
-        self._publication = max(0, int(now_ns * 1e-9 * self.scenario.values["publish_rate"]) - 1)
-        while self._publication_ns() <= now_ns:
-            self._publication += 1
-
-    def _anchor(self) -> None:
-        self._last_drain_ns = time.monotonic_ns()
-        self._anchor_wall_ns = self._followed_clock() if self._followed_clock else self._last_drain_ns
-        self._anchor_simulated_ns = self.simulation.time_ns
-        self._paused_publication_ns = 0
-
-    def _simulated_present_ns(self) -> int:
-        """Simulated time that the wall clock asks for; time lost beyond MAX_LAG_NS is given up and counted."""
-        if self._followed_clock:
-            passed_ns = self._followed_clock() - self._anchor_wall_ns
-            return max(self.simulation.time_ns, self._anchor_simulated_ns + passed_ns)
-        if self._factor == 0.0:
-            return self._publication_ns()
-        present_ns = self._anchor_simulated_ns + int((time.monotonic_ns() - self._anchor_wall_ns) * self._factor)
-        expected_ns = max(self.simulation.time_ns, self._publication_ns())
-        lag_ns = (present_ns - expected_ns) / self._factor
-        if lag_ns > MAX_LAG_NS:
-            self.timekeeping.real_time_lost_s += lag_ns * 1e-9
-            self.timekeeping.overruns += 1
-            self._anchor()
-            self._anchor_simulated_ns = expected_ns
-            present_ns = expected_ns
-        return present_ns
-
-    def _next_wake_ns(self) -> int:
-        latest_ns = self._last_drain_ns + DRAIN_NS
-        if self._followed_clock:
-            return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
-        if self.timekeeping.paused:
-            return latest_ns
-        if self._factor == 0.0:
-            return 0
-        ahead_ns = self._publication_ns() - self._anchor_simulated_ns
-        return min(latest_ns, self._anchor_wall_ns + int(ahead_ns / self._factor) + 1)
+        try:
+            for flight in self._flights:
+                flight.start()
+            while not self._stopping:
+                self._wait_until(min(flight.next_wake_ns() for flight in self._flights))
+                self._serve_requests()
+                now_ns = time.monotonic_ns()
+                for flight in self._flights:
+                    if flight.next_wake_ns() <= now_ns:
+                        flight.tick()
+        except Exception:
+            traceback.print_exc()
+            self._on_crash()
 
     def _wait_until(self, wall_ns: int) -> None:
         rest_ns = wall_ns - time.monotonic_ns()
-        if rest_ns > 0 and not self._requests:
+        if rest_ns <= 0 or self._requests:
+            return
+        if rest_ns < SHORT_NS:
+            time.sleep(rest_ns * 1e-9)
+        else:
             self._wake.wait(rest_ns * 1e-9)
-        self._wake.clear()
+            self._wake.clear()
 
     def _serve_requests(self) -> None:
         while self._requests:
-            function, future = self._requests.pop(0)
+            flight, function, future = self._requests.pop(0)
             if future.set_running_or_notify_cancel():
+                flight.meet_request()
                 try:
                     future.set_result(function())
                 except BaseException as error:  # the caller's to handle

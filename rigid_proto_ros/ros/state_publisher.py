@@ -32,28 +32,28 @@ class StatePublisher:
         def publisher(message_type, topic):
             return node.create_publisher(message_type, f"~/{topic}", qos.STATE, qos_overriding_options=qos.OVERRIDABLE)
 
-        self._pose = publisher(PoseStamped, "pose"), cdr.StampedTemplate(world_frame, 7)
-        self._twist = publisher(TwistStamped, "twist"), cdr.StampedTemplate(world_frame, 6)
-        self._odom = (
-            publisher(Odometry, "odom"),
-            cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame),
-        )
+        self._pose = publisher(PoseStamped, "pose")
+        self._twist = publisher(TwistStamped, "twist")
+        self._odom = publisher(Odometry, "odom")
+        self._pose_template = cdr.StampedTemplate(world_frame, 7)
+        self._twist_template = cdr.StampedTemplate(world_frame, 6)
+        self._odom_template = cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame)
         self._imu = publisher(Imu, "imu")
         self._clock = None
         self._tf = None
+        self._wanted: list = []
 
     def configure(self, values: Mapping[str, object]) -> None:
         """Create or drop the publishers of /clock and /tf; runs on the executor's thread."""
         if values["publish_clock"] and self._clock is None:
             self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
         elif not values["publish_clock"] and self._clock is not None:
-            clock, self._clock = self._clock, None
-            self._node.destroy_publisher(clock)
+            # Kept, silent: the physics thread may be publishing on it at this moment.
+            self._clock = None
         if values["publish_tf"] and self._tf is None:
             self._tf = self._tf_publisher()
         elif not values["publish_tf"] and self._tf is not None:
-            tf, self._tf = self._tf, None
-            self._node.destroy_publisher(tf)
+            self._tf = None
 
     def _tf_publisher(self):
         try:
@@ -63,39 +63,53 @@ class StatePublisher:
             return None
         return self._node.create_publisher(TFMessage, "/tf", qos.TF)
 
-    def publish(self, state: State) -> None:
-        """Publish one state on every topic that has a subscriber."""
-        time_ns, row = state.time_ns, state.row.tolist()
-        q, v, w = row[3:7], row[7:10], row[10:13]
-        clock = self._clock
-        if clock is not None and clock.get_subscription_count():
-            clock.publish(cdr.time(time_ns))
-        publisher, template = self._pose
-        if publisher.get_subscription_count():
-            publisher.publish(bytes(template.pack(time_ns, row[:7])))
-        publisher, template = self._twist
-        if publisher.get_subscription_count():
-            publisher.publish(bytes(template.pack(time_ns, [*v, *rotate(*q, *w)])))
-        publisher, template = self._odom
-        if publisher.get_subscription_count():
-            # An Odometry's twist is in the child frame: body axes.
-            template.pack(time_ns, row[:7])
-            v_body = rotate(-q[0], -q[1], -q[2], q[3], *v)
-            publisher.publish(bytes(template.pack(time_ns, [*v_body, *w], at=cdr.ODOMETRY_TWIST_AT)))
-        if self._imu.get_subscription_count():
-            self._imu.publish(self._imu_message(time_ns, q, w))
-        tf = self._tf
-        if tf is not None and tf.get_subscription_count():
-            tf.publish(self._transform(tf.msg_type, time_ns, row))
+    def look_for_subscribers(self) -> bool:
+        """Note which topics have subscribers, for ``publish`` to go by; whether any has."""
+        self._wanted = [(p, message) for p, message in self._topics() if p.get_subscription_count()]
+        return bool(self._wanted)
 
-    def _imu_message(self, time_ns: int, q: list[float], w: list[float]) -> Imu:
+    def publish(self, state: State) -> None:
+        """Publish one state on every topic that had a subscriber at the last look."""
+        if not self._wanted:
+            return
+        row = state.row.tolist()
+        for publisher, message in self._wanted:
+            publisher.publish(message(state.time_ns, row))
+
+    def pack_all(self, state: State) -> None:
+        """Make every message once and publish none, so that what they need is compiled."""
+        for _, message in self._topics():
+            message(state.time_ns, state.row.tolist())
+
+    def _topics(self) -> list:
+        topics = [(self._pose, self._pose_message), (self._twist, self._twist_message)]
+        topics += [(self._odom, self._odom_message), (self._imu, self._imu_message)]
+        if self._clock is not None:
+            topics.insert(0, (self._clock, lambda time_ns, row: cdr.time(time_ns)))
+        if self._tf is not None:
+            topics.append((self._tf, self._transform))
+        return topics
+
+    def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
+        return bytes(self._pose_template.pack(time_ns, row[:7]))
+
+    def _twist_message(self, time_ns: int, row: list[float]) -> bytes:
+        return bytes(self._twist_template.pack(time_ns, [*row[7:10], *rotate(*row[3:7], *row[10:13])]))
+
+    def _odom_message(self, time_ns: int, row: list[float]) -> bytes:
+        # An Odometry's twist is in the child frame: body axes.
+        self._odom_template.pack(time_ns, row[:7])
+        v_body = rotate(-row[3], -row[4], -row[5], row[6], *row[7:10])
+        return bytes(self._odom_template.pack(time_ns, [*v_body, *row[10:13]], at=cdr.ODOMETRY_TWIST_AT))
+
+    def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and exact specific force, both in body axes, at the contact that was chosen."""
         message = Imu()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
         message.header.frame_id = self._frames[1]
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
-        o.x, o.y, o.z, o.w = q
-        rate.x, rate.y, rate.z = w
+        o.x, o.y, o.z, o.w = row[3:7]
+        rate.x, rate.y, rate.z = row[10:13]
         felt.x, felt.y, felt.z = self._specific_force().tolist()
         return message
 

@@ -4,11 +4,15 @@
 An integrator takes the variables of a segment (core/motion.py) forward in time under the segment's problem
 (core/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone, and
 ``advance`` commits only steps at full length, so that looking at the motion never changes it.
+
+Kernels divide as IEEE 754 does (``error_model="numpy"``): a step that explodes comes out as inf or NaN and is refused, where
+Python's rule would raise in the middle of it.
 """
 
 from __future__ import annotations
 
 from ..errors import CommandRefused, InputError
+from .auto import AUTO
 from .discrete_gradient import DISCRETE_GRADIENT
 from .dop853 import DOP853
 from .euler import EULER
@@ -26,6 +30,7 @@ from .taylor import TAYLOR
 INTEGRATORS: dict[str, Integrator] = {
     integrator.name: integrator
     for integrator in (
+        AUTO,
         EULER,
         MIDPOINT,
         SEMI_IMPLICIT_EULER,

@@ -62,7 +62,7 @@ _PULL_TRIALS = 100
 _O, _FORCE, _A0, _A1 = 0, 3, 6, 9
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _momentum(y, p, h, mu, rho, s):
     """I(ω⁺ − ω) from the mean spin s[0:3] under the pull F = −μ(a + a⁺) + ρ a; keeps F, a and a⁺ in s."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
@@ -99,7 +99,7 @@ def _momentum(y, p, h, mu, rho, s):
     return h * tx, h * ty, h * tz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve_spin(y, p, h, mu, rho, s):
     """The mean spin under a given pull, from the one in s; returns whether it was found."""
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
@@ -121,12 +121,12 @@ def _solve_spin(y, p, h, mu, rho, s):
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _length(s, at):
     return math.sqrt(s[at] * s[at] + s[at + 1] * s[at + 1] + s[at + 2] * s[at + 2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _tension(l0, l1, h, p):
     """T over a step from length l0 to l1, and the part of the way θ in which the damper works."""
     k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
@@ -145,7 +145,7 @@ def _tension(l0, l1, h, p):
     return max(0.0, spring + part * c * (x1 - x0) / h), part
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _excess(y, p, h, mu, s):
     """μ(l + l⁺) − T(l⁺): rises with μ. NaN where the spin was not found."""
     if not _solve_spin(y, p, h, mu, 0.0, s):
@@ -155,7 +155,20 @@ def _excess(y, p, h, mu, s):
     return mu * (l0 + l1) - tension
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _lightness(y, p, s):
+    """1/m + (r × n)ᵀ I⁻¹ (r × n) with n along a: what the knot yields to a pull."""
+    length = _length(s, _A0)
+    if length == 0.0:
+        return 1.0 / p[MASS]
+    x, z, w = s[_A0] / length, s[_A0 + 1] / length, s[_A0 + 2] / length
+    nx, ny, nz = rotate_inverse(y[0], y[1], y[2], y[3], x, z, w)
+    rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    a, b, c = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
+    return 1.0 / p[MASS] + a * a / p[MOMENTS] + b * b / p[MOMENTS + 1] + c * c / p[MOMENTS + 2]
+
+
+@njit(cache=True, error_model="numpy")
 def _solve_pull(y, p, h, s):
     """μ, the spin with it left in s; NaN when there is none."""
     lower, upper = -math.inf, math.inf
@@ -167,8 +180,8 @@ def _solve_pull(y, p, h, s):
     if p[BILATERAL] != 0.0:
         # A push so strong that 1 + ½h²μ/m vanishes is no solution.
         lower = -2.0 * p[MASS] / (h * h)
-    # The slope of μ(l + l⁺) − T without the body's turning, which makes the knot only lighter.
-    give = 0.5 * h * h / p[MASS]
+    # The slope of μ(l + l⁺) − T by the mass that the knot shows along the string.
+    give = 0.5 * h * h * _lightness(y, p, s)
     stiff = 0.5 * p[STIFFNESS] + p[STRING_DAMPING] / h
     slope = (l0 + l1) * (1.0 + give * stiff)
     old_mu, old_f = mu, f
@@ -185,8 +198,8 @@ def _solve_pull(y, p, h, s):
         if not math.isfinite(f):
             return math.nan
         l0, l1 = _length(s, _A0), _length(s, _A1)
-        # What one rounding of the lengths does to T: below it f has no sign.
-        if abs(f) <= 2.0 * ROUNDING * (stiff + abs(mu)) * (l0 + l1):
+        # What rounding of the lengths does to T: below it f has no sign.
+        if abs(f) <= 8.0 * ROUNDING * (stiff + abs(mu)) * (l0 + l1):
             return mu
         slope = (f - old_f) / (mu - old_mu)
         if abs(f) > 0.5 * abs(old_f) and bracketed:
@@ -197,7 +210,7 @@ def _solve_pull(y, p, h, s):
     return mu
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _step(y, p, h, out, s):
     """One step from y into out; returns whether a solution was found."""
     s[_O], s[_O + 1], s[_O + 2] = y[4], y[5], y[6]
@@ -226,7 +239,7 @@ def _step(y, p, h, out, s):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _translate(y, p, h, out, s):
     """Displacement, velocity and the string's energies from the force in s."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
@@ -258,7 +271,7 @@ def _translate(y, p, h, out, s):
         out[HEAT] = y[HEAT] + (tension * (l1 - l0) - 0.5 * p[STIFFNESS] * (x1 - x0) * (x1 + x0))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def discrete_gradient_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new, scratch = y.copy(), np.zeros(12)

@@ -17,7 +17,7 @@ from .runge_kutta import advance, is_good, rates, stages
 from .stepping import FixedSteps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dop853_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     k, z, new = np.zeros((12, 15)), np.empty(15), np.empty(15)
@@ -31,7 +31,7 @@ def dop853_steps(y, p, h, n):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dop853_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
     k, z, new, trial = np.zeros((12, 15)), np.empty(15), np.empty(15), np.empty(15)

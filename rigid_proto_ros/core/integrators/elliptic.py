@@ -20,7 +20,7 @@ _DUPLICATION = 3e-3
 """Carlson's series of fifth order errs by about the sixth power of the arguments' relative spread: 1e-16 of it."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def complete_quarter_period(m1):
     """K(m) by the arithmetic-geometric mean, m₁ > 0."""
     a, b = 1.0, math.sqrt(m1)
@@ -30,7 +30,7 @@ def complete_quarter_period(m1):
     return math.pi / (a + b)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sn_cn_dn(u, m, m1):
     """sn, cn, dn (u | m); cn and dn keep their relative accuracy where they are small. |u| ≤ K, or m₁ = 0."""
     if m1 == 0.0:
@@ -43,7 +43,7 @@ def sn_cn_dn(u, m, m1):
     return _by_landen(u, m1)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _by_series(u, m):
     """Maclaurin series, after halving u until it is small; then duplication (A&S 16.18)."""
     doublings = 0
@@ -79,7 +79,7 @@ def _by_series(u, m):
     return s, c, d
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _by_landen(u, m1):
     """Bulirsch's sncndn: descending Landen transformations of cot am, which keeps small cn and dn accurate."""
     squeeze = m1
@@ -110,7 +110,7 @@ def _by_landen(u, m1):
     return sn, c * sn, d
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _set(values, index, value):
     """A tuple of 14 with one entry replaced: tuples live in registers where an array would be allocated each call."""
     return (
@@ -131,7 +131,7 @@ def _set(values, index, value):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def carlson_rf(x, y, z):
     """R_F(x, y, z), arguments ≥ 0, at most one of them 0."""
     while True:
@@ -146,7 +146,7 @@ def carlson_rf(x, y, z):
     return (1.0 + (e2 / 24.0 - 0.1 - 3.0 * e3 / 44.0) * e2 + e3 / 14.0) / math.sqrt(mean)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _rc_of_one(e):
     """R_C(1, 1 + e), e > −1."""
     if abs(e) < 1e-3:
@@ -156,7 +156,7 @@ def _rc_of_one(e):
     return math.atan(root) / root if e > 0.0 else math.atanh(root) / root
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def carlson_rj(x, y, z, p):
     """R_J(x, y, z, p), x, y, z ≥ 0 with at most one of them 0, p > 0."""
     delta = (p - x) * (p - y) * (p - z)

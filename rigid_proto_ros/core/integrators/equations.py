@@ -38,7 +38,7 @@ from ..rotation import rotate, rotate_inverse
 from ..string import NO_DIRECTION
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def undamped_torque(qx, qy, qz, qw, p):
     """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
     tx, ty, tz = p[TORQUE_BODY], p[TORQUE_BODY + 1], p[TORQUE_BODY + 2]
@@ -55,7 +55,7 @@ def undamped_torque(qx, qy, qz, qw, p):
     return tx, ty, tz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def torque(qx, qy, qz, qw, wx, wy, wz, p):
     """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
     tx, ty, tz = undamped_torque(qx, qy, qz, qw, p)
@@ -63,7 +63,7 @@ def torque(qx, qy, qz, qw, wx, wy, wz, p):
     return tx - c * wx, ty - c * wy, tz - c * wz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def angular_acceleration(wx, wy, wz, tx, ty, tz, p):
     """Euler's equations in principal axes: ω' = I⁻¹(τ − ω × Iω); without the gyroscopic term I⁻¹τ."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
@@ -71,7 +71,7 @@ def angular_acceleration(wx, wy, wz, tx, ty, tz, p):
     return (tx - g * (c - b) * wy * wz) / a, (ty - g * (a - c) * wz * wx) / b, (tz - g * (b - a) * wx * wy) / c
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def added_acceleration(qx, qy, qz, qw, ux, uy, uz, p):
     """Acceleration of the added motion without the string: its constant part, R g_b and −c_v u."""
     B, G = ACCELERATION_BODY, ACCELERATION_ADDED
@@ -80,7 +80,7 @@ def added_acceleration(qx, qy, qz, qw, ux, uy, uz, p):
     return ax + (p[G] - c * ux), ay + (p[G + 1] - c * uy), az + (p[G + 2] - c * uz)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p):
     """From the free end to the knot, a (3,), and its rate a' (3,), world axes."""
     A, S = ATTACH, STRING_START
@@ -90,7 +90,7 @@ def knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p):
     return p[S] + dx + bx, p[S + 1] + dy + by, p[S + 2] + dz + bz, ux + vx, uy + vy, uz + vz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def string_pull(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
     """Force on the knot (world axes), torque about the COM (principal axes), power of the hand, power lost in the damper."""
     ax, ay, az, vx, vy, vz = knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p)
@@ -114,7 +114,7 @@ def string_pull(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
     return fx, fy, fz, ry * bz - rz * by, rz * bx - rx * bz, rx * by - ry * bx, work, heat
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def accelerations(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
     """ω' (principal axes), u' (world axes), power of the hand, power lost in the string's damper, for a unit q."""
     tx, ty, tz = torque(qx, qy, qz, qw, wx, wy, wz, p)
@@ -132,7 +132,7 @@ def accelerations(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
     return ex, ey, ez, ax, ay, az, work, heat
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stretch(y, p):
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p[BILATERAL] != 0.0 or p[HAS_STRING] == 0.0:
@@ -144,7 +144,7 @@ def stretch(y, p):
     return length - p[REST_LENGTH], (ax * vx + ay * vy + az * vz) / length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tension_margin(x, rate, p):
     """Positive exactly while the string pulls: min(k x, k x + c x')."""
     spring = p[STIFFNESS] * x

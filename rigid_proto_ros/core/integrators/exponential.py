@@ -8,7 +8,7 @@ import math
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def exponential(x, y, z):
     """Unit quaternion xyzw of the turn by |v| [rad] about v = (x, y, z); exact in the limit of small turns too."""
     angle = math.sqrt(x * x + y * y + z * z)

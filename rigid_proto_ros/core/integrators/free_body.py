@@ -18,7 +18,7 @@ from .integrator import MAX_SPEED, Integrator
 from .stepping import OneStep
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def free_body_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     q0, q1, q2, q3, w1, w2, w3 = y[0], y[1], y[2], y[3], y[4], y[5], y[6]

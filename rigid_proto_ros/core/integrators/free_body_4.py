@@ -24,7 +24,7 @@ KICKS = (_B1, _B2, _B3, 1.0 - 2.0 * (_B1 + _B2 + _B3), _B3, _B2, _B1)
 DRIFTS = (_A1, _A2, 0.5 - (_A1 + _A2), 0.5 - (_A1 + _A2), _A2, _A1)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def free_body_4_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]

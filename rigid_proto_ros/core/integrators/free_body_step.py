@@ -38,6 +38,9 @@ SHORT = 0.4
 FARTHEST_ON_SEPARATRIX = 300.0
 """u at which a body on the separatrix lies on its middle axis to 1e-130; beyond it sech² would leave the doubles."""
 
+NO_SPIN = 1e-140
+"""Part of the largest ω below which a component is taken as none: its square times a ratio of moments would leave the doubles."""
+
 # Gauss-Legendre nodes and weights on (0, 1); ψ' has its poles at least about 1.2 from the real u axis.
 _NODES_3 = (0.11270166537925831, 0.5, 0.8872983346207417)
 _WEIGHTS_3 = (0.2777777777777778, 0.4444444444444444, 0.2777777777777778)
@@ -53,7 +56,7 @@ _WEIGHTS_8 = (
 )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
     """Attitude q and ω (principal axes, moments i1 ≤ i2 ≤ i3) after h seconds without torque."""
     largest = max(abs(wx), abs(wy), abs(wz))
@@ -64,6 +67,12 @@ def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
     _, f = math.frexp(i3)
     wx, wy, wz, h = math.ldexp(wx, -e), math.ldexp(wy, -e), math.ldexp(wz, -e), math.ldexp(h, e)
     i1, i2, i3 = math.ldexp(i1, -f), math.ldexp(i2, -f), math.ldexp(i3, -f)
+    if not math.isfinite(wx + wy + wz + h):
+        # A runaway of the scheme around it; the iterations below would never end.
+        return math.nan, math.nan, math.nan, math.nan, wx, wy, wz
+    wx = 0.0 if abs(wx) < NO_SPIN else wx
+    wy = 0.0 if abs(wy) < NO_SPIN else wy
+    wz = 0.0 if abs(wz) < NO_SPIN else wz
     side = i3 * (i3 - i2) * wz * wz - i1 * (i2 - i1) * wx * wx
     about_third = side > 0.0 if side != 0.0 else i3 - i2 >= i2 - i1
     if about_third:
@@ -85,7 +94,7 @@ def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
     return qx, qy, qz, qw, math.ldexp(u, e), math.ldexp(v, e), math.ldexp(w, e)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _circulate(A, B, C, w1, w2, w3, h):
     """The turn r xyzw (not normalized) over h, and w after it."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
@@ -108,7 +117,7 @@ def _circulate(A, B, C, w1, w2, w3, h):
     return tx, ty, tz, tw, v1, v2, v3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _even_turn(w1, w2, w3, h):
     """Turn by |w| h about w."""
     size = math.sqrt(w1 * w1 + w2 * w2 + w3 * w3)
@@ -116,14 +125,14 @@ def _even_turn(w1, w2, w3, h):
     return w1 * s, w2 * s, w3 * s, math.cos(0.5 * size * h)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _third(w3, twist, beta, rate, m, t):
     """w₃ after t, from the short-time sn, cn, dn; ``twist`` is (B−A)/C w₁w₂."""
     s, c, d = sn_cn_dn(rate * t, m, 1.0)
     return (w3 * d - twist * (s / rate) * c) / (1.0 - beta * s * s)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _short(A, B, C, w1, w2, w3, P, rate, m, h):
     """w and ψ after a short h; w as increments, which keeps energy and momentum from drifting."""
     beta = B * abs(B - A) * w2 * w2 / P
@@ -156,7 +165,7 @@ def _short(A, B, C, w1, w2, w3, P, rate, m, h):
     return w1 + d1, w2 + d2, w3 + d3, h * total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
     """w and ψ after any h."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
@@ -207,7 +216,7 @@ def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
     return v1, v2, v3, psi + E2 / L * (beyond / rate)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _distance_from_separatrix(A, B, C, w1, w3):
     """C|C−B| w₃² − A|B−A| w₁² ≥ 0 in pairs of doubles: near the separatrix the motion hangs on its last digits."""
     g, g_low = two_sum(C, -B)
@@ -222,7 +231,7 @@ def _distance_from_separatrix(A, B, C, w1, w3):
     return abs(distance)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gauss_phase(cn, sn, dn, k1):
     """sn and cn of Gauss's transformed modulus, both turned by half a period where cn < 0."""
     s = sn * (1.0 + k1) / (1.0 + dn)
@@ -233,14 +242,14 @@ def _gauss_phase(cn, sn, dn, k1):
     return s / size, c / size
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _first_kind(s, c, modulus1):
     """F(φ) with sin φ = s, cos φ = c ≥ 0."""
     cc = c * c
     return s * carlson_rf(cc, cc + modulus1 * s * s, 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _third_kind(s, c, modulus1, nu):
     """∫ sin²/(1 + ν sin²)/√(1 − κ² sin²) from 0 to φ."""
     cc, ss = c * c, s * s

@@ -20,7 +20,7 @@ from .runge_kutta import is_good
 from .stepping import FixedSteps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def free_body_strang_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]

@@ -11,7 +11,7 @@ import math
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def columns(x, y, z, w):
     """Columns of the rotation matrix of a unit quaternion."""
     return (
@@ -21,7 +21,7 @@ def columns(x, y, z, w):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def turned(start, at, wx, wy, wz, h):
     """``start`` + h R [ω]× with R = ``at``: each axis moves with the velocity of its tip."""
     e, f, g = at
@@ -45,7 +45,7 @@ def turned(start, at, wx, wy, wz, h):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def orthonormal(matrix):
     """Gram-Schmidt: the first axis keeps its direction, the second its plane, the third completes the right hand."""
     a, b, _ = matrix
@@ -55,13 +55,13 @@ def orthonormal(matrix):
     return a, b, (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _unit(v):
     scale = 1.0 / math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return v[0] * scale, v[1] * scale, v[2] * scale
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def quaternion_near(matrix, qx, qy, qz, qw):
     """Unit quaternion of a rotation matrix, of the two signs the one nearer to q (Shepperd 1978)."""
     a, b, c = matrix

@@ -18,7 +18,7 @@ from ..rotation import rotate
 from .equations import undamped_torque
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def push(y, p):
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
@@ -29,7 +29,7 @@ def push(y, p):
     return tx, ty, tz, ax + p[G], ay + p[G + 1], az + p[G + 2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def kick(y, p, h, pushed):
     """Let ``push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
     angular, linear = p[DAMPING_ANGULAR], p[DAMPING_LINEAR]
@@ -45,7 +45,7 @@ def kick(y, p, h, pushed):
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def drift_freely(y, p, h):
     """Move the added displacement on with its velocity for h seconds, in place."""
     for k in range(3):

@@ -33,7 +33,7 @@ from .runge_kutta import is_good
 from .stepping import FixedSteps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _change_of_momentum(y, ox, oy, oz, p, h):
     """I(ω⁺ − ω) that follows from the mean spin."""
     mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
@@ -43,7 +43,7 @@ def _change_of_momentum(y, ox, oy, oz, p, h):
     return h * (tx + gx), h * (ty + gy), h * (tz + gz)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _step(y, p, h, out):
     """One step from y into out; returns whether the iteration converged."""
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
@@ -77,7 +77,7 @@ def _step(y, p, h, out):
     return converged
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def lie_midpoint_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()

@@ -19,7 +19,7 @@ from .runge_kutta import is_good
 from .stepping import FixedSteps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _step(y, p, h, taut, out):
     """One step of h seconds from y into out, the string's law given."""
     qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
@@ -42,7 +42,7 @@ def _step(y, p, h, taut, out):
     out[13], out[14] = y[13] + h * work, y[14] + h * heat
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def midpoint_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
@@ -54,7 +54,7 @@ def midpoint_steps(y, p, h, n):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def midpoint_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
     new, trial = np.empty(15), np.empty(15)

@@ -26,7 +26,7 @@ MAX_ITERATIONS = 60
 ROUNDING = 2.0**-52
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def half_turned(qx, qy, qz, qw, ox, oy, oz, h):
     """The mean attitude: half of the Cayley turn of ω̄ after q."""
     a, b, c = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
@@ -35,14 +35,14 @@ def half_turned(qx, qy, qz, qw, ox, oy, oz, h):
     return normalize(qx, qy, qz, qw)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cayley_turned(qx, qy, qz, qw, ox, oy, oz, h):
     """The attitude after the whole turn: q ⊗ (½hω̄, 1), normalized."""
     qx, qy, qz, qw = multiply(qx, qy, qz, qw, 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz, 1.0)
     return normalize(qx, qy, qz, qw)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mean_torque(ox, oy, oz, tx, ty, tz, h):
     """t − ½h ω̄ × t for a torque (tx, ty, tz) in the axes of the mean attitude."""
     s = math.sqrt(1.0 + 0.25 * h * h * (ox * ox + oy * oy + oz * oz))
@@ -50,14 +50,14 @@ def mean_torque(ox, oy, oz, tx, ty, tz, h):
     return s * tx + along * ox, s * ty + along * oy, s * tz + along * oz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gyroscopic_torque(ox, oy, oz, p):
     """−ω̄ × Iω̄."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     return (b - c) * oy * oz, (c - a) * oz * ox, (a - b) * ox * oy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def newton_correction(ox, oy, oz, rx, ry, rz, h, p, extra, ax, ay, az):
     """δ with J δ = −residual r of 2I(ω̄ − ω) − h(...) = 0.
 

@@ -25,7 +25,7 @@ TABLEAU = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 
 WEIGHTS = np.array([1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _rates(qx, qy, qz, qw, wx, wy, wz, ux, uy, uz, p, translate):
     """Time derivatives of q, ω and the added velocity u."""
     nx, ny, nz, nw = qx, qy, qz, qw
@@ -44,7 +44,7 @@ def _rates(qx, qy, qz, qw, wx, wy, wz, ux, uy, uz, p, translate):
     return dqx, dqy, dqz, dqw, ax, ay, az, 0.0, 0.0, 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _sum(y, k, c):
     """y + c k over q, ω and u."""
     return (
@@ -61,7 +61,7 @@ def _sum(y, k, c):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rk4_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     translate = p[TRANSLATES] != 0.0
@@ -94,7 +94,7 @@ def rk4_steps(y, p, h, n):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rk4_string_steps(y, p, h, n):
     """The same by the tableau, each step cut where the string turns slack or taut."""
     k, z, new, trial = np.zeros((4, 15)), np.empty(15), np.empty(15), np.empty(15)

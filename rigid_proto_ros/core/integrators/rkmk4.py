@@ -20,7 +20,7 @@ from .runge_kutta import is_good
 from .stepping import FixedSteps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _stage(y, p, h, taut, k):
     """Rates (14) of σ, ω, d, u, work and heat at the variables that the rates k lead to in h seconds."""
     sx, sy, sz = h * k[0], h * k[1], h * k[2]
@@ -37,7 +37,7 @@ def _stage(y, p, h, taut, k):
     return ox, oy, oz, ex, ey, ez, ux, uy, uz, ax, ay, az, work, heat
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _step(y, p, h, taut, out):
     """One step of h seconds from y into out, the string's law given."""
     k1 = _stage(y, p, 0.0, taut, (0.0,) * 14)
@@ -55,7 +55,7 @@ def _step(y, p, h, taut, out):
         out[4 + j] = y[4 + j] + sixth * (k1[3 + j] + 2.0 * (k2[3 + j] + k3[3 + j]) + k4[3 + j])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rkmk4_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
@@ -67,7 +67,7 @@ def rkmk4_steps(y, p, h, n):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rkmk4_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
     new, trial = np.empty(15), np.empty(15)

@@ -18,7 +18,7 @@ from .equations import accelerations
 from .integrator import MAX_SPEED
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def integrated(p):
     """How many of the variables change: attitude and spin; with added motion also that; with a string also its energies."""
     if p[HAS_STRING] != 0.0:
@@ -26,7 +26,7 @@ def integrated(p):
     return 13 if p[TRANSLATES] != 0.0 else 7
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rates(z, p, taut, k):
     """Time derivatives k of variables z, both (15,)."""
     qx, qy, qz, qw = z[0], z[1], z[2], z[3]
@@ -43,7 +43,7 @@ def rates(z, p, taut, k):
     k[7], k[8], k[9] = z[10], z[11], z[12]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stages(y, p, h, taut, A, count, k, z):
     """Fill the stage derivatives k (count, 15); k[0] must hold the rates at y. z (15,) is scratch."""
     size = integrated(p)
@@ -60,7 +60,7 @@ def stages(y, p, h, taut, A, count, k, z):
         rates(z, p, taut, k[i])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(y, p, h, B, count, k, out):
     """The new variables from the stages: out = y + h Σ bᵢ kᵢ with a unit quaternion."""
     size = integrated(p)
@@ -74,7 +74,7 @@ def advance(y, p, h, B, count, k, out):
     out[0], out[1], out[2], out[3] = normalize(out[0], out[1], out[2], out[3])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def is_good(y):
     """Finite and no runaway."""
     size = 0.0

@@ -20,7 +20,7 @@ from .runge_kutta import is_good
 from .stepping import FixedSteps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _step(y, p, h, taut, out):
     """One step of h seconds from y into out, the string's law given."""
     qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
@@ -37,7 +37,7 @@ def _step(y, p, h, taut, out):
     out[13], out[14] = y[13] + h * work, y[14] + h * heat
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def semi_implicit_euler_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
@@ -49,7 +49,7 @@ def semi_implicit_euler_steps(y, p, h, n):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def semi_implicit_euler_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
     new, trial = np.empty(15), np.empty(15)

@@ -41,13 +41,13 @@ _MAX_SWITCHES = 1000
 """In one step: more is chatter of a step far too long for its string, and the rest of it is taken with one law."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def new_search():
     """The search's own numbers, to be kept by the integrator."""
     return np.zeros(_SIZE)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def begin(s, y, p, h):
     """Start a step of h seconds from variables y."""
     x, rate = stretch(y, p)
@@ -60,7 +60,7 @@ def begin(s, y, p, h):
     _begin_part(s, x, rate, margin)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _begin_part(s, x, rate, margin):
     s[_PHASE] = _WHOLE
     s[TRIAL] = s[REMAINING]
@@ -69,7 +69,7 @@ def _begin_part(s, x, rate, margin):
     s[_TRIALS] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def judge(s, trial, p):
     """Whether the trial step is accepted (its heat then completed); s says what is to be done next until nothing remains."""
     x, rate = stretch(trial, p)
@@ -85,7 +85,7 @@ def judge(s, trial, p):
         s[_EDGE] = 0.0
         return False
     if phase == _WHOLE and right:
-        hidden = _extremum(s[_X], s[_RATE], x, rate, s[TRIAL], s[TAUT] != 0.0)
+        hidden = extremum(s[_X], s[_RATE], x, rate, s[TRIAL], s[TAUT] != 0.0)
         if hidden <= 0.0:
             return _accept(s, trial, p, x, rate, margin, False)
         s[_PHASE] = _PEEK
@@ -108,7 +108,7 @@ def judge(s, trial, p):
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _next_trial(s):
     low, high, resolution = s[_LOW], s[_HIGH], s[_RESOLUTION]
     s[_TRIALS] += 1.0
@@ -127,7 +127,7 @@ def _next_trial(s):
     s[TRIAL] = min(max(middle, low + resolution), high - resolution)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _accept(s, trial, p, x, rate, margin, switches):
     if s[TAUT] == 0.0:
         # Stretched but not pulling, because it shortens faster than its damper lets it: the damper takes all of ½ k x².
@@ -146,8 +146,8 @@ def _accept(s, trial, p, x, rate, margin, switches):
     return True
 
 
-@njit(cache=True)
-def _extremum(x0, rate0, x1, rate1, h, taut):
+@njit(cache=True, error_model="numpy")
+def extremum(x0, rate0, x1, rate1, h, taut):
     """Time in (0, h) at which the cubic through both ends dips below zero (taut) or rises above it (slack); else 0."""
     sign = -1.0 if taut else 1.0
     if not (sign * rate0 > 0.0 and sign * rate1 < 0.0):

@@ -11,6 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
+from ..motion import VARIABLES
+from . import control as ctl
 from .integrator import Integrator
 
 
@@ -95,3 +97,42 @@ class OneStep:
         if not self.sleeping:
             self.steps += 1
             self.evaluations += self._cost
+
+
+class AdaptiveSteps:
+    """Steps as long as the error allows. kernel(y, p, control, following, span_ns) commits them; look(y, p, control, span_ns)
+    takes one of a given length.
+    """
+
+    sleeping = False
+
+    def __init__(self, choice: str, control: np.ndarray, kernel, look, cost_of_look: int):
+        self.choice = choice
+        self._control = control
+        self._following = np.zeros(VARIABLES)
+        self._kernel = kernel
+        self._look = look
+        self._cost = cost_of_look
+        self._cuts = 0
+
+    @property
+    def floor_binds(self) -> bool:
+        return bool(self._control[ctl.FLOOR_BINDS])
+
+    @property
+    def steps(self) -> int:
+        return int(self._control[ctl.STEPS]) + self._cuts
+
+    @property
+    def evaluations(self) -> int:
+        return int(self._control[ctl.EVALUATIONS] + self._control[ctl.PENDING]) + self._cuts * self._cost
+
+    def advance(self, y: np.ndarray, p: np.ndarray, span_ns: int) -> tuple[int, bool]:
+        advanced_ns = self._kernel(y, p, self._control, self._following, span_ns)
+        return int(advanced_ns), not self._control[ctl.FAILED]
+
+    def look(self, y: np.ndarray, p: np.ndarray, rest_ns: int) -> bool:
+        return bool(self._look(y, p, self._control, rest_ns))
+
+    def cut(self) -> None:
+        self._cuts += 1

@@ -34,7 +34,7 @@ _Q, _W, _D, _U, _G = 0, 4, 7, 10, 13
 ROWS = 17
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def series(y, p, degree, c):
     """Coefficients c (17, degree + 1) of the motion from y: q, ω, d, u, and g_b ⊗ q* as a means."""
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
@@ -90,7 +90,7 @@ def series(y, p, degree, c):
             c[_D, k + 1], c[_D + 1, k + 1], c[_D + 2, k + 1] = f * c[_U, k], f * c[_U + 1, k], f * c[_U + 2, k]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sum_series(c, p, degree, h, out):
     """The variables h seconds on, summed from the smallest term (Horner), with a unit quaternion."""
     rows = 13 if p[TRANSLATES] != 0.0 else 7
@@ -102,7 +102,7 @@ def sum_series(c, p, degree, h, out):
     out[0], out[1], out[2], out[3] = normalize(out[0], out[1], out[2], out[3])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def taylor_steps_of_degree(y, p, h, n, degree):
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
     c, new = np.zeros((ROWS, degree + 1)), y.copy()
@@ -115,7 +115,7 @@ def taylor_steps_of_degree(y, p, h, n, degree):
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def taylor_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return taylor_steps_of_degree(y, p, h, n, DEGREE)

@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: MIT
+"""Mass properties of closed meshes: ours against trimesh, igl, MuJoCo (exact), Drake and numpy-stl, in one process.
+
+Rules: every tool gets the same arrays in the form it likes, built before the clock starts; what a tool keeps from one
+call to the next is thrown away by building that form anew; tools take turns within each repetition; times are medians.
+A tool that fails or refuses has nan and its words. Errors are those against exact rational arithmetic on the tool's
+input as doubles: |ΔV|/V, |Δc| beyond an ulp over the diagonal, max|ΔI|/max|I| about the COM.
+
+Writes results/mass_properties.csv beside this file; ``--quick`` leaves out the largest mesh.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE.parent / "test")]
+
+from mass_solids import box, moved, sphere  # noqa: E402
+
+from result_table import ResultTable  # noqa: E402
+from rigid_proto_ros import __version__  # noqa: E402
+from rigid_proto_ros.core.exact_moments import exact_solid_moments, relative_errors  # noqa: E402
+from rigid_proto_ros.core.mass_properties import MeshMoments  # noqa: E402
+from rigid_proto_ros.core.moments import solid_moments  # noqa: E402
+
+COLUMNS = (
+    *("what", "tool", "version", "mesh", "triangles", "place", "milliseconds", "ns_per_triangle", "repetitions"),
+    *("volume_error", "center_of_mass_error", "inertia_error", "note"),
+)
+OURS = "rigid_proto_ros"
+BUDGET_S = 3.0
+"""Seconds a tool may take for one mesh, beyond its first repetition."""
+REPETITIONS = 9
+PLACES = {"base": 0.0, "+1e3": 1e3, "+1e6": 1e6}
+
+Result = tuple[float, np.ndarray, np.ndarray]  # volume, centroid (3,), inertia (3, 3) about it at unit density
+
+
+class Tool:
+    """``prepare`` builds the tool's form of a mesh outside the clock; ``compute`` is what is timed; ``read`` takes volume,
+    centroid and inertia from what it returned."""
+
+    def __init__(self, name: str, package: str, prepare: Callable, compute: Callable, read: Callable) -> None:
+        self.name, self.prepare, self.compute, self.read = name, prepare, compute, read
+        self.version = __version__ if package == OURS else version(package)
+
+
+def ours() -> list[Tool]:
+    """The production path, and the second path by itself."""
+
+    def prepare(v, t):
+        return v, t
+
+    def blocked(mesh):
+        return MeshMoments(*mesh).mass_properties(density=1.0)
+
+    def second(mesh):
+        moments = MeshMoments(*mesh, known={"solid": solid_moments(*mesh, path="compensated")})
+        return moments.mass_properties(density=1.0)
+
+    def read(p) -> Result:
+        return p.mass, p.center_of_mass, p.inertia
+
+    return [
+        Tool("rigid_proto", OURS, prepare, blocked, read),
+        Tool("rigid_proto, second path", OURS, prepare, second, read),
+    ]
+
+
+def trimesh_tool() -> Tool:
+    import trimesh
+
+    return Tool(
+        "trimesh",
+        "trimesh",
+        lambda v, t: trimesh.Trimesh(v, t, process=False, validate=False),
+        lambda mesh: mesh.mass_properties,
+        lambda p: (p["volume"], np.array(p["center_mass"]), np.array(p["inertia"])),
+    )
+
+
+def igl_tool() -> Tool:
+    import igl
+
+    def read(moments) -> Result:
+        volume, first, inertia = moments
+        return volume, first / volume, inertia
+
+    return Tool("igl.moments", "libigl", lambda v, t: (v, t), lambda mesh: igl.moments(*mesh), read)
+
+
+def mujoco_tool() -> Tool:
+    import mujoco
+
+    def prepare(v, t):
+        spec = mujoco.MjSpec()
+        mesh = spec.add_mesh(name="m")
+        mesh.uservert, mesh.userface = v.ravel(), t.ravel().astype(np.int32)
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
+        body = spec.worldbody.add_body()
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="m", density=1.0)
+        body.add_freejoint()
+        return spec
+
+    def read(model) -> Result:
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, model.body_iquat[1])
+        rotation = rotation.reshape(3, 3)
+        inertia = rotation @ np.diag(model.body_inertia[1]) @ rotation.T
+        return model.body_mass[1], model.body_ipos[1].copy(), inertia
+
+    return Tool("MuJoCo compile, exact", "mujoco", prepare, lambda spec: spec.compile(), read)
+
+
+def drake_tool() -> Tool:
+    from pydrake.geometry import SurfaceTriangle, TriangleSurfaceMesh
+    from pydrake.multibody.tree import CalcSpatialInertia
+
+    def prepare(v, t):
+        return TriangleSurfaceMesh(triangles=[SurfaceTriangle(*row) for row in t.tolist()], vertices=list(v))
+
+    def read(inertia) -> Result:
+        center = inertia.get_com()
+        about = inertia.Shift(center).CalcRotationalInertia().CopyToFullMatrix3()
+        return inertia.get_mass(), center, about
+
+    return Tool("Drake", "drake", prepare, lambda mesh: CalcSpatialInertia(mesh, 1.0), read)
+
+
+def numpy_stl_tool() -> Tool:
+    from stl.mesh import Mesh
+
+    def prepare(v, t):
+        data = np.zeros(len(t), dtype=Mesh.dtype)
+        data["vectors"] = v[t]
+        return Mesh(data)
+
+    def read(p) -> Result:
+        volume, center, inertia = p
+        return float(volume), np.asarray(center, float), np.asarray(inertia, float)
+
+    return Tool("numpy-stl (float32)", "numpy-stl", prepare, lambda mesh: mesh.get_mass_properties(), read)
+
+
+PEERS = {
+    "trimesh": trimesh_tool,
+    "igl": igl_tool,
+    "mujoco": mujoco_tool,
+    "pydrake": drake_tool,
+    "stl": numpy_stl_tool,
+}
+
+
+def tools() -> list[Tool]:
+    """Ours and those peers that are installed."""
+    found = ours()
+    for module, make in PEERS.items():
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            print(f"{module}: not installed ({error})")
+            continue
+        found.append(make())
+    return found
+
+
+def meshes(quick: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Ellipsoids of three sizes, one with its vertices and faces in random order, and a thin plate at an angle."""
+    shape = (1.0, 0.8, 0.6)
+    found = {"ellipsoid 10k": sphere(50, shape), "ellipsoid 100k": sphere(158, shape)}
+    vertices, triangles = found["ellipsoid 100k"]
+    random = np.random.default_rng(0)
+    order = random.permutation(len(vertices))
+    shuffled = np.argsort(order)[triangles][random.permutation(len(triangles))]
+    found["ellipsoid 100k, shuffled"] = vertices[order], np.ascontiguousarray(shuffled)
+    found["plate 1 x 1 x 1e-5, 100k"] = moved(box((1.0, 1.0, 1e-5), 92), (0.0, 0.0, 0.0), 3)
+    if not quick:
+        found["ellipsoid 1.4M"] = sphere(592, shape)
+    return {name: (np.ascontiguousarray(v), np.ascontiguousarray(t)) for name, (v, t) in found.items()}
+
+
+def timed(tool: Tool, vertices, triangles) -> tuple[float, Result]:
+    prepared = tool.prepare(vertices, triangles)
+    started = time.perf_counter()
+    result = tool.compute(prepared)
+    seconds = time.perf_counter() - started
+    return seconds, tool.read(result)
+
+
+def one_mesh(table: ResultTable, everything: list[Tool], name: str, vertices, triangles) -> None:
+    """Errors at every place, times at the base place."""
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    notes: dict[str, str] = {}
+    errors: dict[tuple[str, str], dict] = {}
+    for place, shift in PLACES.items():
+        there = vertices + shift
+        exact = exact_solid_moments(there, triangles)
+        for tool in everything:
+            try:
+                _, (volume, center, inertia) = timed(tool, there, triangles)
+                errors[tool.name, place] = relative_errors(exact, volume, center, inertia, diagonal)
+            except Exception as error:  # noqa: BLE001 - a peer may refuse in any way it likes
+                notes[tool.name, place] = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
+    seconds: dict[str, list[float]] = {tool.name: [] for tool in everything}
+    for _ in range(REPETITIONS):
+        for tool in everything:
+            if (tool.name, "base") not in notes and sum(seconds[tool.name]) < BUDGET_S:
+                seconds[tool.name].append(timed(tool, vertices, triangles)[0])
+    for tool in everything:
+        median = statistics.median(seconds[tool.name] or [float("nan")])
+        for place in PLACES:
+            row = {"what": "mass properties", "tool": tool.name, "version": tool.version, "mesh": name}
+            row |= {"triangles": len(triangles), "place": place, "note": notes.get((tool.name, place), "")}
+            row |= errors.get((tool.name, place), {})
+            if place == "base":
+                row |= {"milliseconds": 1e3 * median, "ns_per_triangle": 1e9 * median / len(triangles)}
+                row |= {"repetitions": len(seconds[tool.name])}
+            table.add(row)
+
+
+def rescale(table: ResultTable, name: str, vertices, triangles) -> None:
+    """A rescale with another mass and ballast on the ten numbers, against a new pass over scaled vertices."""
+    moments = MeshMoments(vertices, triangles)
+    moments.mass_properties()
+    scales = np.random.default_rng(1).uniform(0.5, 2.0, (400, 3))
+    closed, again = [], []
+    for scale in scales:
+        started = time.perf_counter()
+        moments.mass_properties(scale=scale, density=500.0, ballast=((1.0, 0.1, 0.2, 0.3),))
+        closed.append(time.perf_counter() - started)
+    for scale in scales[:7]:
+        started = time.perf_counter()
+        MeshMoments(vertices * scale, triangles).mass_properties(density=500.0)
+        again.append(time.perf_counter() - started)
+    for tool, times in (("rigid_proto", closed), ("rigid_proto, a new pass", again)):
+        table.add(
+            {
+                "what": "rescale",
+                "tool": tool,
+                "version": __version__,
+                "mesh": name,
+                "triangles": len(triangles),
+                "place": "base",
+                "milliseconds": 1e3 * statistics.median(times),
+                "ns_per_triangle": 1e9 * statistics.median(times) / len(triangles),
+                "repetitions": len(times),
+                "note": "",
+            }
+        )
+
+
+def load(table: ResultTable, name: str, vertices, triangles) -> None:
+    """Reading an .obj file with six decimals: ours parsing, ours from the cache, trimesh."""
+    import os
+
+    from rigid_proto_ros.mesh_io import load_mesh
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mesh.obj"
+        with path.open("w") as file:
+            np.savetxt(file, vertices, "v %.6f %.6f %.6f")
+            np.savetxt(file, triangles + 1, "f %d %d %d")
+        os.environ["XDG_CACHE_HOME"] = folder
+
+        def parse():
+            os.environ["RIGID_PROTO_CACHE"] = "off"
+            load_mesh(str(path))
+
+        def cached():
+            os.environ.pop("RIGID_PROTO_CACHE", None)
+            load_mesh(str(path))
+
+        readers = [("rigid_proto", OURS, parse), ("rigid_proto, cached", OURS, cached)]
+        try:
+            import trimesh
+
+            options = {"process": False, "maintain_order": True, "skip_materials": True, "force": "mesh"}
+            readers.append(("trimesh", "trimesh", lambda: trimesh.load(path, **options)))
+        except ImportError:
+            pass
+        for tool, package, read in readers:
+            times = []
+            read()
+            for _ in range(3):
+                started = time.perf_counter()
+                read()
+                times.append(time.perf_counter() - started)
+            median = statistics.median(times)
+            row = {
+                "what": "load .obj",
+                "tool": tool,
+                "version": __version__ if package == OURS else version(package),
+                "mesh": name,
+                "place": "base",
+            }
+            row |= {"triangles": len(triangles), "milliseconds": 1e3 * median, "repetitions": 3, "note": ""}
+            table.add(row | {"ns_per_triangle": 1e9 * median / len(triangles)})
+
+
+def main() -> None:
+    """Run, write the table and print what it says."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="without the largest mesh")
+    parser.add_argument("-o", type=Path, default=HERE / "results" / "mass_properties.csv", help="the table's path")
+    args = parser.parse_args()
+    table = ResultTable(args.o, COLUMNS)
+    everything = tools()
+    everything[0].compute(everything[0].prepare(*sphere(40)))  # compiled before anything is timed
+    everything[1].compute(everything[1].prepare(*sphere(40)))
+    chosen = meshes(args.quick)
+    for name, mesh in chosen.items():
+        one_mesh(table, everything, name, *mesh)
+        _show(table, name)
+    largest = list(chosen)[-1]
+    rescale(table, largest, *chosen[largest])
+    load(table, largest, *chosen[largest])
+    for row in table.rows:
+        if row["what"] != "mass properties":
+            print(f"{row['what']:10} {row['tool']:26} {row['mesh']:18} {row['milliseconds']:.4g} ms")
+    table.write()
+    print(f"wrote {args.o}")
+
+
+def _show(table: ResultTable, name: str) -> None:
+    print(name)
+    rows = [row for row in table.rows if row["mesh"] == name]
+    ns = {row["tool"]: row["ns_per_triangle"] for row in rows if row["place"] == "base"}
+    for tool, value in ns.items():
+        errors = {row["place"]: row["inertia_error"] for row in rows if row["tool"] == tool}
+        words = "  ".join(f"{place} {error:.1e}" for place, error in errors.items())
+        print(f"  {tool:26} {value:9.1f} ns/triangle  {value / ns['rigid_proto']:8.1f} x ours   inertia off: {words}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""One rigid body: the node, and when asked for a poke script and a viewer.
+
+ros2 launch rigid_proto_ros rigid_body.launch.py scene:=hammer script:=/path/to/pokes.yaml viewer:=web
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+PACKAGE = "rigid_proto_ros"
+
+ARGUMENTS = (
+    ("scene", "t_handle", "scene: the path of a parameter file, or the name of a bundled one"),
+    ("mesh", "", "fly this mesh instead of the scene's: a path, a package:// URI or a bundled name"),
+    ("name", "rigid_body", "name of the node, and of the body's frame"),
+    ("namespace", "", "namespace of the node"),
+    ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),
+    ("reset", "true", "reset first, so that the script's times are simulated time itself"),
+    ("viewer", "none", "live view in Rerun: none, web or native"),
+    ("record", "", "record the session to this .rrd file"),
+    ("use_sim_time", "false", "simulated time follows /clock"),
+)
+
+
+def generate_launch_description() -> LaunchDescription:
+    """The declared arguments, and the nodes that follow from them."""
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=description)
+        for name, default, description in ARGUMENTS
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=nodes)])
+
+
+def nodes(context) -> list[Node]:
+    """The body's node, and a poke client where a script is named."""
+    # Only here: a launch file is listed on machines on which the package isn't on the path.
+    from rigid_proto_ros.bundled import example_path
+    from rigid_proto_ros.offline import scene_file
+
+    given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    parameters = {"viewer": given["viewer"], "use_sim_time": given["use_sim_time"].lower() in ("true", "1", "yes")}
+    parameters.update({name: given[name] for name in ("mesh", "record") if given[name]})
+    target = "/".join(["", *filter(None, [given["namespace"].strip("/"), given["name"]])])
+    body = Node(
+        package=PACKAGE,
+        executable="rigid_body_node",
+        name=given["name"],
+        namespace=given["namespace"],
+        parameters=[*_for_node(str(scene_file(given["scene"])), target), parameters],
+        output="screen",
+    )
+    if not given["script"]:
+        return [body]
+    script = given["script"] if "/" in given["script"] else str(example_path(given["script"].removesuffix(".yaml")))
+    options = ["--node", target, "--timeout", "60"]
+    if given["reset"].lower() in ("true", "1", "yes"):
+        options.append("--reset")
+    client = Node(package=PACKAGE, executable="poke_client", arguments=[script, *options], output="screen")
+    return [body, client]
+
+
+def _for_node(scene: str, target: str) -> list:
+    """The scene as launch takes it: as the file, or as its values where a node of another name wouldn't find its section."""
+    if target == "/rigid_body":
+        return [scene]
+    from rigid_proto_ros.scene_file import read_scene_file
+
+    return [read_scene_file(scene).values]

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""What a kernel that chooses its own steps keeps between calls, as one array of doubles.
+
+An accepted step that reaches beyond the time asked for is kept until it can be committed, so that when anybody asks never
+changes the steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+ACCURACY = 0  # local error rate asked for [1/s]
+DEGREE = 1  # of the series
+ACCEPTED_NS = 2  # length of the step that waits for its commitment; 0 for none
+ELAPSED_NS = 3  # committed since the segment's start
+STEPS = 4  # committed
+EVALUATIONS = 5  # in committed steps, one for each series
+PENDING = 6  # evaluations spent on the step that waits
+FLOOR_BINDS = 7  # 1 once rounding, not the accuracy, set the allowance of a step
+FAILED = 8  # 1 when a nanosecond would be too long a step, or the motion ran away
+SIZE = 9
+
+LONGEST = 1e6
+"""Longest step [s]: 10¹⁵ ns are exact in a double."""
+
+
+def new_control(accuracy: float, degree: int) -> np.ndarray:
+    """The array at a segment's start."""
+    control = np.zeros(SIZE)
+    control[ACCURACY], control[DEGREE] = accuracy, degree
+    return control
+
+
+@njit(cache=True, error_model="numpy")
+def commit(control):
+    """Count the step that waited as committed."""
+    control[ELAPSED_NS] += control[ACCEPTED_NS]
+    control[EVALUATIONS] += control[PENDING]
+    control[STEPS] += 1.0
+    control[ACCEPTED_NS] = 0.0
+    control[PENDING] = 0.0

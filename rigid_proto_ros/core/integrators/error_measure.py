@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""How large an error is: attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s), the largest of them.
+
+``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε a
+step. Where a stiff string turns rounding of a position into a jerk, the floor is what that jerk does in one step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from ..motion import damping_functions
+from ..problem import (
+    ATTACH,
+    HAS_STRING,
+    LENGTH,
+    MASS,
+    MOMENTS,
+    REFERENCE_ACCELERATION,
+    REFERENCE_DAMPING,
+    REFERENCE_VELOCITY,
+    REST_LENGTH,
+    STIFFNESS,
+    STRING_DAMPING,
+    TRANSLATES,
+)
+
+FLOOR = 32.0 * 2.0**-52
+
+
+@njit(cache=True, error_model="numpy")
+def scales(y, p, elapsed):
+    """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into the segment."""
+    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
+    if p[TRANSLATES] == 0.0:
+        return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
+    c = p[REFERENCE_DAMPING]
+    push = elapsed * damping_functions(c * elapsed)[0]
+    speed = 0.0
+    for k in range(3):
+        v = p[REFERENCE_VELOCITY + k]
+        v += push * (p[REFERENCE_ACCELERATION + k] - c * v) + y[10 + k]
+        speed += v * v
+    length = p[LENGTH]
+    return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
+
+
+@njit(cache=True, error_model="numpy")
+def size(e, attitude, spin, place, speed):
+    """The measure of a small difference e (≥ 13,) of variables."""
+    a = attitude * math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
+    a = max(a, spin * math.sqrt(e[4] * e[4] + e[5] * e[5] + e[6] * e[6]))
+    if place == 0.0:
+        return a
+    a = max(a, place * math.sqrt(e[7] * e[7] + e[8] * e[8] + e[9] * e[9]))
+    return max(a, speed * math.sqrt(e[10] * e[10] + e[11] * e[11] + e[12] * e[12]))
+
+
+@njit(cache=True, error_model="numpy")
+def _response(p, spin, speed):
+    """What a force at the knot does to the measured velocities, per newton and second."""
+    A = ATTACH
+    arm = math.sqrt(p[A] * p[A] + p[A + 1] * p[A + 1] + p[A + 2] * p[A + 2])
+    return max(speed / p[MASS], spin * arm / p[MOMENTS])
+
+
+@njit(cache=True, error_model="numpy")
+def _rounding_of_place(p):
+    A = ATTACH
+    arm = math.sqrt(p[A] * p[A] + p[A + 1] * p[A + 1] + p[A + 2] * p[A + 2])
+    return FLOOR * (arm + p[REST_LENGTH])
+
+
+@njit(cache=True, error_model="numpy")
+def jerk_of_rounding(p, spin, speed):
+    """Error rate [1/s] that one rounding of the knot's place causes through the spring; times h it is a floor too."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    return p[STIFFNESS] * _rounding_of_place(p) * _response(p, spin, speed)
+
+
+@njit(cache=True, error_model="numpy")
+def jump_of_rounding(p, spin, speed):
+    """Error that one rounding of the knot's place causes when a damped string jerks taut that much too early or late."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    return p[STRING_DAMPING] * _rounding_of_place(p) * _response(p, spin, speed)
+
+
+@njit(cache=True, error_model="numpy")
+def jump_of_displacement(p, spin, speed):
+    """The same for a displacement of one unit of the measure."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    return p[STRING_DAMPING] * p[LENGTH] * _response(p, spin, speed)

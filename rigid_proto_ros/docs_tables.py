@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""Tables of the docs, written from the declarations in the code.
+
+    python -m rigid_proto_ros.docs_tables [--check]
+
+A document holds a table between ``<!-- table: NAME -->`` and ``<!-- end -->``; what stands there is replaced. With
+``--check`` nothing is written and the exit status is 1 when a document is behind.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from .core.integrators import INTEGRATORS
+from .core.integrators.integrator import (
+    ANGULAR_DAMPING,
+    BODY_FORCE,
+    BODY_TORQUE,
+    NO_GYROSCOPIC_TERM,
+    STRING,
+    WORLD_TORQUE,
+)
+from .interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from .parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCUMENTS = ("README.md", "docs/physics.md")
+
+_MARKED = re.compile(r"(<!-- table: (?P<name>[a-z]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def topics() -> str:
+    """The node's topics."""
+    words = {SUBSCRIBED: "sub", PUBLISHED: "pub"}
+    rows = [
+        (words[i.direction], _code(i.name), _code(i.type.replace("/msg/", "/")), _with_switch(i))
+        for i in INTERFACES
+        if i.direction in words
+    ]
+    return _table(("", "topic", "type", "meaning"), rows)
+
+
+def services() -> str:
+    """The node's services."""
+    rows = [
+        (_code(i.name), _code(i.type.replace("/srv/", "/")), _with_switch(i))
+        for i in INTERFACES
+        if i.direction == SERVED
+    ]
+    return _table(("service", "type", "meaning"), rows)
+
+
+def parameters() -> str:
+    """The node's parameters, which a scene file sets too."""
+    rows = [_parameter_row(p) for p in (*PARAMETERS.values(), *PATTERNS.values())]
+    return _table(("parameter", "default", "unit", "meaning"), rows)
+
+
+def integrators() -> str:
+    """What each integrator is and can't carry."""
+    needs = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM)
+    rows = []
+    for integrator in INTEGRATORS.values():
+        lacks = [need for need in needs if need not in integrator.carries]
+        order = "exact" if integrator.order is None else str(integrator.order)
+        cells = (_code(integrator.name), order, str(integrator.evaluations), "; ".join(lacks))
+        rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".")))
+    return _table(("name", "order", "evaluations a step", "can't carry", "good for, and what breaks it"), rows)
+
+
+TABLES = {"topics": topics, "services": services, "parameters": parameters, "integrators": integrators}
+
+
+def filled(text: str) -> str:
+    """A document with its tables written anew."""
+    return _MARKED.sub(lambda m: f"{m[1]}{TABLES[m['name']]()}\n{m[4]}", text)
+
+
+def documents() -> list[Path]:
+    """The documents that hold tables."""
+    return [ROOT / name for name in DOCUMENTS if (ROOT / name).is_file()]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write the tables, or check them; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.docs_tables", description="Tables of the docs.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 when a document is behind")
+    args = parser.parse_args(argv)
+    behind = 0
+    for path in documents():
+        text = path.read_text(encoding="utf-8")
+        new = filled(text)
+        if new == text:
+            continue
+        behind += 1
+        if args.check:
+            print(f"{path}: behind the code; write it with: python -m rigid_proto_ros.docs_tables", file=sys.stderr)
+        else:
+            path.write_text(new, encoding="utf-8")
+    return 1 if args.check and behind else 0
+
+
+def _with_switch(interface) -> str:
+    on_request = f" (with `{interface.on_request}`)" if interface.on_request else ""
+    return interface.meaning + on_request
+
+
+def _parameter_row(parameter: Parameter) -> tuple[str, ...]:
+    meaning = parameter.description.rstrip(".")
+    if parameter.choices:
+        meaning += ": " + ", ".join(_code(choice or '""') for choice in parameter.choices)
+    if parameter.changes != LIVE:
+        meaning += " (at start only)" if parameter.changes == READ_ONLY else " (counts at the next reset)"
+    return _code(parameter.name), _default(parameter), parameter.unit, meaning
+
+
+def _default(parameter: Parameter) -> str:
+    value = parameter.default
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return _code(str(value).lower())
+    if isinstance(value, list):
+        return _code("[" + ", ".join(f"{x:g}" for x in value) + "]")
+    if isinstance(value, float):
+        return _code(f"{value:g}")
+    return _code(str(value) or '""')
+
+
+def _code(text: str) -> str:
+    return f"`{text}`"
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    head = tuple(head)
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

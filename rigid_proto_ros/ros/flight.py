@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""The flight of one body in time: when it advances, publishes and takes commands.
+
+Simulated time follows the wall clock by the real-time factor from an anchor, never by adding up periods, so that a late
+wake-up isn't carried on. Everything here runs on the physics thread (physics_thread.py).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..core.observer import Observer
+from ..core.simulation import Simulation
+from ..core.state import State
+from ..scenario import Scenario, publication_ns
+
+DRAIN_NS = 10_000_000
+"""Commands are taken at least this often [ns of wall time]."""
+
+PAUSED_NS = 100_000_000
+"""States go out at 10 Hz while paused [ns of wall time]."""
+
+FOLLOW_NS = 1_000_000
+"""A followed clock is looked at this often [ns of wall time]."""
+
+MAX_LAG_NS = 250_000_000
+"""A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
+
+
+@dataclass
+class Timekeeping:
+    """overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up."""
+
+    overruns: int = 0
+    real_time_lost_s: float = 0.0
+    paused: bool = False
+
+
+class Flight:
+    """publish(state) is called for every publication; take_commands(wall_ns) at every tick, to submit what has arrived.
+
+    anybody_listens() says whether publications reach anybody; while they don't, none is made and the body crosses the
+    time between two looks at the commands at once.
+    on_failure(message) is called when the motion stopped in its last good state. followed_clock() gives nanoseconds of a clock
+    that simulated time follows instead of the wall's.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        observer: Observer,
+        publish: Callable[[State], None],
+        take_commands: Callable[[int], None],
+        on_failure: Callable[[str], None],
+        followed_clock: Callable[[], int] | None = None,
+        anybody_listens: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self.scenario = scenario
+        self.observer = observer
+        self.simulation = Simulation(scenario.setup, observer)
+        self.timekeeping = Timekeeping(paused=scenario.values["start_paused"])
+        self._publish = publish
+        self._take_commands = take_commands
+        self._on_failure = on_failure
+        self._followed_clock = followed_clock
+        self._anybody_listens = anybody_listens
+        self._listeners = True
+        self._publication = 0
+        self._present_ns = 0
+        self._anchor()
+
+    # For functions that other threads hand over
+
+    def change(self, scenario: Scenario) -> None:
+        """Take on another scenario's time settings; its setup reaches the motion by a command."""
+        rate_changed = scenario.values["publish_rate"] != self.scenario.values["publish_rate"]
+        pace_changed = scenario.values["real_time_factor"] != self.scenario.values["real_time_factor"]
+        self.scenario = scenario
+        if rate_changed:
+            self._find_next_publication()
+        if pace_changed:
+            self._anchor()
+
+    def pause(self, paused: bool) -> None:
+        """Stop or resume simulated time."""
+        if paused != self.timekeeping.paused:
+            self.timekeeping.paused = paused
+            self.simulation.log("pause", {"data": paused})
+            self._anchor()
+
+    def catch_up(self) -> None:
+        """Advance to this tick's present: what a command means by now. Without commands nobody needs it."""
+        if not self.timekeeping.paused and self._present_ns > self.simulation.time_ns:
+            self.simulation.advance(self._present_ns)
+            self._check_failure()
+
+    def step(self) -> int:
+        """While paused, advance to the next publication; returns its time [ns]."""
+        self.simulation.log("step", {})
+        self._find_next_publication()
+        self._publish_next()
+        return self.simulation.time_ns
+
+    def reset(self) -> None:
+        """Time 0 and the initial state; paused or running stays."""
+        # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
+        self.simulation.reset(self.scenario.setup)
+        self._publication = 0
+        self._anchor()
+
+    # In the thread's loop
+
+    def start(self) -> None:
+        """Simulated time begins now."""
+        self._anchor()
+
+    def tick(self) -> None:
+        """Do what is due."""
+        if self.timekeeping.paused:
+            self._tick_paused()
+        else:
+            self._tick_running()
+
+    def meet_request(self) -> None:
+        """Bring simulated time up to now for a request, unless a publication comes first."""
+        if not self.timekeeping.paused:
+            self._present_ns = self._simulated_present_ns()
+            if self._present_ns < self._publication_ns():
+                self.catch_up()
+
+    def _tick_running(self) -> None:
+        """Advance to the present: publish what is due, then take the commands that have arrived."""
+        wall_ns = time.monotonic_ns()
+        if wall_ns >= self._next_look_ns:
+            self._next_look_ns = wall_ns + DRAIN_NS
+            self._listeners = self._anybody_listens()
+        present_ns = self._simulated_present_ns()
+        if not self._listeners:
+            self._pass_over(present_ns)
+        due_ns = self._publication_ns()
+        while due_ns <= present_ns:
+            if not self._publish_next():
+                return
+            due_ns = self._publication_ns()
+            if due_ns <= present_ns and self._factor > 0.0:
+                self.timekeeping.overruns += 1
+        self._last_drain_ns = wall_ns
+        self._present_ns = present_ns
+        self._take_commands(wall_ns)
+        if not self._listeners:
+            self.catch_up()
+
+    def _pass_over(self, present_ns: int) -> None:
+        """Make no publication up to the present, but for what a run without pacing goes by."""
+        if self._factor > 0.0 or self._followed_clock:
+            numerator, denominator = self.scenario.values["publish_rate"].as_integer_ratio()
+            # One early, and then on: the estimate is floored and publications are rounded.
+            self._publication = max(self._publication, present_ns * numerator // (1_000_000_000 * denominator) - 1)
+            while self._publication_ns() <= present_ns:
+                self._publication += 1
+
+    def _tick_paused(self) -> None:
+        now_ns = time.monotonic_ns()
+        self._last_drain_ns = now_ns
+        self._take_commands(now_ns)
+        if now_ns >= self._paused_publication_ns:
+            self._paused_publication_ns = now_ns + PAUSED_NS
+            self._listeners = self._anybody_listens()
+            self._publish(self.simulation.state)
+
+    def _publish_next(self) -> bool:
+        state = self.simulation.advance(self._publication_ns())
+        if self._check_failure():
+            return False
+        self._publication += 1
+        self.observer.state(state.time_ns, state.row)
+        self._publish(state)
+        return True
+
+    def _check_failure(self) -> bool:
+        if not self.simulation.failure:
+            return False
+        if not self.timekeeping.paused:
+            self.timekeeping.paused = True
+            self._on_failure(self.simulation.failure)
+        return True
+
+    # Time
+
+    @property
+    def _factor(self) -> float:
+        return self.scenario.values["real_time_factor"]
+
+    def _publication_ns(self) -> int:
+        return publication_ns(self._publication, self.scenario.values["publish_rate"])
+
+    def _find_next_publication(self) -> None:
+        """The first publication after the present."""
+        now_ns = self.simulation.time_ns
+        self._publication = max(0, int(now_ns * 1e-9 * self.scenario.values["publish_rate"]) - 1)
+        while self._publication_ns() <= now_ns:
+            self._publication += 1
+
+    def _anchor(self) -> None:
+        self._last_drain_ns = time.monotonic_ns()
+        self._anchor_wall_ns = self._followed_clock() if self._followed_clock else self._last_drain_ns
+        self._anchor_simulated_ns = self.simulation.time_ns
+        self._paused_publication_ns = 0
+        self._next_look_ns = 0
+
+    def _simulated_present_ns(self) -> int:
+        """Simulated time that the wall clock asks for; time lost beyond MAX_LAG_NS is given up and counted."""
+        if self._followed_clock:
+            passed_ns = self._followed_clock() - self._anchor_wall_ns
+            return max(self.simulation.time_ns, self._anchor_simulated_ns + passed_ns)
+        if self._factor == 0.0:
+            return self._publication_ns()
+        present_ns = self._anchor_simulated_ns + int((time.monotonic_ns() - self._anchor_wall_ns) * self._factor)
+        expected_ns = max(self.simulation.time_ns, self._publication_ns())
+        lag_ns = (present_ns - expected_ns) / self._factor
+        if lag_ns > MAX_LAG_NS:
+            self.timekeeping.real_time_lost_s += lag_ns * 1e-9
+            self.timekeeping.overruns += 1
+            self._anchor()
+            self._anchor_simulated_ns = expected_ns
+            present_ns = expected_ns
+        return present_ns
+
+    def next_wake_ns(self) -> int:
+        """When ``tick`` is due next [ns of wall time]."""
+        latest_ns = self._last_drain_ns + DRAIN_NS
+        if self._followed_clock:
+            return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
+        if self.timekeeping.paused:
+            return latest_ns
+        if self._factor == 0.0:
+            return 0
+        if not self._listeners:
+            return latest_ns
+        ahead_ns = self._publication_ns() - self._anchor_simulated_ns
+        return min(latest_ns, self._anchor_wall_ns + int(ahead_ns / self._factor) + 1)
