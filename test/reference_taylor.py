@@ -106,7 +106,8 @@ def _starts_taut(problem, state, order) -> bool:
     if problem.string is None or problem.string.bilateral:
         return True
     series = _series(problem, state, order, False)
-    t = _step(series, 20) * mpf("1e-6")
+    # Only a start exactly on the switch needs a look ahead.
+    t = _step(series, 20) * mpf("1e-6") if series.stretch[0] == 0 or series.tension[0] == 0 else mpf(0)
     return _polynomial(series.stretch, t) > 0 and _polynomial(series.tension, t) > 0
 
 
@@ -118,14 +119,15 @@ def _switch(problem, series, h, taut):
     string = problem.string
     if string is None or string.bilateral:
         return None
-    # Doubles find the interval, high precision the time in it. The first point is left out: a switch has just been there.
-    grid = np.linspace(0.0, 1.0, 201)[2:]
+    # Doubles find the interval, high precision the time in it.
+    points = 200
+    grid = np.linspace(0.0, 1.0, points + 1)[1:]
     scaled = [[float(c * h**k) for k, c in enumerate(part)] for part in (series.stretch, series.tension)]
     is_taut = np.logical_and(*(np.polynomial.polynomial.polyval(grid, part) > 0.0 for part in scaled))
     switched = np.flatnonzero(is_taut != taut)
     if switched.size == 0:
         return None
-    return _bisect(series, h * (switched[0] + 1) / 200, h * (switched[0] + 2) / 200, taut)
+    return _bisect(series, h * int(switched[0]) / points, h * int(switched[0] + 1) / points, taut)
 
 
 def _bisect(series, low, high, taut):

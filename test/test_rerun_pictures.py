@@ -9,7 +9,7 @@ import rerun_flight as flight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_proto_ros.core.observer import BodySnapshot
+from rigid_proto_ros.core.observer import BodySnapshot, ShownString
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.arrows import ArrowScale, arrow_length
@@ -17,7 +17,8 @@ from rigid_proto_ros.rerun_view.derived import rotation_matrices
 from rigid_proto_ros.rerun_view.ghost import attitude_angle
 from rigid_proto_ros.rerun_view.inertia_shapes import PrincipalFrame, bounding_box
 from rigid_proto_ros.rerun_view.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
-from rigid_proto_ros.rerun_view.reader import record_batches
+from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+from rigid_proto_ros.rerun_view.string_picture import sag
 from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
 from rigid_proto_ros.rerun_view.trail import Trail
 from rigid_proto_ros.rerun_view.words import readable
@@ -240,6 +241,64 @@ def test_an_impulse_is_shown_from_its_instant_for_a_moment(tmp_path):
     shown = [time_ns for time_ns, vector in zip(times, vectors, strict=True) if vector]
     assert shown[0] == 100_000_000 and shown[-1] == 240_000_000
     assert (times[-1], vectors[-1]) == (250_000_000, [])
+
+
+@settings(deadline=None)
+@given(st.floats(0.01, 0.999), st.floats(1e-3, 1e3))
+def test_a_slack_string_is_drawn_as_long_as_it_is(taut, length):
+    (depth,) = sag(np.array([taut * length]), length)
+    along = np.linspace(0.0, 1.0, 4001)
+    curve = np.column_stack([taut * length * along, 4.0 * depth * along * (1.0 - along)])
+    assert np.isclose(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum(), length, rtol=1e-5)
+
+
+def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let_go(tmp_path):
+    path = tmp_path / "string.rrd"
+    rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (60, 1))
+    # The body rises towards the hand at 1 m/s: 0.4 m long, the string goes slack half-way.
+    rows[:, 2], rows[:, 9] = 0.01 * np.arange(60), 1.0
+    knot, hand = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8])
+    observer = RerunObserver(record=str(path))
+    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+    observer.body_changed(0, flight.BODY)
+    observer.string_changed(0, ShownString(knot, hand, hand, 0, 0, 50.0, 0.0, 0.4, False))
+    for k, row in enumerate(rows[:50]):
+        observer.state(k * flight.PERIOD_NS, row)
+    observer.string_changed(495_000_000, None)
+    for k, row in enumerate(rows[50:], start=50):
+        observer.state(k * flight.PERIOD_NS, row)
+    observer.close()
+    assert observer.error == ""
+    times, strips = cells(path, e.STRING, "LineStrips3D:strips")
+    assert times == [*(k * flight.PERIOD_NS for k in range(50)), 495_000_000] and strips[-1] == []
+    _, tensions = cells(path, e.STRING_TENSION, "Scalars:scalars")
+    stretch = 0.8 - 0.1 - rows[:50, 2] - 0.4
+    assert np.allclose(np.ravel(tensions)[:50], np.maximum(50.0 * stretch, 0.0), atol=1e-12)
+    for k in range(50):
+        points = np.array(strips[k][0])
+        assert np.allclose(points[0], hand, atol=1e-6) and np.allclose(points[-1], rows[k, 0:3] + knot, atol=1e-6)
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        # 25 points of a parabola are a little shorter than it.
+        assert np.isclose(length, max(0.4, 0.4 + stretch[k]), rtol=5e-3)
+    lane_times, lane = cells(path, f"{e.STATUS}/string", "StateChange:state")
+    assert np.ravel(lane).tolist() == ["taut", "slack", "none"]
+    assert lane_times == [0, 300_000_000, 495_000_000]
+
+
+def test_the_next_run_starts_from_the_parameters_then_in_force(tmp_path):
+    path = tmp_path / "scene.rrd"
+    rows = flight.rows(20)
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, rows)
+    changed = flight.SCENE + "    mass: 2.0\n"
+    observer.scene_changed(190_000_000, changed)
+    observer.reset()
+    observer.state(0, rows[0])
+    observer.close()
+    before = tmp_path / "scene.run1.rrd"
+    assert read_session(before).scene == flight.SCENE
+    assert cells(before, e.SCENE_IN_FORCE, "TextDocument:text") == ([190_000_000], [[changed]])
+    assert read_session(path).scene == changed
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,24 @@ class ShownLoad:
     torque: np.ndarray
 
 
+@dataclass(frozen=True)
+class ShownString:
+    """A tied string. attach (3,) [m, body axes from the COM] is the knot; the free end goes evenly from ``origin`` at
+    begin_ns to ``target`` at end_ns (3,) [m, world] and stays there. stiffness [N/m], damping [N s/m], rest_length [m];
+    a ``bilateral`` one also pushes.
+    """
+
+    attach: np.ndarray
+    origin: np.ndarray
+    target: np.ndarray
+    begin_ns: int
+    end_ns: int
+    stiffness: float
+    damping: float
+    rest_length: float
+    bilateral: bool
+
+
 class Observer:
     """Null object, and the interface: override what is of interest."""
 
@@ -77,6 +95,9 @@ class Observer:
 
     def applied(self, time_ns: int, command, load, body) -> None:
         """A wrench or poke took effect: the WrenchCommand, the Load that it settled to, and the Body it acts on."""
+
+    def string_changed(self, time_ns: int, string: ShownString | None) -> None:
+        """The string is tied like this from ``time_ns`` on, or not at all; again at every target."""
 
     def event(self, time_ns: int, line: str) -> None:
         """One JSON line of the event log (command, parameter change, service), as applied."""

@@ -30,7 +30,7 @@ from .event_log import EventLog
 from .integrators import check_carried
 from .integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, STRING, needs_of_load
 from .loads import Load, LoadSum, apply_impulse, cross, settle
-from .observer import BodySnapshot, Observer, ShownLoad, listens
+from .observer import BodySnapshot, Observer, ShownLoad, ShownString, listens
 from .problem import make_problem
 from .segment import IntegrationFailed, Segment
 from .setup import Setup
@@ -386,6 +386,7 @@ class Simulation:
         self._finished_work += self._segment.hand_work
         self._finished_heat += self._segment.heat
         self._segment = self._new_segment(self.state)
+        self._tell_string()
 
     def _load_sum(self) -> LoadSum:
         """All loads that act, summed afresh in their canonical order."""
@@ -407,6 +408,8 @@ class Simulation:
         self.state = State(0, self.setup.initial.copy())
         self._string = StringControl(self.setup, self.state)
         self._segment = self._new_segment(self.state)
+        self._told_string: Tied | None = None
+        self._tell_string()
 
     def _stop_in_last_good_state(self, failed: IntegrationFailed) -> None:
         if np.isfinite(failed.last_good.row).all() and failed.last_good.time_ns >= self.time_ns:
@@ -422,6 +425,20 @@ class Simulation:
         axes = "world" if load.axes == "world" else "body"
         force = np.asarray(load.force) if axes == "world" else load.force_body(body, self.state)
         return ShownLoad(kind, axes, load.arm(body), force, np.asarray(load.torque))
+
+    def _tell_string(self) -> None:
+        tied = self.string
+        if tied is self._told_string:
+            return
+        self._told_string = tied
+        if not listens(self.observer, "string_changed"):
+            return
+        shown = None
+        if tied is not None:
+            arm = np.asarray(tied.arm(self.setup.body))
+            ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
+            shown = ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
+        self.observer.string_changed(self.time_ns, shown)
 
     def _snapshot(self) -> BodySnapshot:
         setup, body = self.setup, self.setup.body

@@ -19,6 +19,10 @@ CENTRE = "world/centre"
 LOADS = "world/loads"
 TRAIL = "world/trail"
 
+STRING = "world/string"
+HAND = "world/string/hand"
+STRING_TENSION = "plots/string_tension"
+
 ANGULAR_VELOCITY = "world/centre/angular_velocity"
 MOMENTUM = "world/centre/angular_momentum"
 BOUNDING_BOX = "world/body/bounding_box"
@@ -54,6 +58,9 @@ STATUS = "status"
 """Below it one lane a track: ``loads``, ``integrator``, ``inertia_model`` and those that the run reports."""
 
 SCENE = "session/scene"
+"""The parameters at the run's start."""
+SCENE_IN_FORCE = "session/scene_in_force"
+"""They again at every change."""
 SESSION_MESH = "session/mesh"
 SESSION_BODY = "session/body"
 EVENTS = "events"
@@ -64,6 +71,7 @@ RED, GREEN, BLUE = (235, 85, 85), (90, 200, 110), (85, 150, 250)
 GREY, YELLOW, VIOLET, ORANGE = (190, 190, 190), (240, 200, 70), (190, 120, 245), (250, 150, 60)
 MESH_COLOUR = (214, 205, 190)
 TRAIL_COLOUR = (250, 205, 95)
+STRING_COLOUR, SLACK_COLOUR = (250, 240, 210), (150, 150, 150)
 OMEGA_COLOUR = (90, 230, 230)
 MOMENTUM_COLOUR = (190, 120, 245)
 GHOST_COLOUR = (120, 180, 255)
@@ -77,6 +85,7 @@ SERIES = {
     ANGULAR_MOMENTUM: (("Lx", RED), ("Ly", GREEN), ("Lz", BLUE), ("|L|", GREY)),
     ANGULAR_MOMENTUM_ANGLE: (("angle of L to its start", VIOLET),),
     DRIFT: (("energy, relative", ORANGE), ("L as a vector, relative", VIOLET)),
+    STRING_TENSION: (("string", ORANGE),),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
     ANGULAR_VELOCITY_BODY: (("ω1", RED), ("ω2", GREEN), ("ω3", BLUE)),
 }

@@ -65,6 +65,7 @@ def debugging(size: float) -> Any:
             plot(e.ANGULAR_MOMENTUM_ANGLE, "Angle of L to its start [rad]"),
             plot(e.DRIFT, "Drift since the last command"),
             plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]"),
+            plot(e.STRING_TENSION, "Tension of the string [N]"),
             grid_columns=2,
         ),
         name="Debugging",

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.observer import BodySnapshot, Observer, ShownLoad
+from ..core.observer import BodySnapshot, Observer, ShownLoad, ShownString
 from .mailbox import BLOCK_ROWS, Block, Mailbox, Mark
 from .ports import choose_port
 
@@ -125,6 +125,14 @@ class RerunObserver(Observer):
         """Note a load that acts no longer."""
         self._mark(time_ns, "load_ended", load_id)
 
+    def scene_changed(self, time_ns: int, scene: str) -> None:
+        """Note the parameters in force from ``time_ns`` on; the next run starts from them."""
+        self._mark(time_ns, "scene_changed", scene)
+
+    def string_changed(self, time_ns: int, string: ShownString | None) -> None:
+        """Note how the string is tied from ``time_ns`` on."""
+        self._mark(time_ns, "string_changed", string)
+
     def event(self, time_ns: int, line: str) -> None:
         """Note a line of the event log."""
         self._mark(time_ns, "event", line)
@@ -215,7 +223,7 @@ class RerunObserver(Observer):
     def _mark(self, time_ns: int, kind: str, *content: Any) -> None:
         if self._mailbox is not None:
             self._mailbox.mark(time_ns, kind, *content)
-        elif kind in ("started", "body_changed", "ghost_began"):
+        elif kind in ("started", "body_changed", "scene_changed", "string_changed", "ghost_began"):
             # Kept for a recording that is switched on later.
             self._remembered = [kept for kept in self._remembered if kept[1] != kind]
             self._remembered.append((time_ns, kind, *content))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +40,12 @@ class Scene:
         self.surface: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         if self.vertices is not None and self.triangles is not None and len(self.triangles):
             self.surface = shaded_surface(self.vertices, self.triangles)
+
+    def with_text(self, text: str) -> Scene:
+        """The same mesh under other parameters."""
+        other = copy(self)
+        other.text = text
+        return other
 
     def size(self, body: BodySnapshot) -> float:
         """A length [m] that stands for the body: the diagonal of its box, or of the box of equal inertia."""
@@ -104,6 +111,8 @@ def send_styles(stream: Stream, size: float, view_size: float, initial_view: str
             arrow_colour = colour if part == "force" else e.TORQUE_COLOUR
             style = rr.Arrows3D.from_fields(colors=arrow_colour, radii=0.012 * size)
             stream.log_static(load_entity(kind, part), style)
+    stream.log_static(e.STRING, rr.LineStrips3D.from_fields(radii=0.0035 * size))
+    stream.log_static(e.HAND, rr.Points3D.from_fields(colors=e.STRING_COLOUR, radii=0.02 * size))
     _arrow_style(stream, e.ANGULAR_VELOCITY, e.OMEGA_COLOUR, 0.009 * size, "ω")
     _arrow_style(stream, e.MOMENTUM, e.MOMENTUM_COLOUR, 0.009 * size, "L")
     line = 0.0025 * size

@@ -13,7 +13,7 @@ import rerun as rr
 from ..core.observer import BodySnapshot
 from . import entities as e
 from .arrows import ArrowScale, arrow_length
-from .columns import Ticks, scalar_columns, time_columns
+from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .lanes import Lanes
@@ -23,6 +23,7 @@ from .plots import Plots
 from .poinsot_picture import PoinsotPicture
 from .statics import TRAIL_RADIUS, Scene, drawn_mesh, send_body, send_scene, send_styles
 from .streams import Stream
+from .string_picture import StringPicture
 from .trail import Trail
 from .words import Words
 
@@ -49,12 +50,15 @@ class SceneWriter:
         self._scene: Scene | None = None
         self._body: BodySnapshot | None = None
         self._ghost_body: BodySnapshot | None = None
+        self._scene_in_force = ""
         self.restart()
 
     # What holds for a whole run
 
     def restart(self) -> None:
-        """A new run: simulated time starts again at 0; scene, mesh and body stay."""
+        """A new run: simulated time starts again at 0; the parameters in force, mesh and body stay."""
+        if self._scene is not None and self._scene_in_force:
+            self._scene = self._scene.with_text(self._scene_in_force)
         self.moved = False
         self._last_time_ns = 0
         self._ticks = Ticks(PICTURE_RATE)
@@ -64,6 +68,7 @@ class SceneWriter:
         self._loads = LoadArrows()
         self._ghost = Ghost()
         self._words = Words()
+        self._string = StringPicture()
         self._lanes = Lanes()
         self._load_changes: list[tuple[int, bool]] = []
         self._acted = self._touched = False
@@ -96,7 +101,7 @@ class SceneWriter:
         self._skip_live = skip_live
         sent = shown = 0
         for mark in block.marks:
-            self._loads.rows(block, shown, mark.after_rows)
+            self._show_loads(block, shown, mark.after_rows)
             shown = mark.after_rows
             self._note_time(mark.time_ns)
             handler = _ALONG_WITH_ROWS.get(mark.kind)
@@ -110,12 +115,16 @@ class SceneWriter:
                 handler(self, mark)
             else:
                 on_mark(mark)
-        self._loads.rows(block, shown, block.count)
+        self._show_loads(block, shown, block.count)
         self._send_upto(block, sent, block.count)
 
     def write_ghost(self, block: Block, begin: int, end: int) -> None:
         """Send states begin..end of the ghost, after the body's of the same times."""
         self._ghost.rows(block, begin, end, self._send_rows)
+
+    def _show_loads(self, block: Block, begin: int, end: int) -> None:
+        self._loads.rows(block, begin, end)
+        self._string.rows(block, begin, end)
 
     def _note_time(self, time_ns: int) -> None:
         self.moved = self.moved or time_ns > 0
@@ -124,6 +133,7 @@ class SceneWriter:
     def _send_upto(self, block: Block, begin: int, end: int) -> None:
         self._write_rows(block, begin, end)
         self._loads.send(self._send)
+        self._string.send(self._send, self._lanes)
         self._words.send(self._send)
         self._lanes.send(self._send)
 
@@ -139,8 +149,19 @@ class SceneWriter:
 
     def _loads_changed(self, mark: Mark) -> None:
         kinds = self._loads.kinds_acting
-        self._load_changes.append((mark.after_rows, bool(kinds)))
+        self._load_changes.append((mark.after_rows, bool(kinds) or self._string.tied))
         self._lane(mark, "loads", " + ".join(kinds) or "none")
+
+    def _string_changed(self, mark: Mark) -> None:
+        (string,) = mark.content
+        self._string.change(mark.time_ns, mark.wall_ns, string)
+        self._load_changes.append((mark.after_rows, bool(self._loads.kinds_acting) or string is not None))
+
+    def _scene_changed(self, mark: Mark) -> None:
+        (self._scene_in_force,) = mark.content
+        if self._scene is None or self._scene_in_force != self._scene.text:
+            document = rr.TextDocument.columns(text=[self._scene_in_force], media_type=["text/plain"])
+            self._send(e.SCENE_IN_FORCE, one_time(mark.time_ns, mark.wall_ns), document)
 
     def _status(self, mark: Mark) -> None:
         self._lane(mark, *mark.content)
@@ -282,6 +303,8 @@ def _drawn(vectors: np.ndarray, reference: float, size: float) -> np.ndarray:
 _ALONG_WITH_ROWS = {
     "load_began": SceneWriter._load_began,
     "load_ended": SceneWriter._load_ended,
+    "string_changed": SceneWriter._string_changed,
+    "scene_changed": SceneWriter._scene_changed,
     "status": SceneWriter._status,
     "event": SceneWriter._event,
     "refused": SceneWriter._refused,

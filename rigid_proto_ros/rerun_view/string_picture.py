@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""The string from the hand to its knot: straight while it pulls, hanging through while it is slack."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from ..core.observer import ShownString
+from . import entities as e
+from .columns import Send, Ticks, scalar_columns, time_columns
+from .derived import rotation_matrices, to_world
+from .lanes import Lanes
+from .mailbox import Block
+
+RATE = 100
+"""[1/s, simulated] of the picture; tension is plotted at it too."""
+
+SLACK_POINTS = 25
+BISECTIONS = 40
+"""Enough for the sag to 12 digits."""
+
+NO_DIRECTION = 1e-12
+"""In rest lengths: a string shorter than this has no direction to pull in."""
+
+
+def sag(distance: np.ndarray, length: float) -> np.ndarray:
+    """How deep (n,) a parabola hangs through whose ends are ``distance`` (n,) apart and which is ``length`` long.
+
+    With half span h and slope a = 2 s/h at the end, the arc is h √(1 + a²) + (h/a) asinh a.
+    """
+    half = np.maximum(0.5 * distance, 1e-9 * length)
+    low, high = np.zeros_like(half), np.full_like(half, 0.5 * length)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        a = 2.0 * middle / half
+        arc = half * np.sqrt(1.0 + a * a) + half * np.divide(np.arcsinh(a), a, out=np.ones_like(a), where=a > 0.0)
+        low, high = np.where(arc < length, middle, low), np.where(arc < length, high, middle)
+    return 0.5 * (low + high)
+
+
+class StringPicture:
+    """Follows the string of one run; call in the order of what happened."""
+
+    def __init__(self) -> None:
+        self._string: ShownString | None = None
+        self._ticks = Ticks(RATE)
+        self._shown = False
+        self._reset()
+
+    def _reset(self) -> None:
+        self._times: list[np.ndarray] = []
+        self._walls: list[np.ndarray] = []
+        self._strips: list[np.ndarray] = []
+        self._hands: list[np.ndarray] = []
+        self._tensions: list[np.ndarray] = []
+        self._counts: list[np.ndarray] = []
+
+    @property
+    def tied(self) -> bool:
+        """Whether there is a string."""
+        return self._string is not None
+
+    def change(self, time_ns: int, wall_ns: int, string: ShownString | None) -> None:
+        """Another target, another knot, tied or let go."""
+        if string is None and self._shown:
+            # A row without a string ends the picture of the one before.
+            self._times.append(np.array([time_ns]))
+            self._walls.append(np.array([wall_ns]))
+            self._counts.append(np.zeros(1, dtype=int))
+            self._tensions.append(np.zeros(1))
+            self._shown = False
+        self._string = string
+
+    def rows(self, block: Block, begin: int, end: int) -> None:
+        """States begin..end, between which the string isn't changed."""
+        string = self._string
+        if begin == end or string is None:
+            return
+        chosen = begin + self._ticks.choose(block.times[begin:end])
+        if not len(chosen):
+            return
+        times_ns, rows = block.times[chosen], block.rows[chosen]
+        arm = to_world(rotation_matrices(rows[:, 3:7]), np.asarray(string.attach, dtype=float))
+        spin = to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
+        free_end, velocity = _hand(string, times_ns)
+        span = rows[:, 0:3] + arm - free_end
+        distance = np.linalg.norm(span, axis=1)
+        tension = _tension(string, span, distance, rows[:, 7:10] + np.cross(spin, arm) - velocity)
+        self._times.append(times_ns.copy())
+        self._walls.append(block.walls[chosen])
+        self._counts.append(np.ones(len(chosen), dtype=int))
+        self._tensions.append(tension)
+        self._hands.append(free_end)
+        self._strips.extend(_drawn(string, free_end, span, distance))
+        self._shown = True
+
+    def send(self, send: Send, lanes: Lanes) -> None:
+        """Send what was collected, and say when the string went taut or slack."""
+        if not self._times:
+            return
+        times_ns, walls = np.concatenate(self._times), np.concatenate(self._walls)
+        counts, tensions = np.concatenate(self._counts), np.concatenate(self._tensions)
+        times = time_columns(times_ns, walls)
+        pulls = [bool(tension) for tension, count in zip(tensions, counts, strict=True) if count]
+        colours = [e.STRING_COLOUR if taut else e.SLACK_COLOUR for taut in pulls]
+        send(e.STRING, times, rr.LineStrips3D.columns(strips=self._strips, colors=colours).partition(counts))
+        hands = np.concatenate(self._hands) if self._hands else np.empty((0, 3))
+        send(e.HAND, times, rr.Points3D.columns(positions=hands).partition(counts))
+        send(e.STRING_TENSION, times, scalar_columns(tensions[:, np.newaxis]))
+        for time_ns, wall_ns, count, tension in zip(times_ns, walls, counts, tensions, strict=True):
+            lanes.change(int(time_ns), int(wall_ns), "string", ("taut" if tension else "slack") if count else "none")
+        self._reset()
+
+
+def _hand(string: ShownString, times_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Place and velocity (n, 3) of the free end at each time."""
+    way = np.asarray(string.target, dtype=float) - string.origin
+    lasts_ns = string.end_ns - string.begin_ns
+    done = np.clip((times_ns - string.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
+    speed = way / (1e-9 * lasts_ns) if lasts_ns > 0 else np.zeros(3)
+    return string.origin + done[:, np.newaxis] * way, (times_ns < string.end_ns)[:, np.newaxis] * speed
+
+
+def _tension(string: ShownString, span: np.ndarray, distance: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Tension (n,) [N]: k x + c ẋ, and nothing for a string that would have to push."""
+    if string.rest_length == 0.0:
+        return np.linalg.norm(string.stiffness * span + string.damping * velocity, axis=1)
+    direction = span / np.maximum(distance, np.finfo(float).tiny)[:, np.newaxis]
+    stretch = distance - string.rest_length
+    tension = string.stiffness * stretch + string.damping * np.einsum("ij,ij->i", direction, velocity)
+    if not string.bilateral:
+        tension = np.where(stretch > 0.0, np.maximum(tension, 0.0), 0.0)
+    return np.where(distance < NO_DIRECTION * string.rest_length, 0.0, tension)
+
+
+def _drawn(string: ShownString, free_end: np.ndarray, span: np.ndarray, distance: np.ndarray) -> list[np.ndarray]:
+    """Per state the string as points: its two ends, or as long a curve as it is, hanging down."""
+    slack = (distance < string.rest_length) & (not string.bilateral)
+    depth = sag(distance, string.rest_length) if slack.any() else np.zeros(len(span))
+    along = np.linspace(0.0, 1.0, SLACK_POINTS)[:, np.newaxis]
+    strips = []
+    for k in range(len(span)):
+        if slack[k]:
+            down = 4.0 * depth[k] * along * (1.0 - along) * _down(span[k], distance[k])
+            strips.append(free_end[k] + along * span[k] + down)
+        else:
+            strips.append(np.array([free_end[k], free_end[k] + span[k]]))
+    return strips
+
+
+def _down(span: np.ndarray, distance: float) -> np.ndarray:
+    """The unit vector (3,) square to the span that points down most, sideways for a string that hangs straight."""
+    axis = span / distance if distance > 0.0 else np.array([1.0, 0.0, 0.0])
+    down = np.array([0.0, 0.0, -1.0])
+    square = down - axis * (axis @ down)
+    if np.linalg.norm(square) < 1e-6:
+        square = np.array([1.0, 0.0, 0.0]) - axis * axis[0]
+    return square / np.linalg.norm(square)

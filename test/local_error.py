@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Steps as an integrator committed them, each judged against the exact flow from its own start.
+
+The flow is that of the segment's own variables (core/motion.py), so nothing is lost by converting to world coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpmath import mp, mpf
+from reference_motion import angle_between, rotation_of
+from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
+
+from rigid_proto_ros.core import problem as of
+from rigid_proto_ros.core.simulation import Simulation
+
+FLOOR = 32.0 * 2.0**-52
+"""What rounding is allowed in one step, whatever its length."""
+
+
+@dataclass(frozen=True)
+class CommittedStep:
+    """Problem (SIZE,) of its segment, variables before and after, times from the segment's start [ns]."""
+
+    problem: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    begin_ns: int
+    end_ns: int
+
+    @property
+    def length(self) -> float:
+        return (self.end_ns - self.begin_ns) * 1e-9
+
+
+def committed_steps(
+    simulation: Simulation, until_ns: int, wanted: int, rng: np.random.Generator
+) -> list[CommittedStep]:
+    """Up to ``wanted`` single steps that the simulation committed on its way to ``until_ns``, spread over the flight."""
+    found: list[CommittedStep] = []
+    times = np.sort(rng.integers(0, until_ns, wanted))
+    for start_ns in times:
+        if start_ns <= simulation.time_ns:
+            continue
+        simulation.advance(int(start_ns))
+        segment, portion = simulation._segment, 1000
+        while simulation.time_ns < until_ns:
+            steps, begin_ns, before = segment.steps, segment.committed_ns, segment._variables.copy()
+            simulation.advance(min(until_ns, simulation.time_ns + portion))
+            if simulation._segment is not segment:
+                break
+            taken = segment.steps - steps
+            if taken == 1:
+                origin_ns = segment.start.time_ns
+                found.append(
+                    CommittedStep(
+                        segment._problem.copy(),
+                        before,
+                        segment._variables.copy(),
+                        begin_ns - origin_ns,
+                        segment.committed_ns - origin_ns,
+                    )
+                )
+                break
+            portion = max(1, portion // 4) if taken > 1 else 2 * portion
+    return found
+
+
+def local_error(step: CommittedStep, digits: int = 22) -> float:
+    """Largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s) of a step."""
+    p, length = step.problem, step.problem[of.LENGTH]
+    row = [*step.before[7:10], *step.before[0:4], *step.before[10:13], *step.before[4:7]]
+    with mp.workdps(digits + 10):
+        span = mpf(step.end_ns - step.begin_ns) / 10**9
+        (exact,) = reference_motion(reference_problem(p), row, [span], digits)
+        angle = angle_between(step.after[0:4], rotation_of(exact[3:7]))
+        moved, sped, spun = (
+            float(sum((mpf(float(a)) - b) ** 2 for a, b in zip(step.after[k : k + 3], part, strict=True)) ** mpf("0.5"))
+            for k, part in ((7, exact[0:3]), (10, exact[7:10]), (4, exact[10:13]))
+        )
+    time = step.end_ns * 1e-9
+    speed = np.linalg.norm(_reference_velocity(p, time) + step.after[10:13])
+    spin = np.linalg.norm(step.after[4:7])
+    return max(angle, moved / length, spun / max(spin, 1.0), sped / max(speed, length))
+
+
+def _reference_velocity(p: np.ndarray, time: float) -> np.ndarray:
+    """Of the closed-form part of the translation [m/s]."""
+    v, a = (
+        p[of.REFERENCE_VELOCITY : of.REFERENCE_VELOCITY + 3],
+        p[of.REFERENCE_ACCELERATION : of.REFERENCE_ACCELERATION + 3],
+    )
+    c = p[of.REFERENCE_DAMPING]
+    if c == 0.0:
+        return v + time * a
+    decay = np.exp(-c * time)
+    return v * decay + a * (1.0 - decay) / c
+
+
+def reference_problem(p: np.ndarray) -> ReferenceProblem:
+    """The same motion in principal axes for the reference; its position is the added displacement."""
+    mass = float(p[of.MASS])
+    string = None
+    if p[of.HAS_STRING]:
+        string = ReferenceString(
+            point=_triple(p, of.ATTACH),
+            target=tuple(-c for c in _triple(p, of.STRING_START)),
+            stiffness=float(p[of.STIFFNESS]),
+            damping=float(p[of.STRING_DAMPING]),
+            rest_length=float(p[of.REST_LENGTH]),
+            bilateral=bool(p[of.BILATERAL]),
+        )
+    with mp.workdps(50):
+        # The problem holds accelerations; forces are exact products of them with the mass.
+        force_body = tuple(mpf(mass) * mpf(c) for c in _triple(p, of.ACCELERATION_BODY))
+        damping = mpf(mass) * mpf(float(p[of.DAMPING_LINEAR]))
+    return ReferenceProblem(
+        mass=mass,
+        inertia=tuple(tuple(float(p[of.MOMENTS + i]) if i == j else 0.0 for j in range(3)) for i in range(3)),
+        gravity=_triple(p, of.ACCELERATION_ADDED),
+        force_body=force_body,
+        torque_world=_triple(p, of.TORQUE_WORLD),
+        torque_body=_triple(p, of.TORQUE_BODY),
+        moment=tuple(_triple(p, of.MOMENT + 3 * i) for i in range(3)),
+        linear_damping=damping,
+        angular_damping=float(p[of.DAMPING_ANGULAR]),
+        gyroscopic=bool(p[of.GYROSCOPIC]),
+        string=string,
+    )
+
+
+def _triple(p: np.ndarray, at: int) -> tuple[float, float, float]:
+    return tuple(float(c) for c in p[at : at + 3])
