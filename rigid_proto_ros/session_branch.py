@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
+from .core.body import Body
+from .core.commands import WrenchCommand
 from .core.errors import InputError
 from .core.frames import parse_frame
+from .core.loads import Load
 from .core.observer import Observer, ShownLoad
 from .recorded_session import RecordedSession
 from .replay import Resimulation, mesh_finder, session_scenario
@@ -33,9 +36,11 @@ class ActingLoads(Observer):
         self.acting: dict[int, _Acting] = {}
         self._latest: _Acting | None = None
 
-    def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
         """Remember the command until it is said to act."""
-        self._latest = _Acting(time_ns, frame_id, kind, np.asarray(force).tolist(), np.asarray(torque).tolist())
+        force = load.force if load.axes == "world" else load.own_force(body)
+        frame_id = load.frame_id + command.frame.options
+        self._latest = _Acting(time_ns, frame_id, command.kind, [float(f) for f in force], list(load.torque))
 
     def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
         """The command applied last begins to act; an impulse has acted."""

@@ -18,7 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from . import cdr, session_messages
+from .core.body import Body
+from .core.commands import WrenchCommand
 from .core.errors import InputError
+from .core.loads import Load
 from .core.observer import BodySnapshot, Observer
 from .mesh_io import resolve_mesh
 from .rerun_view.mailbox import BLOCK_ROWS, Block, Mailbox, Mark
@@ -116,11 +119,11 @@ class McapObserver(Observer):
         """Copy one state row (13,)."""
         self._mailbox.put(time_ns, row)
 
-    def applied(self, time_ns: int, frame_id: str, kind: str, force: np.ndarray, torque: np.ndarray) -> None:
-        """Write a wrench or poke as it took effect."""
-        self._message(
-            time_ns, "applied", cdr.wrench_stamped(time_ns, frame_id, np.asarray(force).tolist(), torque.tolist())
-        )
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
+        """Write a wrench or poke as it took effect, as the node publishes it."""
+        force = load.force if load.axes == "world" else load.own_force(body).tolist()
+        frame_id = load.frame_id + command.frame.options
+        self._message(time_ns, "applied", cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
 
     def event(self, time_ns: int, line: str) -> None:
         """Write a line of the event log."""
