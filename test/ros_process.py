@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Real processes of this package for tests: started, awaited, signalled and ended by their own process id."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parent.parent
+MODULES = {
+    "rigid_body_node": "rigid_proto_ros.ros.main",
+    "poke_client": "rigid_proto_ros.ros.poke_client",
+    "rigid_proto": "rigid_proto_ros.cli.main",
+}
+READY_S = 90.0
+"""Longer than a first start with all kernels to compile on a loaded machine."""
+
+LOOPBACK = (
+    '<General><AllowMulticast>false</AllowMulticast><Interfaces><NetworkInterface name="lo"/></Interfaces></General>'
+    "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery>'
+)
+"""Cyclone DDS finds the node by unicast, as ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST wants it."""
+
+
+def command(name: str, *arguments: object) -> list[str]:
+    """How to start one of the package's executables with this interpreter."""
+    return [sys.executable, "-m", MODULES[name], *map(str, arguments)]
+
+
+def from_source(environment: dict[str, str]) -> dict[str, str]:
+    """The environment with this source tree first on the path."""
+    rest = filter(None, [environment.get("PYTHONPATH", "")])
+    return {**environment, "PYTHONPATH": os.pathsep.join([str(SOURCE), *rest])}
+
+
+def run(name: str, *arguments: object, environment: dict[str, str], cwd: Path | None = None, timeout: float = READY_S):
+    """Run an executable to its end; returns the CompletedProcess with text."""
+    return subprocess.run(
+        command(name, *arguments),
+        env=from_source(environment),
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
+def refusal(name: str, *arguments: object, environment: dict[str, str], cwd: Path | None = None) -> str:
+    """Run what must be refused: exit 2 and one line on stderr, which is returned."""
+    done = run(name, *arguments, environment=environment, cwd=cwd)
+    lines = done.stderr.splitlines()
+    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
+    assert len(lines) == 1, done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in lines[0]
+    return lines[0]
+
+
+class RosProcess:
+    """A process with its output in files ``<log>.out`` and ``<log>.err``."""
+
+    def __init__(self, name: str, *arguments: object, environment: dict[str, str], log: Path) -> None:
+        self._out, self._err = log.with_suffix(".out"), log.with_suffix(".err")
+        with open(self._out, "w") as out, open(self._err, "w") as err:
+            self.process = subprocess.Popen(
+                command(name, *arguments),
+                env=from_source(environment),
+                cwd=log.parent,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=err,
+            )
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    @property
+    def output(self) -> str:
+        return self._out.read_text()
+
+    @property
+    def errors(self) -> str:
+        return self._err.read_text()
+
+    def wait_for(self, text: str) -> None:
+        """Wait until ``text`` stands in the output or the errors."""
+        deadline = time.monotonic() + READY_S
+        while text not in self.output + self.errors:
+            ended = self.process.poll()
+            assert ended is None, f"ended with {ended}: {self.output}{self.errors}"
+            assert time.monotonic() < deadline, f"no {text!r} in {self.output}{self.errors}"
+            time.sleep(0.02)
+
+    def end(self, number: int = signal.SIGINT, within_s: float = 20.0) -> int:
+        """Send a signal, wait for the end and return the exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+            try:
+                self.process.wait(within_s)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+                raise
+        return self.process.returncode
+
+
+@contextmanager
+def running_node(*arguments: object, environment: dict[str, str], log: Path) -> Iterator[RosProcess]:
+    """A rigid_body_node that flies; ended by SIGINT, with status 0, at the end."""
+    node = RosProcess("rigid_body_node", *arguments, environment=environment, log=log)
+    try:
+        node.wait_for("is flying")
+        yield node
+    finally:
+        status = node.end()
+    assert status == 0, node.errors
+
+
+def descendants(pid: int) -> set[int]:
+    """Process ids of all children, and theirs."""
+    found: set[int] = set()
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        try:
+            children = {int(child) for child in task.read_text().split()}
+        except OSError:
+            continue
+        for child in children:
+            found |= {child} | descendants(child)
+    return found
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs (one that ended and waits for its parent doesn't)."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def dds_client(environment: dict[str, str], node: str, commands: list, until_ns: int) -> subprocess.Popen:
+    """Start the outside client; its result is the last line of its output, see dds_client.py."""
+    process = subprocess.Popen(
+        [sys.executable, str(Path(__file__).parent / "dds_client.py")],
+        env={**environment, "CYCLONEDDS_URI": LOOPBACK},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    process.stdin.write(json.dumps({"node": node, "commands": commands, "until_ns": until_ns}) + "\n")
+    process.stdin.flush()
+    return process
