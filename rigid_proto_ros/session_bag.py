@@ -10,20 +10,11 @@ from pathlib import Path
 import yaml
 
 from .core.errors import InputError
-from .session_mcap import ZSTD_MAGIC, McapContent, decompressed, read_mcap
+from .session_mcap import ZSTD_MAGIC, McapContent, decompressed, read_mcap, repair_mcap
+
+__all__ = ["bag_bytes", "bag_files", "read_bag", "repair_mcap"]
 
 METADATA = "metadata.yaml"
-
-
-def is_bag(path: Path) -> bool:
-    """Whether a path is to be read as a bag: a folder, or a file that begins as an MCAP or zstd file does."""
-    if path.is_dir() or ".mcap" in path.suffixes:
-        return True
-    try:
-        with open(path, "rb") as stream:
-            return stream.read(5) == b"\x89MCAP"
-    except OSError:
-        return False
 
 
 def read_bag(path: Path, wanted: Callable[[str], bool]) -> McapContent:

@@ -40,8 +40,8 @@ _logger = logging.getLogger(__name__)
 class McapObserver(Observer):
     """Records to ``path``; topics are named after the node, frames as its messages name them.
 
-    log_time(simulated ns, wall ns) gives the time that a message is logged at: by default the wall's, as bags have it.
-    on_error gets one line when recording has stopped because the file can't be written, from another thread; ``error``
+    Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run behind
+    the one before. on_error gets one line when recording has stopped because the file can't be written, from another thread; ``error``
     keeps it. Raises InputError where the file can't be opened.
     """
 
@@ -51,14 +51,15 @@ class McapObserver(Observer):
         node_name: str = "rigid_body",
         values: Mapping[str, object] | None = None,
         on_error: Callable[[str], None] | None = None,
-        log_time: Callable[[int, int], int] = lambda simulated_ns, wall_ns: wall_ns,
+        simulated_log: bool = False,
     ) -> None:
         from .session_mcap import McapFile
 
         values = values or {}
         self.error = ""
         self._on_error = on_error or _logger.error
-        self._log_time = log_time
+        self._simulated_log = simulated_log
+        self._run_begins_ns = self._latest_log_ns = 0
         world = str(values.get("world_frame") or "world")
         self._body_frame = str(values.get("body_frame") or node_name)
         self._templates = {
@@ -129,6 +130,10 @@ class McapObserver(Observer):
         """Write a line of the event log."""
         self._message(time_ns, "events", cdr.string(line))
 
+    def reset(self) -> None:
+        """The next run begins; its first event says so."""
+        self._mailbox.mark(0, "reset")
+
     def close(self) -> None:
         """Write what is buffered and finish the file."""
         if self._closed:
@@ -181,7 +186,15 @@ class McapObserver(Observer):
             self._write_mark(mark)
         self._write_rows(block, sent, block.count)
 
+    def _log_time(self, simulated_ns: int, wall_ns: int) -> int:
+        log_time = self._run_begins_ns + simulated_ns if self._simulated_log else wall_ns
+        self._latest_log_ns = max(self._latest_log_ns, log_time)
+        return log_time
+
     def _write_mark(self, mark: Mark) -> None:
+        if mark.kind == "reset":
+            self._run_begins_ns = self._latest_log_ns + 1
+            return
         log_time = self._log_time(mark.time_ns, mark.wall_ns)
         if mark.kind == "message":
             name, data = mark.content

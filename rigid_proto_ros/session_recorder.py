@@ -30,8 +30,7 @@ def make_recorder(
         try:
             from .session_observer import McapObserver
 
-            log_time = (lambda simulated_ns, wall_ns: simulated_ns) if simulated_log else (lambda _, wall_ns: wall_ns)
-            return McapObserver(path, node_name, values, on_error, log_time)
+            return McapObserver(path, node_name, values, on_error, simulated_log)
         except ImportError as error:
             raise InputError("record", path, f"mcap to be installed, pip install mcap zstandard ({error})") from None
     from .rerun_view import RerunObserver
