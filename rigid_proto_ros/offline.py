@@ -12,6 +12,7 @@ from .bundled import scene_names, scene_path
 from .core.errors import CommandRefused, InputError
 from .core.observer import Observer
 from .core.simulation import Simulation
+from .ghost import ghost_of
 from .parameters import parameter_named
 from .poke_script import ScriptCommand, core_command, with_contacts
 from .scenario import Scenario, make_scenario, publication_ns
@@ -82,6 +83,7 @@ class OfflineRun:
         if observer is not None:
             tell_start(observer, scenario)
             self.simulation.announce()
+        self._ghost = ghost_of(scenario, self.simulation, observer)
         script = with_contacts(script or [], scenario.setup.contacts)
         for number, command in enumerate(script, 1):
             try:
@@ -98,6 +100,8 @@ class OfflineRun:
         self.scenario = self.scenario.with_changes(changes)
         if self.observer is not None:
             self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
+        if self._ghost is not None:
+            self._ghost.change(self.simulation.time_ns, self.scenario)
         return self.scenario.setup
 
     def advance(self, until_ns: int) -> bool:
@@ -109,6 +113,9 @@ class OfflineRun:
                 if self.simulation.failure:
                     return False
                 self.observer.state(next_ns, state.row)
+                self.simulation.tell_status()
+                if self._ghost is not None:
+                    self._ghost.advance(next_ns)
                 self._next_publication += 1
         self.simulation.advance(until_ns)
         return not self.simulation.failure

@@ -43,13 +43,15 @@ class BodyMesh:
 class Scenario:
     """A complete, checked set of parameter values and what follows from them; immutable.
 
-    values: every parameter by name, in its own type. body_mesh: None without a mesh. warnings: one line each.
+    values: every parameter by name, in its own type. body_mesh: None without a mesh. warnings: one line each. ghost: the
+    setup of the ghost, when one is asked for.
     """
 
     values: Mapping[str, object]
     body_mesh: BodyMesh | None
     setup: Setup
     warnings: tuple[str, ...] = ()
+    ghost: Setup | None = None
 
     def with_changes(self, changes: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
         """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is.
@@ -112,6 +114,13 @@ def _load(values, mesh: Mesh | None = None) -> BodyMesh | None:
 
 
 def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:
+    setup, warnings = _setup(values, body_mesh)
+    ghost = {name: values[f"ghost.{name}"] for name in ("inertia_model", "integrator") if values[f"ghost.{name}"]}
+    ghost_setup = _setup({**values, **ghost}, body_mesh)[0] if ghost else None
+    return Scenario(values, body_mesh, setup, warnings, ghost_setup)
+
+
+def _setup(values: Mapping[str, object], body_mesh: BodyMesh | None) -> tuple[Setup, tuple[str, ...]]:
     scale = scale_vector(values["scale"])
     properties = _mass_properties(values, body_mesh, scale)
     check_tensor(properties.inertia)
@@ -151,9 +160,10 @@ def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario
             bilateral=values["string.bilateral"],
             timeout_ns=nanoseconds(values["string.timeout"]),
         ),
+        accuracy=values["accuracy"],
         initial=state_row(values["initial.position"], quaternion, values["initial.linear_velocity"], omega_body),
     )
-    return Scenario(values, body_mesh, setup, tuple(properties.warnings))
+    return setup, tuple(properties.warnings)
 
 
 def _mass_properties(values, body_mesh, scale):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from mass_solids import PLACES, box, circle, prism, solids, sphere
 
+from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.core.exact_moments import exact_solid_moments, relative_errors
 from rigid_proto_ros.core.mass_properties import MeshMoments
-from rigid_proto_ros.core.moments import solid_moments
+from rigid_proto_ros.core.moments import PART, solid_moments
 from rigid_proto_ros.core.moments_mirtich import mirtich_moments
 from rigid_proto_ros.mesh_body import mesh_body
 from rigid_proto_ros.mesh_io import load_mesh
@@ -131,3 +132,24 @@ def test_both_paths_agree_where_both_are_good():
     careful = solid_moments(vertices + 0.3, triangles, path="compensated")
     assert plain.measure == pytest.approx(careful.measure, rel=1e-15 * 8)
     assert plain.second == pytest.approx(careful.second, rel=1e-14, abs=1e-15)
+
+
+def test_the_number_of_processors_is_of_no_matter(monkeypatch):
+    vertices, triangles = sphere(200, (1.0, 0.7, 0.4))
+    assert len(triangles) > 2 * PART  # summed by threads
+    bits = set()
+    for processors in (1, 2, 5):
+        monkeypatch.setattr("os.cpu_count", lambda n=processors: n)
+        moments = solid_moments(vertices, triangles)
+        bits.add((moments.measure, moments.center.tobytes(), moments.second.tobytes()))
+    assert len(bits) == 1
+
+
+def test_a_vertex_that_is_not_there_is_refused_by_every_path():
+    for rings in (5, 40, 200):
+        vertices, triangles = sphere(rings)
+        for wrong in (len(vertices), -1, 2**62):
+            broken = triangles.copy()
+            broken[-1, 2] = wrong
+            with pytest.raises(MeshError, match="out of range"):
+                solid_moments(vertices, broken)

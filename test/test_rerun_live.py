@@ -15,7 +15,7 @@ from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.rerun_view import RerunObserver, ports, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.snapshot import DRIVERS, headless_viewer, show, view_errors
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, complaints, headless_viewer, show
 
 WAIT_S = 30.0
 
@@ -123,7 +123,7 @@ def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(v
         observer.state(k * flight.PERIOD_NS, row)
     wait_for(lambda: 39 * flight.PERIOD_NS in shown())
     viewer.take_screenshot()
-    assert view_errors(viewer) == []
+    assert complaints(viewer) == []
     observer.close()
 
 
@@ -155,6 +155,8 @@ def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, i
     path = tmp_path / "session.rrd"
     observer = RerunObserver(record=str(path), initial_view=initial_view)
     flight.fly(observer, flight.rows(80))
+    observer.mesh_changed(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32)
+    observer.body_changed(780_000_000, flight.BODY)
     observer.ghost_began(790_000_000, flight.BODY)
     observer.ghost_state(790_000_000, flight.rows(80)[79])
     observer.close()
@@ -162,6 +164,6 @@ def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, i
     for at_s in (0.0, 0.25, 0.35, 0.79):
         viewer.set_time(e.SIM_TIME, duration=at_s, play_state="paused")
         viewer.take_screenshot()
-        assert view_errors(viewer) == []
+        assert complaints(viewer) == []
     expected = {"lesson": "Flight", "debugging": "All shapes", "plain": "Plain"}[initial_view]
     assert expected in {view.name for view in viewer.get_state().views if view.visible}

@@ -162,6 +162,27 @@ def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states)
     assert np.isclose(energies[1][0], 0.5 * 24.0 * velocity @ velocity, rtol=1e-13)
 
 
+def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
+    path = tmp_path / "meshes.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, states[:20])
+    observer.mesh_changed(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32)
+    observer.body_changed(200_000_000, flight.BODY)
+    observer.state(200_000_000, states[20])
+    observer.reset()
+    observer.state(0, states[21])
+    observer.close()
+    before, after = read_session(tmp_path / "meshes.run1.rrd"), read_session(path)
+    assert (before.mesh_chunks, after.mesh_chunks) == (2, 1)
+    assert np.array_equal(before.vertices, flight.VERTICES) and before.mesh_sha256 == flight.SHA256
+    assert np.array_equal(after.vertices, 2.0 * flight.VERTICES) and after.mesh_sha256 == "ab" * 32
+    first = column(tmp_path / "meshes.run1.rrd", e.BODY_MESH, "Transform3D:scale")
+    second = column(tmp_path / "meshes.run1.rrd", e.BODY_MESH + "_2", "Transform3D:scale")
+    scale = flight.SCALE.tolist()
+    assert first[0].tolist() == [0, 200_000_000] and np.allclose(first[1], [[scale], [[1e-9] * 3]])
+    assert second[0].tolist() == [0, 200_000_000] and np.allclose(second[1], [[[1e-9] * 3], [scale]])
+
+
 def test_a_reset_keeps_the_run_before_beside_the_new_one(tmp_path, states):
     path = tmp_path / "session.rrd"
     observer = RerunObserver(record=str(path))
@@ -212,17 +233,33 @@ def test_recording_can_be_switched_on_and_off_in_flight(tmp_path, states):
     assert read_session(first).mesh_chunks == read_session(second).mesh_chunks == 1
 
 
-@pytest.mark.parametrize("name", ["nowhere/session.rrd", "."])
+@pytest.mark.parametrize("name", ["nowhere/session.rrd", "session.mcap", "."])
 def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, name):
     with pytest.raises(InputError, match="record"):
         RerunObserver(record=str(tmp_path / name))
 
 
-def test_a_disk_that_is_full_from_the_start_is_refused():
+def test_a_disk_that_is_full_from_the_start_is_refused(tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full")
+    (tmp_path / "full.rrd").symlink_to("/dev/full")
     with pytest.raises(InputError, match="[Nn]o space"):
-        RerunObserver(record="/dev/full")
+        RerunObserver(record=str(tmp_path / "full.rrd"))
+
+
+def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states):
+    path = tmp_path / "session.rrd"
+    errors = []
+    observer = RerunObserver(record=str(path), on_error=errors.append)
+    flight.fly(observer, states[:20])
+    observer._flusher.flush_now()
+    observer.body_changed(200_000_000, None)
+    for k in range(20, 40):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer.close()
+    assert len(errors) == 1 and observer.recording == ""
+    session = read_session(path)
+    assert session.complete and session.rows.tobytes() == states[:20].tobytes()
 
 
 FULL_IN_FLIGHT = """
@@ -262,12 +299,12 @@ def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
     errors = []
     observer = RerunObserver(record=str(path), on_error=errors.append)
     flight.fly(observer, states[:20])
-    observer._flush_now()
+    observer._flusher.flush_now()
     path.unlink()
     folder.rmdir()
     for k in range(20, 40):
         observer.state(k * flight.PERIOD_NS, states[k])
-    observer._flush_now()
+    observer._flusher.flush_now()
     assert observer.recording == "" and str(path) in observer.error
     for k in range(40, 60):
         observer.state(k * flight.PERIOD_NS, states[k])

@@ -28,6 +28,16 @@ def _accumulate(total: np.ndarray, carry: np.ndarray, k: int, value: float) -> N
     carry[k] += error
 
 
+# Apart from the sums, since no reassociation may touch it: these subtractions are exact, sums of three corners aren't.
+@njit(cache=True, nogil=True)
+def _centre(w: np.ndarray, count: int, rx: float, ry: float, rz: float, factor: float) -> None:
+    for corner in range(3):
+        for t in range(count):
+            w[3 * corner, t] = (w[3 * corner, t] - rx) * factor
+            w[3 * corner + 1, t] = (w[3 * corner + 1, t] - ry) * factor
+            w[3 * corner + 2, t] = (w[3 * corner + 2, t] - rz) * factor
+
+
 # Contraction and reassociation only choose the order and the fusing of the block's own sums; every such order has the
 # bound BLOCK·2⁻⁵³·Σ|terms|. Neither infinities nor NaN nor signed zeros are assumed away.
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
@@ -66,31 +76,43 @@ def _block_sums(w: np.ndarray, count: int, total: np.ndarray, carry: np.ndarray)
 
 
 @njit(cache=True, nogil=True)
-def blocked_sums(vertices, triangles, reference, factor):
-    """The ten sums in plain doubles, block by block; blocks are combined without error.
+def blocked_sums(vertices, triangles, first, last, reference, factor):
+    """The ten sums over triangles first to last in plain doubles, block by block; blocks are combined without error.
 
     vertices (n, 3), triangles (m, 3), reference (3,), factor a power of two: corners enter as (v − reference)·factor.
-    Returns (sums (10,), their low parts (10,), Σ(|b − a|² + |c − a|²)); the last measures how much d can round, and is
-    −1 when a triangle names a vertex that isn't there.
+    Returns (sums (11,), their low parts (11,)), the eleventh being Σ(|b − a|² + |c − a|²), which measures how much d can
+    round; it is −1 when a triangle names a vertex that isn't there.
     """
     known = np.uint64(vertices.shape[0])
-    count = triangles.shape[0]
     rx, ry, rz = reference[0], reference[1], reference[2]
     total = np.zeros(11)
     carry = np.zeros(11)
     w = np.empty((9, BLOCK))
-    for start in range(0, count, BLOCK):
-        size = min(BLOCK, count - start)
+    for start in range(first, last, BLOCK):
+        size = min(BLOCK, last - start)
         for t in range(size):
             for corner in range(3):
                 i = triangles[start + t, corner]
                 if np.uint64(i) >= known:  # negative numbers wrap to large ones
-                    return total[:10], carry[:10], -1.0
-                w[3 * corner, t] = (vertices[i, 0] - rx) * factor
-                w[3 * corner + 1, t] = (vertices[i, 1] - ry) * factor
-                w[3 * corner + 2, t] = (vertices[i, 2] - rz) * factor
+                    total[10] = -1.0
+                    return total, carry
+                w[3 * corner, t] = vertices[i, 0]
+                w[3 * corner + 1, t] = vertices[i, 1]
+                w[3 * corner + 2, t] = vertices[i, 2]
+        _centre(w, size, rx, ry, rz, factor)
         _block_sums(w, size, total, carry)
-    return total[:10], carry[:10], total[10]
+    return total, carry
+
+
+@njit(cache=True, nogil=True)
+def joined_sums(total, carry, more, more_carry):
+    """Add the sums of further triangles to ``total`` and ``carry`` (11,), in place, without error; −1 stays −1."""
+    missing = total[10] < 0.0 or more[10] < 0.0
+    for k in range(11):
+        _accumulate(total, carry, k, more[k])
+        carry[k] += more_carry[k]
+    if missing:
+        total[10] = -1.0
 
 
 @njit(cache=True, nogil=True)

@@ -84,6 +84,11 @@ class Observer:
     def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
         """The body is this one from ``time_ns`` on; called once at the start and again at every change."""
 
+    def mesh_changed(
+        self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str
+    ) -> None:
+        """The body is drawn as this mesh from ``time_ns`` on; before the ``body_changed`` of the same change."""
+
     def state(self, time_ns: int, row: np.ndarray) -> None:
         """One published state; ``row`` (13,) float64 in STATE_FIELDS order is reused by the caller: copy it."""
 

@@ -11,6 +11,7 @@ import heapq
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -52,6 +53,12 @@ class _Acting:
     load_id: int
 
 
+class Follower(Protocol):
+    """Whoever takes the same commands at the same times, such as a ghost."""
+
+    def submit(self, command: Command, when_ns: int) -> None: ...
+
+
 class Simulation:
     """One body under commands.
 
@@ -63,6 +70,8 @@ class Simulation:
         self.setup = setup
         self.observer = observer or Observer()
         self._shows_loads = listens(self.observer, "load_began")
+        self._shows_status = listens(self.observer, "status")
+        self.follower: Follower | None = None
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
@@ -189,6 +198,8 @@ class Simulation:
             pending.load, pending.settled_for = load, (self.setup.body, self.setup.surface)
         # Time, rank, message: arrival decides only between messages that are equal to the byte.
         heapq.heappush(self._pending, (when_ns, command.rank, command.message, self._arrivals, pending))
+        if self.follower is not None:
+            self.follower.submit(command, when_ns)
         return when_ns
 
     def refuse(self, error: CommandRefused) -> None:
@@ -219,7 +230,23 @@ class Simulation:
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
-        self.observer.body_changed(self.time_ns, self._snapshot())
+        self.observer.body_changed(self.time_ns, self.snapshot())
+
+    def tell_status(self, paused: bool = False) -> None:
+        """Tell the observer what the body is doing, where that changed since it was last told."""
+        if not self._shows_status:
+            return
+        motion = "paused" if paused else "sleeping" if self.at_rest else "flying"
+        tracks = {"motion": motion, "method": self.choice}
+        if self.string is not None:
+            slack = not self.string.bilateral and self.string.stretch(self.setup.body, self.state) < 0.0
+            tracks["string"] = "slack" if slack else "taut"
+        elif "string" in self._told:
+            tracks["string"] = "loose"
+        for track, value in tracks.items():
+            if self._told.get(track) != value:
+                self._told[track] = value
+                self.observer.status(self.time_ns, track, value)
 
     def advance(self, until_ns: int) -> State:
         """Carry the body to ``until_ns`` and return its state there, before what acts at that very time.
@@ -396,6 +423,7 @@ class Simulation:
         return loads
 
     def _start_over(self) -> None:
+        self._told: dict[str, str] = {}
         self._pending: list[tuple] = []
         self._held: _Acting | None = None
         self._pulses: list[_Acting] = []
@@ -440,8 +468,10 @@ class Simulation:
             shown = ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
         self.observer.string_changed(self.time_ns, shown)
 
-    def _snapshot(self) -> BodySnapshot:
-        setup, body = self.setup, self.setup.body
+    def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
+        """The body as an observer is told of it; of another setup, when one is given."""
+        setup = setup or self.setup
+        body = setup.body
         return BodySnapshot(
             body.mass,
             body.center_of_mass,

@@ -65,6 +65,7 @@ def _read(path: Path, session: RecordedSession) -> None:
     times, rows = [], []
     events: list[tuple[int, str]] = []
     refusals: list[tuple[int, str]] = []
+    first_mesh: str | None = None
     for entity, _, batch in record_batches(path):
         if entity == e.STATE:
             times.append(_sim_times(batch))
@@ -75,9 +76,11 @@ def _read(path: Path, session: RecordedSession) -> None:
             target.extend(zip(_sim_times(batch).tolist(), texts, strict=True))
         elif entity == e.SCENE:
             session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
-        elif entity == e.BODY_MESH and "Mesh3D:vertex_positions" in batch.schema.names:
+        elif entity.startswith(e.BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
             session.mesh_chunks += 1
-        elif entity == e.SESSION_MESH:
+        elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity < first_mesh):
+            # A run may have had several; it began with the first.
+            first_mesh = entity
             session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
             session.vertices = _flat(batch, "vertices").reshape(-1, 3)
             session.triangles = _flat(batch, "triangles").reshape(-1, 3)

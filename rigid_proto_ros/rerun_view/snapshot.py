@@ -30,6 +30,9 @@ DRAWN_STEADY_S = 10.0
 NOTICE_GONE_S = 6.0
 """After this the viewer's note that it runs without a window has left the corner of the window."""
 
+MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wgpu", "winit")
+"""Parts of the viewer whose warnings are about the machine, such as drawing without a graphics card."""
+
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
 
@@ -123,13 +126,19 @@ def show(client: Any, recording: Path) -> None:
     raise InputError("session", str(recording), f"a recording that the viewer loads within {LOAD_TIMEOUT_S:g} s")
 
 
-def view_errors(client: Any) -> list[str]:
-    """What the views shown at present report as failed."""
-    return [
+def complaints(client: Any) -> list[str]:
+    """What the viewer finds wrong with the recording: reports of the views shown at present, warnings it logged."""
+    reports = [
         f"{view.name}: {report.severity}: {report.summary}"
         for view in client.get_state().views
         for report in view.reports
     ]
+    logged = [
+        entry.message
+        for entry in client.get_logs()
+        if entry.level in ("WARN", "ERROR") and not entry.target.startswith(MACHINE_TARGETS)
+    ]
+    return reports + logged
 
 
 def _view_id(client: Any, name: str) -> str:

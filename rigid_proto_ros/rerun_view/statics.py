@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a stream is sent once, or when the body changes: scene, mesh, styles, layout, shapes of the inertia."""
+"""What a stream is sent once, or when the body changes: scene, mesh, styles, shapes of the inertia."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from ..core.observer import BodySnapshot
 from . import entities as e
 from .columns import one_time
 from .inertia_shapes import PrincipalFrame, bounding_box
-from .layout import layout
 from .load_arrows import PARTS, load_entity
 from .streams import Stream
 from .surface_normals import shaded_surface
@@ -22,6 +21,9 @@ from .surface_normals import shaded_surface
 TRAIL_RADIUS = 0.004
 AXIS_LENGTH = 0.25
 """In body sizes."""
+
+INVISIBLE = 1e-9
+"""A scale that nobody sees; the viewer refuses 0, which has no inverse."""
 
 VIEW_PER_REACH = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
@@ -40,6 +42,10 @@ class Scene:
         self.surface: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         if self.vertices is not None and self.triangles is not None and len(self.triangles):
             self.surface = shaded_surface(self.vertices, self.triangles)
+
+    def with_mesh(self, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> Scene:
+        """Another mesh under the same parameters."""
+        return Scene(self.text, vertices, triangles, mesh_sha256)
 
     def with_text(self, text: str) -> Scene:
         """The same mesh under other parameters."""
@@ -77,7 +83,23 @@ def drawn_mesh(surface: tuple[np.ndarray, np.ndarray, np.ndarray], colour: tuple
     )
 
 
-def send_scene(stream: Stream, scene: Scene) -> None:
+def numbered(entity: str, number: int) -> str:
+    """The entity of the run's mesh with this number. A static mesh can't be replaced, so each has an entity."""
+    return f"{entity}_{number + 1}" if number else entity
+
+
+def mesh_entity(number: int) -> str:
+    """Where the run's mesh with this number is drawn."""
+    return numbered(e.BODY_MESH, number)
+
+
+def hide_mesh(stream: Stream, time_ns: int, wall_ns: int, number: int) -> None:
+    """Draw a mesh no more from ``time_ns`` on: too small to be seen, since a static mesh can't be cleared."""
+    nowhere = rr.Transform3D.columns(translation=[[0.0, 0.0, 0.0]], scale=[[INVISIBLE] * 3])
+    stream.send(mesh_entity(number), one_time(time_ns, wall_ns), nowhere)
+
+
+def send_scene(stream: Stream, scene: Scene, mesh_number: int) -> None:
     """The scene's text and the mesh, once as drawn and once as the numbers themselves.
 
     With the numbers the flight can be computed again from the recording alone.
@@ -85,11 +107,16 @@ def send_scene(stream: Stream, scene: Scene) -> None:
     stream.log_static(e.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     stream.log_static(e.POINSOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     stream.log_static(e.SCENE, rr.TextDocument(scene.text, media_type="text/plain"))
+    send_mesh(stream, scene, mesh_number)
+
+
+def send_mesh(stream: Stream, scene: Scene, number: int) -> None:
+    """The mesh of a run that already had ``number`` others."""
     if scene.surface is None:
         return
-    stream.log_static(e.BODY_MESH, drawn_mesh(scene.surface, (*e.MESH_COLOUR, 255)))
+    stream.log_static(mesh_entity(number), drawn_mesh(scene.surface, (*e.MESH_COLOUR, 255)))
     stream.log_static(
-        e.SESSION_MESH,
+        numbered(e.SESSION_MESH, number),
         rr.AnyValues(
             sha256=scene.mesh_sha256,
             vertices=np.ascontiguousarray(scene.vertices, dtype=np.float64).ravel(),
@@ -98,8 +125,8 @@ def send_scene(stream: Stream, scene: Scene) -> None:
     )
 
 
-def send_styles(stream: Stream, size: float, view_size: float, initial_view: str) -> None:
-    """Colours, names and thicknesses for a body of this size [m], and the layout with its camera."""
+def send_styles(stream: Stream, size: float) -> None:
+    """Colours, names and thicknesses for a body of this size [m]."""
     for entity, series in e.SERIES.items():
         names, colours = zip(*series, strict=True)
         stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
@@ -125,7 +152,6 @@ def send_styles(stream: Stream, size: float, view_size: float, initial_view: str
         e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=e.GREEN, line_radii=0.6 * line, fill_mode=wire)
     )
     _send_poinsot_styles(stream)
-    stream.send_blueprint(layout(view_size, initial_view))
 
 
 def _send_poinsot_styles(stream: Stream) -> None:
@@ -146,11 +172,13 @@ def _arrow_style(stream: Stream, entity: str, colour: tuple[int, ...], radius: f
     stream.log_static(entity, rr.Arrows3D.from_fields(colors=colour, radii=radius, labels=label, show_labels=True))
 
 
-def send_body(stream: Stream, time_ns: int, wall_ns: int, body: BodySnapshot, scene: Scene | None) -> None:
+def send_body(
+    stream: Stream, time_ns: int, wall_ns: int, body: BodySnapshot, scene: Scene | None, mesh_number: int
+) -> None:
     """The body from ``time_ns`` on: where the mesh hangs, its boxes and ellipsoid, its numbers."""
     times = one_time(time_ns, wall_ns)
     mesh_place = rr.Transform3D.columns(translation=[-body.center_of_mass], scale=[body.scale])
-    stream.send(e.BODY_MESH, times, mesh_place)
+    stream.send(mesh_entity(mesh_number), times, mesh_place)
     if scene is not None and scene.surface is not None:
         centre, half = bounding_box(scene.vertices, body.scale, body.center_of_mass)
         stream.send(e.BOUNDING_BOX, times, rr.Boxes3D.columns(centers=[centre], half_sizes=[half]))

@@ -10,7 +10,6 @@ from ..core.observer import ShownString
 from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
-from .lanes import Lanes
 from .mailbox import Block
 
 RATE = 100
@@ -95,8 +94,8 @@ class StringPicture:
         self._strips.extend(_drawn(string, free_end, span, distance))
         self._shown = True
 
-    def send(self, send: Send, lanes: Lanes) -> None:
-        """Send what was collected, and say when the string went taut or slack."""
+    def send(self, send: Send) -> None:
+        """Send what was collected."""
         if not self._times:
             return
         times_ns, walls = np.concatenate(self._times), np.concatenate(self._walls)
@@ -108,8 +107,6 @@ class StringPicture:
         hands = np.concatenate(self._hands) if self._hands else np.empty((0, 3))
         send(e.HAND, times, rr.Points3D.columns(positions=hands).partition(counts))
         send(e.STRING_TENSION, times, scalar_columns(tensions[:, np.newaxis]))
-        for time_ns, wall_ns, count, tension in zip(times_ns, walls, counts, tensions, strict=True):
-            lanes.change(int(time_ns), int(wall_ns), "string", ("taut" if tension else "slack") if count else "none")
         self._reset()
 
 

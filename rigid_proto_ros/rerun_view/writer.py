@@ -17,11 +17,12 @@ from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .lanes import Lanes
+from .layout import layout
 from .load_arrows import LoadArrows
 from .mailbox import Block, Mark
 from .plots import Plots
 from .poinsot_picture import PoinsotPicture
-from .statics import TRAIL_RADIUS, Scene, drawn_mesh, send_body, send_scene, send_styles
+from .statics import TRAIL_RADIUS, Scene, drawn_mesh, hide_mesh, send_body, send_mesh, send_scene, send_styles
 from .streams import Stream
 from .string_picture import StringPicture
 from .trail import Trail
@@ -61,6 +62,8 @@ class SceneWriter:
             self._scene = self._scene.with_text(self._scene_in_force)
         self.moved = False
         self._last_time_ns = 0
+        self._mesh_number = 0
+        self._began_wall_ns = time.time_ns()
         self._ticks = Ticks(PICTURE_RATE)
         self._trail = Trail()
         self._plots = Plots()
@@ -79,12 +82,12 @@ class SceneWriter:
         """Send a stream what holds at all times, and the body as it is now; then it gets whatever follows."""
         self.streams.append(stream)
         if self._scene is not None:
-            send_scene(stream, self._scene)
+            send_scene(stream, self._scene, self._mesh_number)
         if self._body is None:
             return
         now, wall = self._last_time_ns, time.time_ns()
-        send_styles(stream, self._size, self._view_size, self._initial_view)
-        send_body(stream, now, wall, self._body, self._scene)
+        self._send_styles(stream)
+        send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
             self._send_ghost_mesh(stream)
@@ -133,7 +136,7 @@ class SceneWriter:
     def _send_upto(self, block: Block, begin: int, end: int) -> None:
         self._write_rows(block, begin, end)
         self._loads.send(self._send)
-        self._string.send(self._send, self._lanes)
+        self._string.send(self._send)
         self._words.send(self._send)
         self._lanes.send(self._send)
 
@@ -180,8 +183,16 @@ class SceneWriter:
     def _started(self, mark: Mark) -> None:
         self._scene = Scene(*mark.content)
         for stream in self.streams:
-            send_scene(stream, self._scene)
+            send_scene(stream, self._scene, self._mesh_number)
         self._tell_body()
+
+    def _mesh_changed(self, mark: Mark) -> None:
+        self._scene = (self._scene or Scene("", None, None, "")).with_mesh(*mark.content)
+        before, self._mesh_number = self._mesh_number, self._mesh_number + 1
+        for stream in self.streams:
+            hide_mesh(stream, mark.time_ns, mark.wall_ns, before)
+            hide_mesh(stream, 0, self._began_wall_ns, self._mesh_number)
+            send_mesh(stream, self._scene, self._mesh_number)
 
     def _body_changed(self, mark: Mark) -> None:
         before = self._size if self._body is not None else None
@@ -189,8 +200,8 @@ class SceneWriter:
         self._tell_body()
         for stream in self.streams:
             if self._size != before:
-                send_styles(stream, self._size, self._view_size, self._initial_view)
-            send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene)
+                self._send_styles(stream)
+            send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
         if before is None:
@@ -211,7 +222,13 @@ class SceneWriter:
         (self._ghost_body,) = mark.content
         for stream in self.streams if first else ():
             self._send_ghost_mesh(stream)
+            if self._body is not None:
+                self._send_styles(stream)
         self._ghost.change(mark.time_ns, mark.wall_ns, self._ghost_body, self._send)
+
+    def _send_styles(self, stream: Stream) -> None:
+        send_styles(stream, self._size)
+        stream.send_blueprint(layout(self._view_size, self._initial_view, self._ghost_body is not None))
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None:
@@ -311,6 +328,7 @@ _ALONG_WITH_ROWS = {
 }
 _BETWEEN_ROWS = {
     "started": SceneWriter._started,
+    "mesh_changed": SceneWriter._mesh_changed,
     "body_changed": SceneWriter._body_changed,
     "ghost_began": SceneWriter._ghost_began,
 }

@@ -102,8 +102,9 @@ class CommandIntake:
         )
         self._lively_until_ns = [0] * len(self._sources)
 
-    def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None]) -> None:
-        """Submit everything that has arrived; what is refused is counted and told, and the rest goes on.
+    def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None]) -> bool:
+        """Submit everything that has arrived; what is refused is counted and told, and the rest goes on. Returns whether
+        something has arrived within the last LIVELY_NS.
 
         catch_up() is called before the first message of a tick, so that now is the tick's own time. Topics that carried something lately are looked at in every tick, quiet ones every QUIET_NS.
         """
@@ -133,6 +134,7 @@ class CommandIntake:
                     except CommandRefused as refusal:
                         simulation.refuse(refusal)
                         self._on_refusal(refusal)
+        return wall_ns < max(self._lively_until_ns)
 
     def _count_gap(self, subscription, number: int | None) -> None:
         """Messages that a publisher sent and we never saw. Numbers are each publisher's own, so with several of them

@@ -14,10 +14,14 @@ from dataclasses import dataclass
 from ..core.observer import Observer
 from ..core.simulation import Simulation
 from ..core.state import State
+from ..ghost import Ghost, ghost_of
 from ..scenario import Scenario, publication_ns
 
 DRAIN_NS = 10_000_000
 """Commands are taken at least this often [ns of wall time]."""
+
+LIVELY_DRAIN_NS = 500_000
+"""At most this often while commands come in [ns of wall time]."""
 
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
@@ -39,7 +43,8 @@ class Timekeeping:
 
 
 class Flight:
-    """publish(state) is called for every publication; take_commands(wall_ns) at every tick, to submit what has arrived.
+    """publish(state) is called for every publication; take_commands(wall_ns) at every tick, to
+    submit what has arrived; it says whether commands come in these seconds.
 
     anybody_listens() says whether publications reach anybody; while they don't, none is made and the body crosses the
     time between two looks at the commands at once.
@@ -52,10 +57,11 @@ class Flight:
         scenario: Scenario,
         observer: Observer,
         publish: Callable[[State], None],
-        take_commands: Callable[[int], None],
+        take_commands: Callable[[int], bool],
         on_failure: Callable[[str], None],
         followed_clock: Callable[[], int] | None = None,
         anybody_listens: Callable[[], bool] = lambda: True,
+        is_viewed: bool = False,
     ) -> None:
         self.scenario = scenario
         self.observer = observer
@@ -67,6 +73,9 @@ class Flight:
         self._followed_clock = followed_clock
         self._anybody_listens = anybody_listens
         self._listeners = True
+        self._is_viewed = is_viewed
+        self._ghost: Ghost | None = None
+        self._lively = False
         self._publication = 0
         self._present_ns = 0
         self._anchor()
@@ -78,6 +87,10 @@ class Flight:
         rate_changed = scenario.values["publish_rate"] != self.scenario.values["publish_rate"]
         pace_changed = scenario.values["real_time_factor"] != self.scenario.values["real_time_factor"]
         self.scenario = scenario
+        if self._ghost is not None:
+            self._ghost.change(self.simulation.time_ns, scenario)
+        elif self._is_viewed and scenario.ghost is not None:
+            self._ghost = ghost_of(scenario, self.simulation, self.observer)
         if rate_changed:
             self._find_next_publication()
         if pace_changed:
@@ -88,6 +101,7 @@ class Flight:
         if paused != self.timekeeping.paused:
             self.timekeeping.paused = paused
             self.simulation.log("pause", {"data": paused})
+            self.simulation.tell_status(paused)
             self._anchor()
 
     def catch_up(self) -> None:
@@ -107,6 +121,8 @@ class Flight:
         """Time 0 and the initial state; paused or running stays."""
         # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
         self.simulation.reset(self.scenario.setup)
+        if self._ghost is not None:
+            self._ghost.reset(self.scenario)
         self._publication = 0
         self._anchor()
 
@@ -114,6 +130,8 @@ class Flight:
 
     def start(self) -> None:
         """Simulated time begins now."""
+        if self._is_viewed:
+            self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
         self._anchor()
 
     def tick(self) -> None:
@@ -148,7 +166,7 @@ class Flight:
                 self.timekeeping.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
-        self._take_commands(wall_ns)
+        self._lively = self._take_commands(wall_ns)
         if not self._listeners:
             self.catch_up()
 
@@ -176,6 +194,9 @@ class Flight:
             return False
         self._publication += 1
         self.observer.state(state.time_ns, state.row)
+        self.simulation.tell_status()
+        if self._ghost is not None:
+            self._ghost.advance(state.time_ns)
         self._publish(state)
         return True
 
@@ -239,5 +260,9 @@ class Flight:
             return 0
         if not self._listeners:
             return latest_ns
+        if self._lively:
+            # Twice a period: a command then shows in a state after one period on average, instead of one and a half.
+            half_ns = int(5e8 / (self.scenario.values["publish_rate"] * self._factor))
+            latest_ns = self._last_drain_ns + min(max(half_ns, LIVELY_DRAIN_NS), DRAIN_NS)
         ahead_ns = self._publication_ns() - self._anchor_simulated_ns
         return min(latest_ns, self._anchor_wall_ns + int(ahead_ns / self._factor) + 1)

@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+from dataclasses import replace
 
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
@@ -141,16 +142,30 @@ def _asked_for(values, port: str) -> int | None:
 
 
 def _warm_up(node) -> None:
-    """Compile, or load from the cache, what the first wrench would otherwise wait for."""
-    from ..core.commands import WrenchCommand
+    """Compile, or load from the cache, what the first command of each kind would otherwise wait for."""
+    from ..core.commands import MoveString, WrenchCommand
+    from ..core.errors import CommandRefused
     from ..core.frames import parse_frame
     from ..core.simulation import Simulation
 
-    trial = Simulation(node.flight.scenario.setup)
-    for frame in ("world@point/0,0,0;duration=0.001", "body@point/0,0,0;impulse"):
-        zero = (0.0, 0.0, 0.0)
-        trial.submit(WrenchCommand(False, parse_frame(frame), zero, zero, 0, frame, b""))
-    state = trial.advance(2 * node.flight.scenario.setup.step_ns + 1)
+    setup = node.flight.scenario.setup
+    force, none = (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0)
+    spinning = setup.initial.copy()
+    spinning[10:13] += (0.1, 0.2, 0.3)
+
+    def wrench(frame: str) -> WrenchCommand:
+        return WrenchCommand(False, parse_frame(frame), force, none, 0, frame, b"")
+
+    commands = [wrench(f) for f in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")]
+    commands.append(MoveString(tuple(setup.initial[:3].tolist())))
+    for command in commands:
+        trial = Simulation(replace(setup, initial=spinning))
+        try:
+            trial.submit(command)
+        except CommandRefused:
+            continue  # an integrator that can't carry it will refuse it in flight too
+        for until_ns in (1_000_000, 2_000_001):
+            state = trial.advance(until_ns)
     node.states.pack_all(state)
 
 

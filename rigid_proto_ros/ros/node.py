@@ -64,6 +64,7 @@ class RigidBodyNode(Node):
             self._motion_failed,
             self._followed_clock(scenario),
             self._anybody_listens,
+            self._is_viewed,
         )
         self.intake = CommandIntake(
             self,
@@ -105,8 +106,8 @@ class RigidBodyNode(Node):
     def _anybody_listens(self) -> bool:
         return self.states.look_for_subscribers() or self._is_viewed
 
-    def _take_commands(self, wall_ns: int) -> None:
-        self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
+    def _take_commands(self, wall_ns: int) -> bool:
+        return self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
 
     def _command_refused(self, refusal: CommandRefused) -> None:
         self.get_logger().warning(f"refused: {refusal}", throttle_duration_sec=1.0)

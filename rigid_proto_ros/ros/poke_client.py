@@ -11,6 +11,7 @@ Exit status: 0 all sent, 1 something came late or was refused, 2 the input was r
 from __future__ import annotations
 
 import argparse
+import re
 import signal
 import sys
 
@@ -47,6 +48,8 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         description="Send a poke script, or one command, to a running rigid_body node.",
         usage="poke_client (SCRIPT.yaml | poke ... | wrench ...) [--reset] [--lead S] [--node NAME]",
     )
+    # argparse takes -2e-4 for an option: it knows no exponents.
+    parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
     parser.error = lambda message: parser.exit(2, f"poke_client: {message} (see poke_client --help)\n")
     parser.add_argument("what", metavar="SCRIPT.yaml | poke | wrench", help="a script, or one command from the line")
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")

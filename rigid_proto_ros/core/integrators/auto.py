@@ -47,9 +47,9 @@ from .exponential import exponential
 from .free_body import free_body_steps
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
-from .series_steps import series_advance, series_look
+from .series_steps import series_steps
 from .stepping import AdaptiveSteps, FixedSteps, OneStep, Stepper
-from .taylor_adaptive import degree_for, taylor_advance, taylor_look
+from .taylor_adaptive import degree_for, taylor_adaptive_steps
 
 FASTEST_STRING = 1e6
 """rad/s; above it resolving the string's swing would take millions of steps a second."""
@@ -95,14 +95,14 @@ def _choose(integrator: Integrator, p: np.ndarray, y: np.ndarray, step_ns: int, 
         if not p[TRANSLATES]:
             return OneStep("auto: free_body, one exact step without torque", free_body_steps, 1)
     if p[HAS_WORLD_TORQUE]:
-        return _series("loads that depend on the attitude", accuracy, series_advance, series_look)
-    return _series("the loads turn with the body", accuracy, taylor_advance, taylor_look)
+        return _series("loads that depend on the attitude", accuracy, series_steps)
+    return _series("the loads turn with the body", accuracy, taylor_adaptive_steps)
 
 
-def _series(why: str, accuracy: float, advance, look) -> Stepper:
+def _series(why: str, accuracy: float, kernel) -> Stepper:
     degree = degree_for(accuracy)
     control = ctl.new_control(accuracy, degree)
-    return AdaptiveSteps(f"auto: taylor of degree {degree}, {why}", control, advance, look, 1)
+    return AdaptiveSteps(f"auto: taylor of degree {degree}, {why}", control, kernel, 1)
 
 
 def _choose_for_string(p, y, turns: bool, step_ns: int, accuracy: float) -> Stepper:
@@ -119,7 +119,7 @@ def _choose_for_string(p, y, turns: bool, step_ns: int, accuracy: float) -> Step
         stepper.choice = f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
         stepper.floor_binds = True
         return stepper
-    return _series(f"a string of up to {fastest:.3g} rad/s", accuracy, series_advance, series_look)
+    return _series(f"a string of up to {fastest:.3g} rad/s", accuracy, series_steps)
 
 
 AUTO = Integrator(

@@ -147,14 +147,24 @@ def _move(c, p, degree, h, slack, out):
 
 
 @njit(cache=True, error_model="numpy")
-def series_advance(y, p, control, following, span_ns):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays."""
+def series_steps(y, p, control, following, span_ns, look):
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays.
+
+    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
+    """
     c = np.zeros((int(control[ctl.DEGREE]) + 2, COLUMNS))
     advanced = 0
     while True:
-        if control[ctl.ACCEPTED_NS] == 0.0:
-            length = _walk(y, p, control, int(ctl.LONGEST * 1e9), False, c, following)
-            if length < 1 or not is_good(following):
+        if look or control[ctl.ACCEPTED_NS] == 0.0:
+            spent = control[ctl.PENDING]
+            out = np.zeros(15) if look else following
+            length = _walk(y, p, control, span_ns if look else int(ctl.LONGEST * 1e9), look, c, out)
+            good = length >= 1 and is_good(out)
+            if look:
+                control[ctl.PENDING] = spent
+                y[:] = out
+                return length if good else 0
+            if not good:
                 control[ctl.FAILED] = 1.0
                 return advanced
             control[ctl.ACCEPTED_NS] = length
@@ -164,14 +174,3 @@ def series_advance(y, p, control, following, span_ns):
         y[:] = following
         advanced += length
         ctl.commit(control)
-
-
-@njit(cache=True, error_model="numpy")
-def series_look(y, p, control, span_ns):
-    """The one step to span_ns, shorter than the one that is accepted, in y; returns whether it was good."""
-    c, out = np.zeros((int(control[ctl.DEGREE]) + 2, COLUMNS)), np.zeros(15)
-    spent = control[ctl.PENDING]
-    length = _walk(y, p, control, span_ns, True, c, out)
-    control[ctl.PENDING] = spent
-    y[:] = out
-    return length == span_ns and is_good(y)

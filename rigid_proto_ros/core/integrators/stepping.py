@@ -100,19 +100,18 @@ class OneStep:
 
 
 class AdaptiveSteps:
-    """Steps as long as the error allows. kernel(y, p, control, following, span_ns) commits them; look(y, p, control, span_ns)
-    takes one of a given length.
+    """Steps as long as the error allows. kernel(y, p, control, following, span_ns, look) commits them, or looks; control:
+    integrators/control.py. evaluations: series or right-hand sides that the step which ends a segment takes.
     """
 
     sleeping = False
 
-    def __init__(self, choice: str, control: np.ndarray, kernel, look, cost_of_look: int):
+    def __init__(self, choice: str, control: np.ndarray, kernel, evaluations: int):
         self.choice = choice
         self._control = control
         self._following = np.zeros(VARIABLES)
         self._kernel = kernel
-        self._look = look
-        self._cost = cost_of_look
+        self._cost = evaluations
         self._cuts = 0
 
     @property
@@ -128,11 +127,11 @@ class AdaptiveSteps:
         return int(self._control[ctl.EVALUATIONS] + self._control[ctl.PENDING]) + self._cuts * self._cost
 
     def advance(self, y: np.ndarray, p: np.ndarray, span_ns: int) -> tuple[int, bool]:
-        advanced_ns = self._kernel(y, p, self._control, self._following, span_ns)
+        advanced_ns = self._kernel(y, p, self._control, self._following, span_ns, False)
         return int(advanced_ns), not self._control[ctl.FAILED]
 
     def look(self, y: np.ndarray, p: np.ndarray, rest_ns: int) -> bool:
-        return bool(self._look(y, p, self._control, rest_ns))
+        return self._kernel(y, p, self._control, self._following, rest_ns, True) == rest_ns
 
     def cut(self) -> None:
         self._cuts += 1

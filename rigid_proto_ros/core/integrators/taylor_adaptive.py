@@ -56,22 +56,29 @@ def step_length(growth, accuracy, degree, part):
 
 
 @njit(cache=True, error_model="numpy")
-def taylor_advance(y, p, control, following, span_ns):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays."""
+def taylor_adaptive_steps(y, p, control, following, span_ns, look):
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays.
+
+    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
+    """
     degree = int(control[ctl.DEGREE])
     c = np.zeros((ROWS, degree + 1))
     advanced = 0
     while True:
-        if control[ctl.ACCEPTED_NS] == 0.0:
+        if look or control[ctl.ACCEPTED_NS] == 0.0:
             series(y, p, degree, c)
+        if look:
+            sum_series(c, p, degree, span_ns * 1e-9, y)
+            return span_ns if is_good(y) else 0
+        if control[ctl.ACCEPTED_NS] == 0.0:
             growth = _growth(c, degree, scales(y, p, control[ctl.ELAPSED_NS] * 1e-9))
             length_ns = math.floor(step_length(growth, control[ctl.ACCURACY], degree, PART) * 1e9)
-            if not length_ns >= 1.0:
-                control[ctl.FAILED] = 1.0
-                return advanced
-            following[:] = y
-            sum_series(c, p, degree, length_ns * 1e-9, following)
-            if not is_good(following):
+            good = length_ns >= 1.0
+            if good:
+                following[:] = y
+                sum_series(c, p, degree, length_ns * 1e-9, following)
+                good = is_good(following)
+            if not good:
                 control[ctl.FAILED] = 1.0
                 return advanced
             control[ctl.ACCEPTED_NS] = length_ns
@@ -84,13 +91,3 @@ def taylor_advance(y, p, control, following, span_ns):
         y[:] = following
         advanced += length
         ctl.commit(control)
-
-
-@njit(cache=True, error_model="numpy")
-def taylor_look(y, p, control, span_ns):
-    """One step of span_ns in y; returns whether it was good."""
-    degree = int(control[ctl.DEGREE])
-    c = np.zeros((ROWS, degree + 1))
-    series(y, p, degree, c)
-    sum_series(c, p, degree, span_ns * 1e-9, y)
-    return is_good(y)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""The ghost: a second body that gets the same commands under another tensor or integrator, to be seen beside the first.
+
+True against box, exact against rk4: where the two part is the lesson. It never acts back, and a run without a viewer
+doesn't carry it.
+"""
+
+from __future__ import annotations
+
+from .core.commands import Change, Command
+from .core.errors import InputError
+from .core.observer import Observer
+from .core.simulation import Simulation
+from .scenario import Scenario
+
+
+class Ghost:
+    """The simulation of ``scenario.ghost``; follows another one's commands (Simulation.follower)."""
+
+    def __init__(self, scenario: Scenario, observer: Observer) -> None:
+        self.simulation = Simulation(scenario.ghost)
+        self._observer = observer
+        self._shown = True
+
+    def announce(self) -> None:
+        """Tell the observer what the ghost is."""
+        self._observer.ghost_began(self.simulation.time_ns, self.simulation.snapshot())
+
+    def submit(self, command: Command, when_ns: int) -> None:
+        """Take a command of the followed simulation; what the ghost can't carry passes it by."""
+        if isinstance(command, Change):
+            return  # ``change`` brings its own setup
+        try:
+            self.simulation.submit(command, when_ns)
+        except InputError:
+            pass
+
+    def change(self, time_ns: int, scenario: Scenario) -> None:
+        """The followed scenario changed at ``time_ns``; one without a ghost leaves this one out of sight."""
+        setup = scenario.ghost
+        self._shown = setup is not None
+        if setup is not None:
+            self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns))
+            self._observer.ghost_began(time_ns, self.simulation.snapshot(setup))
+
+    def reset(self, scenario: Scenario) -> None:
+        """Time 0 and the initial state."""
+        self.simulation.reset(scenario.ghost)
+        self.announce()
+
+    def advance(self, until_ns: int) -> None:
+        """Carry the ghost along and tell the observer where it is."""
+        state = self.simulation.advance(until_ns)
+        if self._shown and not self.simulation.failure:
+            self._observer.ghost_state(until_ns, state.row)
+
+
+def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | None) -> Ghost | None:
+    """The ghost that a scenario asks for, following the simulation; None when nobody would see it."""
+    if scenario.ghost is None or observer is None:
+        return None
+    ghost = Ghost(scenario, observer)
+    simulation.follower = ghost
+    ghost.announce()
+    return ghost

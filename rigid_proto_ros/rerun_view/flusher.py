@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: MIT
+"""The one thread that turns what the mailbox holds into files and live streams, every half second.
+
+A reset starts simulated time again at 0, and rows of two runs on one timeline could not be told apart, so every run is
+a recording of its own; see observer.py for what users see of that.
+"""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import Callable
+from typing import Any
+
+from ..core.errors import InputError
+from .mailbox import BLOCK_ROWS, Block, Mailbox, Mark
+from .streams import FileStream, LiveServer, LiveStream
+from .writer import SceneWriter
+
+FLUSH_PERIOD_S = 0.5
+"""What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead."""
+
+TIMEOUT_S = 10.0
+"""A disk that doesn't take what waits in this time is given up."""
+
+
+class Flusher:
+    """Owns the writer and its streams. ``mailbox`` and ``ghosts`` take rows and marks from the stepping thread.
+
+    file is what is being recorded to; error says why a recording stopped, and on_error is called with the same.
+    """
+
+    def __init__(self, name: str, initial_view: str, on_error: Callable[[str], None]) -> None:
+        self.mailbox = Mailbox()
+        self.ghosts = Mailbox()
+        self.file: FileStream | None = None
+        self.server: LiveServer | None = None
+        self.run_id = uuid.uuid4().hex
+        self.error = ""
+        self._name = name
+        self._run = 1
+        self._on_error = on_error
+        self._writer = SceneWriter(initial_view)
+        self._ghost_block: Block | None = None
+        self._ghost_sent = 0
+        self._passed: list[threading.Event] = []
+        self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
+        self._thread.start()
+
+    # Called from other threads
+
+    @property
+    def run_name(self) -> str:
+        """The name of the present run's recording."""
+        return self._name if self._run == 1 else f"{self._name}, run {self._run}"
+
+    def open_file(self, path: Any) -> None:
+        """Record to ``path`` from now on; raises InputError where that can't be written."""
+        self.close_file()
+        file = FileStream(path, self.run_id, self.run_name)
+        self.error = ""
+        self.file = file
+        self.mailbox.mark(-1, "record", file, threading.Event())
+
+    def close_file(self) -> None:
+        """Finish the file, if there is one; returns when it is whole."""
+        if self.file is not None:
+            self.file = None
+            self._wait_for("record")
+
+    def serve(self, port: int, memory_limit: str) -> str:
+        """Host the live stream; returns its address."""
+        self.server = LiveServer(port, memory_limit)
+        self.mailbox.mark(-1, "live", self.server.open_run(self.run_id, self.run_name))
+        return self.server.address
+
+    def flush_now(self) -> None:
+        """Return when everything so far was handed to the file and the viewers."""
+        self._wait_for("pass")
+
+    def close(self) -> None:
+        """Send the rest, finish the file, end the thread."""
+        self.mailbox.close()
+        self.ghosts.close()
+        self._thread.join(TIMEOUT_S)
+        if self._thread.is_alive():
+            self._lost("recording stopped: the disk did not take the last states")
+
+    def _wait_for(self, kind: str) -> None:
+        done = threading.Event()
+        self.mailbox.mark(-1, kind, None, done)
+        self.mailbox.wake()
+        done.wait(TIMEOUT_S)
+
+    # The thread
+
+    def _flush_until_closed(self) -> None:
+        while True:
+            closing = self.mailbox.closed
+            try:
+                self._flush()
+            except Exception as error:  # noqa: BLE001
+                # Whatever goes wrong here must not reach the flight: go on without a recording.
+                self._finish_file()
+                self._writer.streams.clear()
+                self._lost(f"recording stopped: {type(error).__name__}: {error}")
+            if closing:
+                break
+            self.mailbox.wait(FLUSH_PERIOD_S)
+        self._finish_file()
+        if self.server is not None:
+            for stream in self._writer.streams:
+                self.server.end_run(stream)
+            self.server.close()
+
+    def _flush(self) -> None:
+        """Send the full blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
+        full = True
+        while full:
+            block, waiting = self.mailbox.take()
+            if block is None:
+                break
+            full = block.count == BLOCK_ROWS
+            self._writer.write(block, self._on_mark, skip_live=waiting > 1)
+            self.mailbox.give_back(block)
+        self._flush_ghost()
+        for stream in list(self._writer.streams):
+            try:
+                stream.flush()
+            except OSError as error:
+                self._give_up_file(error)
+        while self._passed:
+            self._passed.pop().set()
+
+    def _flush_ghost(self, upto_reset: bool = False) -> None:
+        """Send the ghost's states that wait, or those of the run that ends."""
+        while True:
+            if self._ghost_block is None:
+                self._ghost_block, _ = self.ghosts.take()
+                self._ghost_sent = 0
+            block = self._ghost_block
+            if block is None:
+                return
+            reset = block.marks[0] if block.marks else None
+            end = reset.after_rows if reset else block.count
+            self._writer.write_ghost(block, self._ghost_sent, end)
+            self._ghost_sent = end
+            if reset is not None:
+                if not upto_reset:
+                    # The body's own reset hasn't come yet: what follows belongs to the next run.
+                    return
+                block.marks.pop(0)
+                return
+            self._ghost_block = None
+            self.ghosts.give_back(block)
+
+    def _on_mark(self, mark: Mark) -> None:
+        if mark.kind == "reset":
+            self._flush_ghost(upto_reset=True)
+            self._next_run()
+        elif mark.kind == "record":
+            file, finished = mark.content
+            self._finish_file()
+            if file is not None:
+                self._writer.attach(file)
+            finished.set()
+        elif mark.kind == "pass":
+            self._passed.append(mark.content[1])
+        elif mark.kind == "live":
+            self._writer.attach(*mark.content)
+
+    def _next_run(self) -> None:
+        writer = self._writer
+        moved = writer.moved
+        streams = list(writer.streams)
+        if moved:
+            self._run += 1
+        self.run_id = uuid.uuid4().hex
+        writer.streams.clear()
+        writer.restart()
+        for stream in streams:
+            if isinstance(stream, LiveStream):
+                live = self.server.open_run(self.run_id, self.run_name)
+                self.server.end_run(stream)
+                writer.attach(live)
+            else:
+                try:
+                    stream.close()
+                    if moved:
+                        kept = f"{stream.path.stem}.run{self._run - 1}{stream.path.suffix}"
+                        stream.path.rename(stream.path.with_name(kept))
+                    file = FileStream(stream.path, self.run_id, self.run_name)
+                except (OSError, InputError) as error:
+                    self._lost(str(error))
+                    continue
+                if self.file is stream:
+                    self.file = file
+                writer.attach(file)
+
+    def _finish_file(self) -> None:
+        for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
+            self._writer.streams.remove(stream)
+            try:
+                stream.close()
+            except OSError as error:
+                self._lost(str(error))
+
+    def _give_up_file(self, error: OSError) -> None:
+        for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
+            self._writer.streams.remove(stream)
+            stream.abandon()
+        self._lost(f"recording stopped: {error}")
+
+    def _lost(self, message: str) -> None:
+        self.file = None
+        self.error = message
+        self._on_error(message)

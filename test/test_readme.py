@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: MIT
+"""The documents keep their word: commands run, links lead somewhere, tables are the code's, examples are accepted."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+import rigid_proto_ros
+from rigid_proto_ros import docs_tables
+from rigid_proto_ros.bundled import example_names, example_path, scene_names
+from rigid_proto_ros.cli.main import main as rigid_proto
+from rigid_proto_ros.offline import OfflineRun, read_scene
+from rigid_proto_ros.poke_script import parse_script, read_script
+from rigid_proto_ros.ros.poke_client import main as poke_client
+from rigid_proto_ros.scenario import nanoseconds
+
+SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
+README = SOURCE / "README.md"
+pytestmark = pytest.mark.skipif(not README.is_file(), reason="not run from a source tree")
+
+DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if README.is_file() else []
+OWN = ("rigid_proto", "poke_client")
+# Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
+NOT_RUN = {"sudo", "source", "cd", "rosdep", "colcon", "pip", "git", "ros2", "python", "rerun", "rigid_body_node"}
+STAYS_UP = ("rigid_proto up",)
+
+
+def blocks(path: Path, *languages: str) -> list[str]:
+    """Fenced blocks of a document in one of the languages, without the indentation of a list."""
+    found = re.findall(r"^( *)```(\w+)\n(.*?)^\1```", path.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    return [
+        "\n".join(line.removeprefix(indent) for line in text.splitlines())
+        for indent, language, text in found
+        if language in languages
+    ]
+
+
+def commands() -> Iterator[str]:
+    """Every command line in a shell block of the documents, and in the head of the examples."""
+    for path in DOCUMENTS:
+        for block in blocks(path, "sh", "bash", "console"):
+            for line in block.splitlines():
+                if line.strip() and not line.startswith("#"):
+                    yield line.strip()
+    for name in example_names():
+        for line in example_path(name).read_text("utf-8").splitlines():
+            if re.match(r"#   \S", line):
+                yield line[1:].strip()
+
+
+COMMANDS = sorted(set(commands())) if DOCUMENTS else []
+
+
+def words(command: str) -> list[str]:
+    """A command's words, a comment at its end left out."""
+    return shlex.split(command, comments=True)
+
+
+def of(*programs: str) -> list[str]:
+    return [c for c in COMMANDS if words(c)[0].removeprefix(".venv/bin/") in programs]
+
+
+@pytest.fixture
+def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with the scenes and examples beside it, as commands from the repository's root expect."""
+    for name in ("config", "msg_examples"):
+        (tmp_path / name).symlink_to(SOURCE / name)
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_every_command_is_of_a_kind_that_some_test_looks_at() -> None:
+    assert len(COMMANDS) > 20
+    for command in COMMANDS:
+        assert words(command)[0].removeprefix(".venv/bin/") in {*OWN, *NOT_RUN, "make"}, command
+
+
+@pytest.mark.parametrize("command", of("make"))
+def test_make_target_exists(command: str) -> None:
+    target = next(word for word in words(command)[1:] if "=" not in word)
+    makefile = (SOURCE / "Makefile").read_text("utf-8")
+    assert re.search(rf"^{re.escape(target)}:", makefile, re.MULTILINE), command
+
+
+@pytest.mark.slow
+def test_rigid_proto_commands_run(in_a_copy: Path, capsys: pytest.CaptureFixture) -> None:
+    pytest.importorskip("rerun")
+    # In the order of the page: a later one uses the recording of an earlier one.
+    run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
+    for command in dict.fromkeys(run):
+        if command.startswith(STAYS_UP) or " demo" in command:
+            continue
+        if words(command)[1] == "snapshot" and not os.path.isdir("/usr/share/vulkan/icd.d"):
+            continue  # the snapshot's own test says what is missing
+        assert rigid_proto(words(command)[1:]) == 0, (command, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("command", of("poke_client"))
+def test_poke_client_command_is_read_and_planned(command: str, in_a_copy: Path, capsys: pytest.CaptureFixture) -> None:
+    arguments = words(command)[1:]
+    if arguments == ["--help"]:
+        return
+    assert poke_client([*arguments, "--dry-run"] if "--dry-run" not in arguments else arguments) == 0, command
+    assert capsys.readouterr().out
+
+
+def published() -> list[tuple[str, str, str, str]]:
+    """(command, topic, type, message text) of each ``ros2 topic pub``."""
+    found = []
+    for command in of("ros2"):
+        line = command
+        cat = re.search(r'"\$\(cat (\S+)\)"', line)
+        if cat:
+            line = line.replace(cat[0], shlex.quote((SOURCE / cat[1]).read_text("utf-8")))
+        parts = shlex.split(line)
+        if parts[1:3] != ["topic", "pub"]:
+            continue
+        arguments = parts[3:]
+        while arguments[0].startswith("--"):
+            arguments = arguments[1:] if arguments[0] == "--once" else arguments[2:]
+        found.append((command, *arguments[:3]))
+    return found
+
+
+def fill(message, values: dict) -> None:
+    """Set a message's fields from a mapping as ``ros2 topic pub`` does, refusing names and types that don't fit."""
+    for name, value in values.items():
+        field = getattr(message, name)
+        if isinstance(value, dict):
+            fill(field, value)
+        else:
+            setattr(message, name, type(field)(value))
+
+
+@pytest.mark.parametrize("command, topic, type, text", published())
+def test_message_to_publish_is_accepted_and_moves_the_t_handle(command: str, topic: str, type: str, text: str) -> None:
+    messages = pytest.importorskip("geometry_msgs.msg")
+    package, kind, name = type.split("/")
+    assert (package, kind) == ("geometry_msgs", "msg")
+    message = getattr(messages, name)()
+    fill(message, yaml.safe_load(text))
+    resting = {"initial.angular_velocity": [0.0, 0.0, 0.0]}
+    run = OfflineRun(read_scene("t_handle", resting))
+    _submit(run, topic.removeprefix("/rigid_body/"), message)
+    run.advance(nanoseconds(0.5))
+    assert not run.simulation.refused, command
+    state = run.simulation.state
+    size = max(abs(state.linear_velocity).max(), abs(state.angular_velocity).max())
+    # To be seen, and not to be thrown out of sight.
+    assert 0.01 < size < 10.0, command
+
+
+def _submit(run: OfflineRun, topic: str, message) -> None:
+    from rigid_proto_ros.core.commands import WrenchCommand
+    from rigid_proto_ros.core.frames import parse_frame
+    from rigid_proto_ros.poke_script import string_target
+
+    simulation, frame_id = run.simulation, message.header.frame_id
+    if topic == "string/target":
+        point = message.point
+        simulation.submit(string_target(0, frame_id, (point.x, point.y, point.z)))
+        return
+    frame = parse_frame(frame_id, set(simulation.setup.contacts))
+    force, torque = ((v.x, v.y, v.z) for v in (message.wrench.force, message.wrench.torque))
+    simulation.submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id, b""))
+
+
+@pytest.mark.slow
+def test_three_things_to_try_reach_a_running_node(ros_environment: dict[str, str]) -> None:
+    pytest.importorskip("rclpy")
+    text = README.read_text("utf-8")
+    section = text[text.index("### Three things to try") : text.index("### Frames and units")]
+    lines = [line.strip() for line in section.splitlines() if line.strip().startswith("poke_client")]
+    assert len(lines) == 3
+    scene = ["--ros-args", "--params-file", "config/t_handle.yaml"]
+    node = subprocess.Popen([sys.executable, "-m", "rigid_proto_ros.ros.main", *scene], env=ros_environment, cwd=SOURCE)
+    try:
+        for line in lines:
+            command = [sys.executable, "-m", "rigid_proto_ros.ros.poke_client", *words(line)[1:], "--timeout", "60"]
+            done = subprocess.run(
+                command, env=ros_environment, capture_output=True, text=True, timeout=120, check=False
+            )
+            assert done.returncode == 0, (line, done.stdout, done.stderr)
+            assert "0 late, 0 refused" in done.stdout
+            time.sleep(0.1)
+    finally:
+        node.terminate()
+        assert node.wait(timeout=10.0) == 0
+
+
+@pytest.mark.parametrize("name", example_names())
+def test_example_is_a_script_that_flies_unrefused_or_a_message(name: str) -> None:
+    text = example_path(name).read_text("utf-8")
+    content = yaml.safe_load(text)
+    if isinstance(content, dict) and "script" not in content:
+        assert f"msg_examples/{name}.yaml" in "".join(p[0] for p in published()), "a message says how to publish it"
+        return
+    scene = re.search(r"config/(\w+)\.yaml", text)
+    run = OfflineRun(read_scene(scene[1] if scene else "t_handle"), read_script(example_path(name)))
+    assert run.advance(nanoseconds(25.0))
+    assert not run.simulation.refused
+    assert not run.simulation.has_pending
+
+
+@pytest.mark.parametrize(
+    "block", [b for path in DOCUMENTS for b in blocks(path, "yaml") if b.startswith("- {t:")] or [""]
+)
+def test_script_in_a_document_flies_unrefused(block: str) -> None:
+    script = parse_script(block)
+    assert len(script) > 10
+    run = OfflineRun(read_scene("t_handle"), script)
+    assert run.advance(nanoseconds(15.0))
+    assert dict(run.simulation.refused).keys() <= {"ray_miss"}  # whether a ray hits is a matter of the attitude then
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(path: Path) -> None:
+    text = path.read_text("utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if target.startswith(("http://", "https://", "mailto:")):
+            continue
+        file, _, anchor = target.partition("#")
+        place = path if not file else (path.parent / file).resolve()
+        assert place.exists(), f"{path.name}: {target}"
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", place.read_text("utf-8"), re.MULTILINE)
+            anchors = {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in headings}
+            assert anchor in anchors, f"{path.name}: {target}"
+
+
+def test_picture_is_there_and_small() -> None:
+    picture = SOURCE / "docs" / "flight.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert 20_000 < picture.stat().st_size < 300_000
+
+
+def test_tables_are_the_codes(capsys: pytest.CaptureFixture) -> None:
+    assert docs_tables.main(["--check"]) == 0, capsys.readouterr().err
+    text = README.read_text("utf-8")
+    for name in ("topics", "services", "parameters"):
+        assert f"<!-- table: {name} -->" in text
+
+
+def test_a_table_that_is_behind_is_found_and_mended() -> None:
+    marked = "before\n<!-- table: services -->\n| old |\n<!-- end -->\nafter\n"
+    new = docs_tables.filled(marked)
+    assert new != marked
+    assert "| old |" not in new and new.startswith("before\n") and new.endswith("after\n")
+    assert docs_tables.filled(new) == new
+
+
+def test_every_scene_stands_in_the_readme() -> None:
+    text = README.read_text("utf-8")
+    for name in scene_names():
+        assert f"`{name}`" in text, name
+
+
+def test_first_screen_has_the_sentence_the_picture_and_the_two_commands() -> None:
+    first = README.read_text("utf-8").splitlines()[:20]
+    text = "\n".join(first)
+    assert text.index("docs/flight.png") < text.index("make run") < text.index("make test")
