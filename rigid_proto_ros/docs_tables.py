@@ -10,6 +10,7 @@ A document holds a table between ``<!-- table: NAME -->`` and ``<!-- end -->``; 
 from __future__ import annotations
 
 import argparse
+import ast
 import re
 import sys
 from collections.abc import Iterable
@@ -28,7 +29,7 @@ from .interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from .parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENTS = ("README.md", "docs/physics.md")
+DOCUMENTS = ("README.md", "docs/physics.md", "docs/architecture.md")
 
 _MARKED = re.compile(r"(<!-- table: (?P<name>[a-z]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -75,7 +76,31 @@ def integrators() -> str:
     return _table(("name", "order", "evaluations a step", "can't carry", "good for, and what breaks it"), rows)
 
 
-TABLES = {"topics": topics, "services": services, "parameters": parameters, "integrators": integrators}
+def modules() -> str:
+    """Every module with what its docstring begins with, folder by folder."""
+    package = Path(__file__).resolve().parent
+    folders: dict[Path, list[Path]] = {}
+    for path in sorted(package.rglob("*.py")):
+        if not path.name.startswith("__"):
+            folders.setdefault(path.parent, []).append(path)
+    order = ("core", "core/integrators", "", "bodies", "rerun_view", "ros", "cli")
+    known = {place: i for i, place in enumerate(order)}
+    places = sorted(folders, key=lambda f: (known.get(f.relative_to(package).as_posix().strip("."), len(order)), f))
+    lines = []
+    for folder in places:
+        name = folder.relative_to(package).as_posix().strip(".")
+        lines += ["", f"**{name + '/' if name else 'Beside them'}**", ""]
+        lines += [f"- `{path.name}`: {_first_sentence(path)}" for path in folders[folder]]
+    return "\n".join([*lines[1:], ""])
+
+
+TABLES = {
+    "topics": topics,
+    "services": services,
+    "parameters": parameters,
+    "integrators": integrators,
+    "modules": modules,
+}
 
 
 def filled(text: str) -> str:
@@ -136,6 +161,12 @@ def _default(parameter: Parameter) -> str:
 
 def _code(text: str) -> str:
     return f"`{text}`"
+
+
+def _first_sentence(path: Path) -> str:
+    text = ast.get_docstring(ast.parse(path.read_text("utf-8"))) or ""
+    paragraph = " ".join(text.split("\n\n")[0].split()).replace("``", "`")
+    return re.split(r"(?<=\.) (?=[A-Z])", paragraph)[0].rstrip(".:")
 
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

@@ -233,17 +233,33 @@ def test_recording_can_be_switched_on_and_off_in_flight(tmp_path, states):
     assert read_session(first).mesh_chunks == read_session(second).mesh_chunks == 1
 
 
-@pytest.mark.parametrize("name", ["nowhere/session.rrd", "."])
+@pytest.mark.parametrize("name", ["nowhere/session.rrd", "session.mcap", "."])
 def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, name):
     with pytest.raises(InputError, match="record"):
         RerunObserver(record=str(tmp_path / name))
 
 
-def test_a_disk_that_is_full_from_the_start_is_refused():
+def test_a_disk_that_is_full_from_the_start_is_refused(tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full")
+    (tmp_path / "full.rrd").symlink_to("/dev/full")
     with pytest.raises(InputError, match="[Nn]o space"):
-        RerunObserver(record="/dev/full")
+        RerunObserver(record=str(tmp_path / "full.rrd"))
+
+
+def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states):
+    path = tmp_path / "session.rrd"
+    errors = []
+    observer = RerunObserver(record=str(path), on_error=errors.append)
+    flight.fly(observer, states[:20])
+    observer._flusher.flush_now()
+    observer.body_changed(200_000_000, None)
+    for k in range(20, 40):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer.close()
+    assert len(errors) == 1 and observer.recording == ""
+    session = read_session(path)
+    assert session.complete and session.rows.tobytes() == states[:20].tobytes()
 
 
 FULL_IN_FLIGHT = """

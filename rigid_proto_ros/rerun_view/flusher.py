@@ -101,13 +101,16 @@ class Flusher:
                 self._flush()
             except Exception as error:  # noqa: BLE001
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
-                self._lost(f"recording stopped: {type(error).__name__}: {error}")
+                self._finish_file()
                 self._writer.streams.clear()
+                self._lost(f"recording stopped: {type(error).__name__}: {error}")
             if closing:
                 break
             self.mailbox.wait(FLUSH_PERIOD_S)
         self._finish_file()
         if self.server is not None:
+            for stream in self._writer.streams:
+                self.server.end_run(stream)
             self.server.close()
 
     def _flush(self) -> None:

@@ -17,9 +17,9 @@ HERPOLHODE_SECONDS = 20.0
 BACKGROUND = (24, 27, 34)
 
 
-def layout(size: float, initial_view: str) -> Any:
-    """The blueprint for a body of this size [m]: three tabs, ``initial_view`` in front."""
-    tabs = {"lesson": lesson(size), "debugging": debugging(size), "plain": flight_view(size, "Plain", PLAIN)}
+def layout(size: float, initial_view: str, ghost: bool) -> Any:
+    """The blueprint for a body of this size [m]: three tabs, ``initial_view`` in front; ``ghost`` if there is one."""
+    tabs = {"lesson": lesson(size, ghost), "debugging": debugging(size), "plain": flight_view(size, "Plain", PLAIN)}
     return rrb.Blueprint(
         rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
         rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
@@ -29,15 +29,17 @@ def layout(size: float, initial_view: str) -> Any:
     )
 
 
-def lesson(size: float) -> Any:
+def lesson(size: float, ghost: bool) -> Any:
     """How the tensor governs the motion: the flight, Poinsot's construction, what is conserved and what isn't."""
     return rrb.Horizontal(
         rrb.Vertical(flight_view(size, "Flight", LESSON), command_view(), row_shares=[5, 1]),
         rrb.Vertical(
             poinsot_view(),
+            # Beside a ghost, how far the two have come apart matters more than the energy, which both keep.
+            *([plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]")] if ghost else []),
             plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
             plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
-            plot(e.ENERGY, "Energy [J]"),
+            *([] if ghost else [plot(e.ENERGY, "Energy [J]")]),
             row_shares=[2, 1, 1, 1],
         ),
         column_shares=[3, 2],
@@ -56,7 +58,7 @@ def debugging(size: float) -> Any:
                 command_view(),
                 rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
             ),
-            row_shares=[3, 1, 1],
+            row_shares=[5, 3, 2],
         ),
         rrb.Grid(
             plot(e.ENERGY, "Energy [J]"),
@@ -66,6 +68,7 @@ def debugging(size: float) -> Any:
             plot(e.DRIFT, "Drift since the last command"),
             plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]"),
             plot(e.STRING_TENSION, "Tension of the string [N]"),
+            plot(e.EFFORT, "Effort per simulated second"),
             grid_columns=2,
         ),
         name="Debugging",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a stream is sent once, or when the body changes: scene, mesh, styles, layout, shapes of the inertia."""
+"""What a stream is sent once, or when the body changes: scene, mesh, styles, shapes of the inertia."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from ..core.observer import BodySnapshot
 from . import entities as e
 from .columns import one_time
 from .inertia_shapes import PrincipalFrame, bounding_box
-from .layout import layout
 from .load_arrows import PARTS, load_entity
 from .streams import Stream
 from .surface_normals import shaded_surface
@@ -126,8 +125,8 @@ def send_mesh(stream: Stream, scene: Scene, number: int) -> None:
     )
 
 
-def send_styles(stream: Stream, size: float, view_size: float, initial_view: str) -> None:
-    """Colours, names and thicknesses for a body of this size [m], and the layout with its camera."""
+def send_styles(stream: Stream, size: float) -> None:
+    """Colours, names and thicknesses for a body of this size [m]."""
     for entity, series in e.SERIES.items():
         names, colours = zip(*series, strict=True)
         stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
@@ -153,7 +152,6 @@ def send_styles(stream: Stream, size: float, view_size: float, initial_view: str
         e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=e.GREEN, line_radii=0.6 * line, fill_mode=wire)
     )
     _send_poinsot_styles(stream)
-    stream.send_blueprint(layout(view_size, initial_view))
 
 
 def _send_poinsot_styles(stream: Stream) -> None:

@@ -72,6 +72,8 @@ class FileStream(Stream):
 
     def __init__(self, path: Path, recording_id: str, name: str) -> None:
         self.path = path
+        if path.suffix != ".rrd":
+            raise InputError("record", str(path), "the path of an .rrd file")
         try:
             super().__init__(recording_id, rr.FileSink(path), name)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
@@ -107,6 +109,9 @@ class LiveStream(Stream):
     """One run for viewers; the first one hosts the server, later ones send to it."""
 
     may_skip = True
+
+    def flush(self) -> None:
+        """Nothing to do: the stream sends by itself, and a viewer that doesn't take it must hold nobody up."""
 
 
 class LiveServer:

@@ -10,7 +10,6 @@ from ..core.observer import ShownString
 from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
-from .lanes import Lanes
 from .mailbox import Block
 
 RATE = 100
@@ -54,6 +53,7 @@ class StringPicture:
         self._strips: list[np.ndarray] = []
         self._hands: list[np.ndarray] = []
         self._tensions: list[np.ndarray] = []
+        self._energies: list[np.ndarray] = []
         self._counts: list[np.ndarray] = []
 
     @property
@@ -69,6 +69,7 @@ class StringPicture:
             self._walls.append(np.array([wall_ns]))
             self._counts.append(np.zeros(1, dtype=int))
             self._tensions.append(np.zeros(1))
+            self._energies.append(np.zeros(1))
             self._shown = False
         self._string = string
 
@@ -91,12 +92,15 @@ class StringPicture:
         self._walls.append(block.walls[chosen])
         self._counts.append(np.ones(len(chosen), dtype=int))
         self._tensions.append(tension)
+        stretch = distance - string.rest_length
+        stretch = stretch if string.bilateral else np.maximum(stretch, 0.0)
+        self._energies.append(0.5 * string.stiffness * stretch**2)
         self._hands.append(free_end)
         self._strips.extend(_drawn(string, free_end, span, distance))
         self._shown = True
 
-    def send(self, send: Send, lanes: Lanes) -> None:
-        """Send what was collected, and say when the string went taut or slack."""
+    def send(self, send: Send) -> None:
+        """Send what was collected."""
         if not self._times:
             return
         times_ns, walls = np.concatenate(self._times), np.concatenate(self._walls)
@@ -108,8 +112,7 @@ class StringPicture:
         hands = np.concatenate(self._hands) if self._hands else np.empty((0, 3))
         send(e.HAND, times, rr.Points3D.columns(positions=hands).partition(counts))
         send(e.STRING_TENSION, times, scalar_columns(tensions[:, np.newaxis]))
-        for time_ns, wall_ns, count, tension in zip(times_ns, walls, counts, tensions, strict=True):
-            lanes.change(int(time_ns), int(wall_ns), "string", ("taut" if tension else "slack") if count else "none")
+        send(e.STRING_ENERGY, times, scalar_columns(np.concatenate(self._energies)[:, np.newaxis]))
         self._reset()
 
 

@@ -17,6 +17,7 @@ from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .lanes import Lanes
+from .layout import layout
 from .load_arrows import LoadArrows
 from .mailbox import Block, Mark
 from .plots import Plots
@@ -85,7 +86,7 @@ class SceneWriter:
         if self._body is None:
             return
         now, wall = self._last_time_ns, time.time_ns()
-        send_styles(stream, self._size, self._view_size, self._initial_view)
+        self._send_styles(stream)
         send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
@@ -135,7 +136,8 @@ class SceneWriter:
     def _send_upto(self, block: Block, begin: int, end: int) -> None:
         self._write_rows(block, begin, end)
         self._loads.send(self._send)
-        self._string.send(self._send, self._lanes)
+        self._string.send(self._send)
+        self._plots.send_effort(self._send)
         self._words.send(self._send)
         self._lanes.send(self._send)
 
@@ -168,6 +170,9 @@ class SceneWriter:
     def _status(self, mark: Mark) -> None:
         self._lane(mark, *mark.content)
 
+    def _effort(self, mark: Mark) -> None:
+        self._plots.effort(mark.time_ns, mark.wall_ns, *mark.content)
+
     def _event(self, mark: Mark) -> None:
         self._words.event(mark.time_ns, mark.wall_ns, *mark.content)
 
@@ -199,7 +204,7 @@ class SceneWriter:
         self._tell_body()
         for stream in self.streams:
             if self._size != before:
-                send_styles(stream, self._size, self._view_size, self._initial_view)
+                self._send_styles(stream)
             send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
@@ -221,7 +226,13 @@ class SceneWriter:
         (self._ghost_body,) = mark.content
         for stream in self.streams if first else ():
             self._send_ghost_mesh(stream)
+            if self._body is not None:
+                self._send_styles(stream)
         self._ghost.change(mark.time_ns, mark.wall_ns, self._ghost_body, self._send)
+
+    def _send_styles(self, stream: Stream) -> None:
+        send_styles(stream, self._size)
+        stream.send_blueprint(layout(self._view_size, self._initial_view, self._ghost_body is not None))
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None:
@@ -316,6 +327,7 @@ _ALONG_WITH_ROWS = {
     "string_changed": SceneWriter._string_changed,
     "scene_changed": SceneWriter._scene_changed,
     "status": SceneWriter._status,
+    "effort": SceneWriter._effort,
     "event": SceneWriter._event,
     "refused": SceneWriter._refused,
 }

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""docs/architecture.md holds: every file it names exists, and its steps for adding an integrator add one."""
+
+from __future__ import annotations
+
+import fnmatch
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rigid_proto_ros
+
+ROOT = Path(rigid_proto_ros.__file__).resolve().parent
+DOCUMENT = ROOT.parent / "docs" / "architecture.md"
+pytestmark = pytest.mark.skipif(not DOCUMENT.is_file(), reason="not run from a source tree")
+
+# Heun's method of order 2 on the tableau's own machinery: no stops at a slack string, so it carries none.
+HEUN = '''
+"""heun: two evaluations a step, order 2."""
+import numpy as np
+from numba import njit
+
+from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
+from .runge_kutta import advance, is_good, rates, stages
+from .stepping import FixedSteps
+
+TABLEAU = np.array([[0.0, 0.0], [1.0, 0.0]])
+WEIGHTS = np.array([0.5, 0.5])
+
+
+@njit(cache=True, error_model="numpy")
+def heun_steps(y, p, h, n):
+    k, z, new = np.zeros((2, 15)), np.empty(15), np.empty(15)
+    for done in range(n):
+        rates(y, p, False, k[0])
+        stages(y, p, h, False, TABLEAU, 2, k, z)
+        advance(y, p, h, WEIGHTS, 2, k, new)
+        if not is_good(new):
+            return done
+        y[:] = new
+    return n
+
+
+HEUN = Integrator(
+    name="heun",
+    order=2,
+    evaluations=2,
+    source="Heun 1900",
+    limits="Explicit.",
+    stability_limit=1.0,
+    carries=LOADS | {ANGULAR_DAMPING, NO_GYROSCOPIC_TERM},
+    kernel=heun_steps,
+    stepper=FixedSteps,
+)
+'''
+
+FLY = """
+import json
+import numpy as np
+from rigid_proto_ros import docs_tables, parameters
+from rigid_proto_ros.core.errors import CommandRefused
+from rigid_proto_ros.offline import OfflineRun
+from rigid_proto_ros.scenario import make_scenario
+
+body = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]}
+
+def attitude(step):
+    values = {**body, "integrator": "heun", "step": step, "initial.angular_velocity": [1.0, 2.0, 3.0]}
+    run = OfflineRun(make_scenario(values))
+    assert run.advance(1_000_000_000)
+    return run.simulation.state.orientation_xyzw
+
+attitudes = [attitude(h) for h in (2e-3, 1e-3, 5e-4)]
+changes = [float(np.abs(b - a).max()) for a, b in zip(attitudes, attitudes[1:])]
+try:
+    OfflineRun(make_scenario({**body, "integrator": "heun", "string.attached": True}))
+    refusal = ""
+except CommandRefused as error:
+    refusal = str(error)
+choices = parameters.PARAMETERS["integrator"].choices
+print(json.dumps({"changes": changes, "refusal": refusal, "choices": choices, "table": docs_tables.integrators()}))
+"""
+
+
+def named_files() -> list[str]:
+    """Patterns of file names in code marks, such as ``moments*.py``."""
+    return re.findall(r"([\w*]+\.py)\b", DOCUMENT.read_text("utf-8"))
+
+
+def test_every_named_file_exists() -> None:
+    existing = {path.name for path in [*ROOT.rglob("*.py"), *ROOT.parent.glob("test/*.py")]}
+    for pattern in named_files():
+        assert fnmatch.filter(existing, pattern), pattern
+
+
+@pytest.mark.slow
+def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
+    shutil.copytree(ROOT, tmp_path / ROOT.name, ignore=shutil.ignore_patterns("__pycache__"))
+    folder = tmp_path / ROOT.name / "core" / "integrators"
+    (folder / "heun.py").write_text(HEUN, "utf-8")
+    # Its line, and its place among the others.
+    listing = (folder / "__init__.py").read_text("utf-8")
+    listing = listing.replace(
+        "from .integrator import Integrator\n", "from .heun import HEUN\nfrom .integrator import Integrator\n"
+    )
+    listing = listing.replace("        DISCRETE_GRADIENT,\n", "        DISCRETE_GRADIENT,\n        HEUN,\n")
+    (folder / "__init__.py").write_text(listing, "utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert "heun" in found["choices"]
+    assert "| `heun` | 2 | 2 |" in found["table"]
+    assert "heun" in found["refusal"] and "rk4" in found["refusal"]
+    # Halving the step quarters what is still missing: order 2.
+    first, second = found["changes"]
+    assert 3.6 < first / second < 4.4
+
+
+def _only(folder: Path) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(folder)}
