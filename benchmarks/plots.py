@@ -25,7 +25,6 @@ plt.rcParams.update(
     {"svg.hashsalt": "work_precision", "font.size": 9, "svg.fonttype": "none", "axes.grid": True, "grid.alpha": 0.3}
 )
 COLOURS = {
-    "ours (kernel)": "tab:blue",
     "mujoco": "tab:red",
     "drake": "tab:orange",
     "pinocchio": "tab:purple",
@@ -33,6 +32,20 @@ COLOURS = {
     "scipy": "tab:green",
     "diffrax": "tab:olive",
 }
+OURS = (
+    "euler",
+    "semi_implicit_euler",
+    "midpoint",
+    "lie_midpoint",
+    "discrete_gradient",
+    "free_body_strang",
+    "rk4",
+    "rkmk4",
+    "free_body_4",
+    "dop853",
+    "taylor",
+    "free_body",
+)
 MARKS = "osD^v<>Pp*hX8"
 
 
@@ -65,7 +78,10 @@ def draw_curves(rows: list[dict], problem: str, path: Path) -> None:
     marks = defaultdict(int)
     for (tool, name), curve in sorted(curves.items()):
         ours = tool.startswith("ours")
-        colour = "black" if name == "auto" else COLOURS.get(tool, "tab:blue")
+        colour = COLOURS.get(tool, "black")
+        if ours and name != "auto":
+            # Ours in shades of one map, so that the eye tells them from the peers.
+            colour = plt.cm.winter(OURS.index(name) / (len(OURS) - 1) if name in OURS else 0.5)
         curve.sort(key=lambda r: r["step_or_tolerance"], reverse=True)
         x, y = [r["median_s"] for r in curve], [max(r["attitude_error_rad"], 1e-17) for r in curve]
         mark = MARKS[marks[tool] % len(MARKS)]
