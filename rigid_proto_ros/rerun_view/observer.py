@@ -135,6 +135,10 @@ class RerunObserver(Observer):
         """Note that a lane of the state line changes."""
         self._mark(time_ns, "status", track, value)
 
+    def effort(self, time_ns: int, steps: int, force_evaluations: int) -> None:
+        """Note what the motion has cost."""
+        self._mark(time_ns, "effort", steps, force_evaluations)
+
     def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
         """Note the ghost from ``time_ns`` on."""
         self._mark(time_ns, "ghost_began", ghost)

@@ -137,6 +137,7 @@ class SceneWriter:
         self._write_rows(block, begin, end)
         self._loads.send(self._send)
         self._string.send(self._send)
+        self._plots.send_effort(self._send)
         self._words.send(self._send)
         self._lanes.send(self._send)
 
@@ -168,6 +169,9 @@ class SceneWriter:
 
     def _status(self, mark: Mark) -> None:
         self._lane(mark, *mark.content)
+
+    def _effort(self, mark: Mark) -> None:
+        self._plots.effort(mark.time_ns, mark.wall_ns, *mark.content)
 
     def _event(self, mark: Mark) -> None:
         self._words.event(mark.time_ns, mark.wall_ns, *mark.content)
@@ -323,6 +327,7 @@ _ALONG_WITH_ROWS = {
     "string_changed": SceneWriter._string_changed,
     "scene_changed": SceneWriter._scene_changed,
     "status": SceneWriter._status,
+    "effort": SceneWriter._effort,
     "event": SceneWriter._event,
     "refused": SceneWriter._refused,
 }
