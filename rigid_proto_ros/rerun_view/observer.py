@@ -32,7 +32,7 @@ INITIAL_VIEWS = ("lesson", "debugging", "plain")
 
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
-LIVE_MEMORY_LIMIT = "256MiB"
+LIVE_MEMORY_LIMIT = "64MiB"
 """What the server keeps for viewers that come late; the oldest is dropped first."""
 
 _REMEMBERED = ("started", "mesh_changed", "body_changed", "scene_changed", "string_changed", "ghost_began")
