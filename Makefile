@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: help setup run up test lint pictures build bench stress clean pins
+.PHONY: help setup run up test lint pictures build bench stress soak clean pins
 SHELL := /bin/bash
 
 PY := .venv/bin/python
@@ -45,6 +45,9 @@ bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU a
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet -r requirements/base.txt $$(test -f requirements/ros.txt && echo -r requirements/ros.txt) -r benchmarks/requirements.txt
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
+
+soak: setup ## an hour of random commands, guests and changes; MINUTES=5 for the short form
+	$(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
 
 stress: setup ## long and hostile tests
 	$(PY) -m pytest -m stress $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen

@@ -14,8 +14,18 @@ VERSION = next(
 
 # Real rclpy on Fast DDS from PyPI. An extra, because a machine with a ROS installation must keep that one's.
 ROS = ["ros-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
+MCAP = ["mcap>=1.2,<2"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
-TEST = ["pytest>=8", "hypothesis>=6.100", "mpmath>=1.3", "scipy>=1.11", "psutil>=5.9", "manifold3d>=3.1,<4"]
+TEST = [
+    "pytest>=8",
+    "hypothesis>=6.100",
+    "mpmath>=1.3",
+    "scipy>=1.11",
+    "psutil>=5.9",
+    "manifold3d>=3.1,<4",
+    *MCAP,
+    "mcap-ros2-support>=0.5",
+]
 
 setup(
     name=NAME,
@@ -34,7 +44,7 @@ setup(
     ],
     python_requires=">=3.11,<3.14",
     install_requires=["numpy>=1.26", "numba>=0.59", "trimesh>=4.4", "PyYAML>=6.0"],
-    extras_require={"ros": ROS, "rerun": RERUN, "test": TEST},
+    extras_require={"ros": ROS, "rerun": RERUN, "mcap": MCAP, "test": TEST},
     zip_safe=False,
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",

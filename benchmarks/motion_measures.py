@@ -20,9 +20,9 @@ def sane(row: np.ndarray) -> bool:
     return bool((np.abs(row) < 1e100).all())
 
 
-def errors(problem: Problem, row: np.ndarray, reference: list) -> dict:
-    """Attitude error [rad], position error [m] and rate error [rad/s] of a row (13,) against the reference row."""
-    if not sane(row):
+def errors(problem: Problem, row: np.ndarray, reference: list | None) -> dict:
+    """Attitude error [rad], position error [m] and rate error [rad/s] of a row (13,) against the reference row, if any."""
+    if reference is None or not sane(row):
         return dict.fromkeys(("attitude_error_rad", "position_error_m", "rate_error_rad_s"), np.nan)
     difference = [float(b - float(a)) for a, b in zip(row, reference, strict=True)]
     return {

@@ -12,10 +12,13 @@ import time
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped, WrenchStamped
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
 
 from rigid_proto_ros import cdr
 
@@ -86,6 +89,61 @@ def flood(rate: str, seconds: str) -> None:
         time.sleep(0.0005)
     print(json.dumps({"sent": sent}), flush=True)
     STOP.wait()
+
+
+def soak(seed: str) -> None:
+    """Random commands, good and bad, and parameter changes until the end; then prints what was sent."""
+    node = Node("soak")
+    random = np.random.default_rng(int(seed))
+    reliable = QoSProfile(depth=100)
+    topics = {
+        "wrench": node.create_publisher(WrenchStamped, "/rigid_body/wrench", reliable),
+        "poke": node.create_publisher(WrenchStamped, "/rigid_body/poke", reliable),
+        "target": node.create_publisher(PointStamped, "/rigid_body/string/target", reliable),
+    }
+    setter = node.create_client(SetParameters, "/rigid_body/set_parameters")
+    services = {name: node.create_client(Trigger, f"/rigid_body/{name}") for name in ("reset", "clear_wrench")}
+    while not all(p.get_subscription_count() for p in topics.values()) and not STOP.is_set():
+        time.sleep(0.05)
+    sent = {"messages": 0, "bad": 0, "changes": 0}
+    good = ["world", "body", "world@vertex/3", "body@point/0.0,0.01,0.02", "normal@vertex/7", "world@com;impulse"]
+    bad = ["nowhere", "world@vertex/99999999", "body@point/1,2", "world@com;duration=-1", "x" * 2000]
+    next_change = 0.0
+    while not STOP.is_set():
+        force = (1e-3 * random.standard_normal(3)).tolist()
+        kind = random.random()
+        if kind < 0.6:
+            frame = good[random.integers(len(good))]
+            topic = "poke" if ";" in frame or random.random() < 0.5 else "wrench"
+            topics[topic].publish(cdr.wrench_stamped(0, frame, force, (0.0, 0.0, 0.0)))
+        elif kind < 0.8:
+            frame = bad[random.integers(len(bad))]
+            topics["poke"].publish(cdr.wrench_stamped(0, frame, force, (0.0, 0.0, 0.0)))
+            sent["bad"] += 1
+        elif kind < 0.85:
+            topics["poke"].publish(cdr.wrench_stamped(0, "world", (float("nan"), 0.0, 0.0), force))
+            sent["bad"] += 1
+        else:
+            target = (0.05 * random.standard_normal(3)).tolist()
+            topics["target"].publish(cdr.stamped_doubles(0, "world", target))
+        sent["messages"] += 1
+        if time.monotonic() > next_change:
+            next_change = time.monotonic() + 2.0
+            sent["changes"] += 1
+            name, value = [
+                ("density", float(random.uniform(500, 9000))),
+                ("scale", float(random.uniform(0.5, 2.0))),
+                ("inertia_model", ["solid", "bounding_box", "points", "shell"][random.integers(4)]),
+                ("gravity", [0.0, 0.0, float(random.uniform(-0.1, 0.1))]),
+                ("mesh", ["t_handle", "hammer", "teapot", "book"][random.integers(4)]),
+                ("mass", -1.0),
+            ][random.integers(6)]
+            setter.call_async(SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()]))
+            if sent["changes"] % 20 == 0:
+                services["reset" if sent["changes"] % 40 == 0 else "clear_wrench"].call_async(Trigger.Request())
+        rclpy.spin_once(node, timeout_sec=0.0)
+        time.sleep(0.02)
+    print(json.dumps(sent), flush=True)
 
 
 def diagnostics() -> None:
@@ -177,7 +235,12 @@ if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: STOP.set())
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    {"subscribe": subscribe, "latency": latency, "flood": flood, "plain": plain_node, "diagnostics": diagnostics}[
-        sys.argv[1]
-    ](*sys.argv[2:])
+    {
+        "subscribe": subscribe,
+        "latency": latency,
+        "flood": flood,
+        "plain": plain_node,
+        "diagnostics": diagnostics,
+        "soak": soak,
+    }[sys.argv[1]](*sys.argv[2:])
     rclpy.try_shutdown()

@@ -178,7 +178,8 @@ def cache(problem: Problem, digits: int = 25) -> dict:
 
 
 def main() -> None:
-    names = sys.argv[1:] or [name for name in PROBLEMS if not (FOLDER / f"{name}.json").exists()]
+    wanted = [p.name for p in PROBLEMS.values() if p.has_reference and not (FOLDER / f"{p.name}.json").exists()]
+    names = sys.argv[1:] or wanted
     for name in names:
         cache(PROBLEMS[name])
 

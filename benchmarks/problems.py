@@ -68,6 +68,11 @@ class Problem:
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
     @property
+    def has_reference(self) -> bool:
+        """Whether its end is known. Undamped at 1e5 rad/s it is chaotic: energy and boundedness judge it."""
+        return self.spring is None or self.spring.damping > 0.0 or self.spring.frequency < 1e5
+
+    @property
     def torque_free(self) -> bool:
         """Nothing but gravity acts."""
         return not self.wrenches and self.spring is None and self.linear_damping == self.angular_damping == 0.0

@@ -18,7 +18,7 @@ import numpy as np
 
 import peers
 import work_precision_ours as ours
-from motion_measures import energy, errors, momentum_error
+from motion_measures import energy, errors, momentum_error, sane
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
@@ -128,7 +128,12 @@ def measure(problem: Problem, contestant: peers.Contestant, step: float, repeats
         if run is None:
             return None
         times = [timed(run, problem.duration)]
-        entry.update(errors(problem, run.row(), reference_row(problem)), steps=run.steps(), compile_s=run.compile_s)
+        end = run.row()
+        entry.update(
+            errors(problem, end, reference_row(problem) if problem.has_reference else None),
+            steps=run.steps(),
+            compile_s=run.compile_s,
+        )
         # The first run may still meet cold caches; it counts alone only when it was long.
         while len(times) < repeats + 1 and sum(times) < 0.1 * repeats:
             times.append(timed(run, problem.duration))
@@ -136,7 +141,7 @@ def measure(problem: Problem, contestant: peers.Contestant, step: float, repeats
         entry.update(median_s=float(np.median(times)), fastest_s=min(times), repeats=len(times))
         if sum(times) / len(times) < 1.0 or not contestant.tolerance:
             entry.update(drifts(problem, run))
-        entry["status"] = "ok" if np.isfinite(entry["attitude_error_rad"]) else "blew up"
+        entry["status"] = "ok" if sane(end) else "blew up"
     except Exception as error:  # a peer's failure is a result, whatever its kind
         entry["status"] = f"{type(error).__name__}: {error}".splitlines()[0][:120]
     return entry

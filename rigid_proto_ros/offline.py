@@ -98,6 +98,8 @@ class OfflineRun:
 
     def _apply_changes(self, changes: dict):
         self.scenario = self.scenario.with_changes(changes)
+        if self.observer is not None:
+            self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
         if self._ghost is not None:
             self._ghost.change(self.simulation.time_ns, self.scenario)
         return self.scenario.setup

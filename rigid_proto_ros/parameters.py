@@ -177,7 +177,7 @@ _DECLARED = (
     Parameter("ghost.integrator", "string", "", "Show a ghost that gets the same commands under this integrator.", choices=("", *INTEGRATORS)),
     Parameter("world_frame", "string", "world", "Name of the world frame in published messages.", changes=READ_ONLY),
     Parameter("body_frame", "string", "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY),
-    Parameter("record", "string", "", "Record the session to this .rrd file; empty records nothing."),
+    Parameter("record", "string", "", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty records nothing."),
     Parameter("viewer", "string", "none", "Show the motion live in Rerun: in the browser, or in the native viewer.", choices=("none", "web", "native"), changes=READ_ONLY),
     _port("rerun_port", 9876, "Port on which the live view is served, on this machine only."),
     _port("web_port", 9090, "Port of the browser's viewer page, on this machine only."),

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+
+from .session_messages import StampedRows
 
 
 @dataclass
@@ -17,6 +20,10 @@ class RecordedSession:
     ``core.observer.STATE_FIELDS`` order. vertices (p, 3) float64 and triangles (m, 3) int64 as loaded, None without a
     mesh; mesh_sha256 of the mesh file; mesh_chunks counts how often the drawn mesh was logged.
     complete: the file was finished properly. readable_bytes of file_bytes hold whole pieces.
+
+    A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
+    those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics' names.
+    missing: topics that a check would need. attachments: (name, bytes) of files inside; folder: where the session lies.
     """
 
     scene: str = ""
@@ -31,6 +38,17 @@ class RecordedSession:
     complete: bool = True
     readable_bytes: int = 0
     file_bytes: int = 0
+    published: dict[str, StampedRows] = field(default_factory=dict)
+    scenes: list[str] = field(default_factory=list)
+    node_name: str = "rigid_body"
+    missing: tuple[str, ...] = ()
+    attachments: list[tuple[str, bytes]] = field(default_factory=list)
+    folder: Path | None = None
+
+    @property
+    def lines(self) -> list[str]:
+        """The event lines as logged."""
+        return [line for _, line in self.events]
 
     @property
     def end_ns(self) -> int:

@@ -53,8 +53,11 @@ class Scenario:
     warnings: tuple[str, ...] = ()
     ghost: Setup | None = None
 
-    def with_changes(self, changes: Mapping[str, object]) -> Scenario:
-        """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is."""
+    def with_changes(self, changes: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
+        """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is.
+
+        mesh: a mesh at hand, used instead of loading the one that the parameter names.
+        """
         changes = parameters.convert_all(changes)
         for name, value in changes.items():
             if parameters.parameter_named(name).changes == parameters.READ_ONLY:
@@ -62,8 +65,8 @@ class Scenario:
         values = {**self.values, **changes}
         if "density" in changes and "mass" not in changes:
             values["mass"] = 0.0
-        reuse = all(values[name] == self.values[name] for name in _MESH_PARAMETERS)
-        return _build(values, self.body_mesh if reuse else _load(values))
+        reuse = mesh is None and all(values[name] == self.values[name] for name in _MESH_PARAMETERS)
+        return _build(values, self.body_mesh if reuse else _load(values, mesh))
 
     def with_inertia(self, mass: float, com, tensor6, relative: bool) -> Scenario:
         """The scenario with an explicit inertia, as a message gives it; raises InputError.

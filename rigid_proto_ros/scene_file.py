@@ -7,6 +7,7 @@ and 010), a double (also 1e-3, .inf, nan) or else text; quoted ones are text; a 
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,7 +50,8 @@ def scalar(text: str):
             return float(text)
         return value if -(1 << 63) <= value < 1 << 63 else float(value)
     if _DOUBLE.match(text):
-        return float(text)
+        value = float(text)
+        return text if math.isinf(value) else value  # out of a double's range: rcl keeps the text
     if _SPECIAL.match(text):
         return float(text.replace(".", ""))
     if _HEX_DOUBLE.match(text):

@@ -81,7 +81,9 @@ class Scene:
             "force_world": force_world,
             "force_body": force_body if body else np.zeros(3),
             "torque_world": np.array((0.2, 0.3, -0.4)) if world else np.zeros(3),
-            "torque_body": (cross(point, force_body) if body else 0.0) + np.array((-0.3, 0.2, 0.4)) if torque else np.zeros(3),
+            "torque_body": (cross(point, force_body) if body else 0.0) + np.array((-0.3, 0.2, 0.4))
+            if torque
+            else np.zeros(3),
             "moment": point[:, None] * force_world if world else np.zeros((3, 3)),
             "linear_damping": 0.3 if self.damped else 0.0,
             "angular_damping": 0.2 if ANGULAR_DAMPING in self.needs else 0.0,

@@ -143,10 +143,12 @@ class NodeClient:
         return self.fresh_diagnostics(lambda values: int(values["commands_received"]) >= count)
 
     def rows(self) -> dict[str, dict[int, list[float]]]:
-        """What was received on pose and twist by stamp [ns]; the buffer is emptied."""
+        """What was received on pose and twist by stamp [ns] since the last reset; the buffer is emptied."""
         found: dict[str, dict[int, list[float]]] = {"pose": {}, "twist": {}}
         for topic, m in self.states:
             ns = m.header.stamp.sec * SECOND + m.header.stamp.nanosec
+            if found[topic] and ns < max(found[topic]):
+                found[topic].clear()
             if topic == "pose":
                 p, q = m.pose.position, m.pose.orientation
                 found[topic][ns] = [p.x, p.y, p.z, q.x, q.y, q.z, q.w]

@@ -26,6 +26,8 @@ ALLOWED = {
         f"{PACKAGE}.scene_file",
         f"{PACKAGE}.poke_script",
         f"{PACKAGE}.parameters",
+        f"{PACKAGE}.session_bag",
+        f"{PACKAGE}.session_branch",
         f"{PACKAGE}.ros.",
         f"{PACKAGE}.cli.",
     ),
@@ -35,7 +37,8 @@ ALLOWED = {
     "pyarrow": (f"{PACKAGE}.rerun_view",),  # comes with rerun, as PIL does
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
-    "mcap": (f"{PACKAGE}.session", f"{PACKAGE}.recorded_session"),
+    "mcap": (f"{PACKAGE}.session_mcap",),
+    "zstandard": (f"{PACKAGE}.session_mcap",),  # comes with mcap
 }
 
 

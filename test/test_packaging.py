@@ -104,6 +104,7 @@ def _check_installed(prefix: Path, found: list[str]) -> None:
     assert (prefix / "share/rigid_proto_ros/package.xml").is_file()
     assert Path(scene) == prefix / "share/rigid_proto_ros/config/t_handle.yaml"
     assert Path(body).is_file() and Path(body).is_relative_to(prefix)
+    assert (prefix / "share/rigid_proto_ros/launch/rigid_body.launch.py").is_file()
     assert scenes.split() == bundled.scene_names()
 
 

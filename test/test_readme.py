@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -32,7 +33,7 @@ DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if READ
 OWN = ("rigid_proto", "poke_client")
 # Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
 NOT_RUN = {"sudo", "source", "cd", "rosdep", "colcon", "pip", "git", "ros2", "python", "rerun", "rigid_body_node"}
-STAYS_UP = ("rigid_proto up",)
+STAYS_UP = ("rigid_proto up", "rigid_body_node --bodies")
 
 
 def blocks(path: Path, *languages: str) -> list[str]:
@@ -94,16 +95,57 @@ def test_make_target_exists(command: str) -> None:
 
 
 @pytest.mark.slow
-def test_rigid_proto_commands_run(in_a_copy: Path, capsys: pytest.CaptureFixture) -> None:
+def test_rigid_proto_commands_run(
+    in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture
+) -> None:
     pytest.importorskip("rerun")
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):
         if command.startswith(STAYS_UP) or " demo" in command:
             continue
+        if "--publish" in command:
+            sent = subprocess.run(
+                [sys.executable, "-m", "rigid_proto_ros.cli.main", *words(command)[1:]],
+                env={**ros_environment, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                capture_output=True,
+                text=True,
+                timeout=120,
+                check=False,
+            )
+            assert sent.returncode == 0, (command, sent.stderr)
+            continue
         if words(command)[1] == "snapshot" and not os.path.isdir("/usr/share/vulkan/icd.d"):
             continue  # the snapshot's own test says what is missing
         assert rigid_proto(words(command)[1:]) == 0, (command, capsys.readouterr().err)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith(STAYS_UP)])
+def test_command_that_stays_up_gets_ready_and_ends_cleanly(command: str, ros_environment: dict[str, str]) -> None:
+    pytest.importorskip("rclpy")
+    module = {"rigid_proto": "rigid_proto_ros.cli.main", "rigid_body_node": "rigid_proto_ros.ros.main"}
+    program, *arguments = words(command)
+    if program == "rigid_proto":
+        arguments += ["--viewer", "none"]  # the last one counts: no window, no port
+    process = subprocess.Popen(
+        [sys.executable, "-m", module[program], *arguments],
+        env=ros_environment,
+        cwd=SOURCE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        # Ends with the process, which the suite's own timeout would end too.
+        ready = any("is flying" in line for line in process.stderr)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10.0) == 0
+        assert ready
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.parametrize("command", of("poke_client"))
@@ -243,6 +285,21 @@ def test_picture_is_there_and_small() -> None:
     picture = SOURCE / "docs" / "flight.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert 20_000 < picture.stat().st_size < 300_000
+
+
+def test_frames_of_the_readme_are_read_and_are_what_it_says() -> None:
+    from rigid_proto_ros.core.frames import parse_frame
+
+    text = README.read_text("utf-8")
+    section = text[text.index("### Frames and units") : text.index("## Is it right?")]
+    rows = [line.split("|")[2] for line in section.splitlines() if line.startswith("| a ")]
+    frames = [code for row in rows for code in re.findall(r"`([^`]+)`", row) if code != "force.x"]
+    assert len(frames) >= 10
+    for frame in frames:
+        parse_frame(frame, {"tip"})
+    # What stands alone means what stands before it.
+    for short, whole in (("world", "world@com"), ("", "world@com"), ("body", "body@com"), ("tip", "body@tip")):
+        assert parse_frame(short, {"tip"}) == parse_frame(whole, {"tip"})
 
 
 def test_tables_are_the_codes(capsys: pytest.CaptureFixture) -> None:

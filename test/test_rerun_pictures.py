@@ -274,12 +274,31 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
     _, tensions = cells(path, e.STRING_TENSION, "Scalars:scalars")
     stretch = 0.8 - 0.1 - rows[:50, 2] - 0.4
     assert np.allclose(np.ravel(tensions)[:50], np.maximum(50.0 * stretch, 0.0), atol=1e-12)
+    _, energies = cells(path, e.STRING_ENERGY, "Scalars:scalars")
+    assert np.allclose(np.ravel(energies)[:50], 25.0 * np.maximum(stretch, 0.0) ** 2, atol=1e-12)
     for k in range(50):
         points = np.array(strips[k][0])
         assert np.allclose(points[0], hand, atol=1e-6) and np.allclose(points[-1], rows[k, 0:3] + knot, atol=1e-6)
         length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
         # 25 points of a parabola are a little shorter than it.
         assert np.isclose(length, max(0.4, 0.4 + stretch[k]), rtol=5e-3)
+
+
+def test_effort_is_plotted_as_a_rate_since_it_was_told_before(tmp_path):
+    path = tmp_path / "effort.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, flight.rows(10))
+    for time_ns, steps in ((0, 0), (50_000_000, 50), (100_000_000, 50), (100_000_000, 51)):
+        observer.effort(time_ns, steps, 4 * steps)
+    observer.reset()
+    observer.effort(0, 0, 0)
+    observer.effort(50_000_000, 5, 20)
+    observer.close()
+    assert cells(tmp_path / "effort.run1.rrd", e.EFFORT, "Scalars:scalars") == (
+        [50_000_000, 100_000_000],
+        [[1000.0, 4000.0], [0.0, 0.0]],
+    )
+    assert cells(path, e.EFFORT, "Scalars:scalars") == ([50_000_000], [[100.0, 400.0]])
 
 
 def test_the_next_run_starts_from_the_parameters_then_in_force(tmp_path):

@@ -1,46 +1,111 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto replay``: say what a recorded session holds, and check it by computing it anew."""
+"""``rigid_proto replay``: what a recorded session holds; check it, mend it, draw it, branch from it, send it again."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+from pathlib import Path
+
+from ..core.errors import InputError
 
 
 def add_parser(subparsers) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("replay", help="show what a recorded session holds; check it")
-    parser.add_argument("session", metavar="SESSION", help="an .rrd recording")
+    parser = subparsers.add_parser("replay", help="show, check or branch a recorded session")
+    parser.add_argument(
+        "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
+    )
     parser.add_argument("--verify", action="store_true", help="compute it anew; exit 1 at the first difference")
-    parser.add_argument("--record", metavar="FILE.rrd", help="write the computed-anew session to a recording")
+    parser.add_argument("--record", metavar="FILE", help="write it as a recording, .rrd for Rerun or .mcap")
+    parser.add_argument("--repair", metavar="FILE", help="write a whole file of a session that was cut")
+    parser.add_argument("--scene", metavar="FILE", help="the scene of a bag that lacks it")
+    parser.add_argument("--at", type=float, metavar="T", help="a moment of the session [s], for --as-scene")
+    parser.add_argument("--as-scene", metavar="FILE.yaml", help="write the scene that begins at --at")
+    parser.add_argument("--publish", choices=("states", "commands"), help="send it again, over ROS")
+    parser.add_argument("--node", metavar="NAME", help="the node to send commands to; the body in a bag with several")
+    parser.add_argument("--speed", type=float, metavar="X", help="times as fast, for --publish states (default 1)")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what the session holds; with ``--verify`` compare it with a new computation."""
-    from ..rerun_view.reader import read_session
+    """Say what the session holds, and do what is asked for with it."""
+    from ..session_reader import read_runs, repair
 
-    session = read_session(args.session)
+    _check(args)
+    if args.repair:
+        repair(args.session, args.repair)
+    bag_node = "" if args.publish == "commands" else args.node or ""
+    runs = read_runs(args.session, bag_node)
+    for number, session in enumerate(runs, 1):
+        _tell(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
+    if args.repair:
+        print(f"  repaired: {args.repair}")
+    if args.record:
+        _record(runs, args)
+    _say_how_to_see_it(args)
+    if args.as_scene:
+        _branch(runs[-1], args)
+    status = _verify(runs, args) if args.verify else 0
+    if status == 0 and args.publish:
+        status = _publish(runs[-1], args)
+    return status
+
+
+def _check(args: argparse.Namespace) -> None:
+    if (args.at is None) != (args.as_scene is None):
+        raise InputError("--at", args.at, "a time together with --as-scene FILE.yaml")
+    if args.at is not None and not (math.isfinite(args.at) and 0.0 <= args.at <= 1e9):
+        raise InputError("--at", args.at, "seconds from 0 to 1e9")
+    if args.speed is not None and not (math.isfinite(args.speed) and 1e-6 <= args.speed <= 1e6):
+        raise InputError("--speed", args.speed, "a factor from 1e-6 to 1e6")
+    if args.speed is not None and args.publish != "states":
+        raise InputError("--speed", args.speed, "--publish states; a node that flies has real_time_factor")
+    if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
+        raise InputError("--record", args.record, "another file than the session")
+
+
+def _tell(name: str, session) -> None:
     times = session.times
     span = f"{times.min() / 1e9:.9g} s to {times.max() / 1e9:.9g} s" if len(times) else "no time"
-    print(f"{args.session}: {len(times)} states, {span}; {len(session.events)} commands and services")
+    print(f"{name}: {len(times)} states, {span}; {len(session.events)} commands and services")
     if not session.complete:
         print(f"  not finished: {session.readable_bytes} of {session.file_bytes} bytes are whole")
+    if session.missing:
+        print(f"  without {', '.join(session.missing)}")
     for time_ns, line in session.refusals:
         print(f"  refused at {time_ns / 1e9:.9g} s: {line}")
-    if args.record:
-        _record(session, args.record)
-    print(f"  open it with: rerun {args.record or args.session}")
-    if not args.verify:
-        return 0
-    from ..replay import verify
 
-    difference = verify(session, _progress)
-    if difference is None:
-        print("  verified: every command and state is the same to the bit")
-        return 0
-    print(f"rigid_proto replay: {args.session}: {difference}", file=sys.stderr)
-    return 1
+
+def _say_how_to_see_it(args: argparse.Namespace) -> None:
+    shown = args.record or (args.session if args.session.endswith(".rrd") else "")
+    if shown.endswith(".rrd"):
+        print(f"  open it with: rerun {shown}")
+    elif not args.record:
+        print("  to see it, make a recording for Rerun: --record FILE.rrd")
+
+
+def _verify(runs: list, args: argparse.Namespace) -> int:
+    from ..session_check import BeganLaterError, verify
+
+    verified = 0
+    for number, session in enumerate(runs, 1):
+        which = f"run {number}: " if len(runs) > 1 else ""
+        try:
+            difference = verify(session, _progress)
+        except BeganLaterError:
+            # What lies before the first reset can't be checked; what follows it can.
+            if number == len(runs) and not verified:
+                raise
+            print(f"  {which}began before the recording did; not checked")
+            continue
+        if difference is not None:
+            print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
+            return 1
+        verified += 1
+    print("  verified: every command and state is the same to the bit")
+    return 0
 
 
 def _progress(done: float) -> None:
@@ -48,18 +113,58 @@ def _progress(done: float) -> None:
         print(f"\r{100 * done:3.0f} % verified", end="\r", file=sys.stderr, flush=True)
 
 
-def _record(session, path: str) -> None:
-    from ..offline import tell_start
-    from ..replay import Resimulation, session_scenario
-    from ..rerun_view import RerunObserver
+def _record(runs: list, args: argparse.Namespace) -> None:
+    from ..session_playback import play
+    from ..session_recorder import make_recorder
 
-    scenario = session_scenario(session)
-    observer = RerunObserver(record=path)
+    given = _given_scene(args)
+    for session in runs:
+        if not session.scene and given is None:
+            raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
+    recorder = make_recorder(args.record, runs[-1].node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
     try:
-        tell_start(observer, scenario)
-        again = Resimulation(scenario, [line for _, line in session.events], observer)
-        again.simulation.announce()
-        for time_ns in sorted(session.times.tolist()):
-            observer.state(time_ns, again.advance(time_ns))
+        for number, session in enumerate(runs):
+            if number:
+                recorder.reset()
+            play(session, recorder, given)
     finally:
-        observer.close()
+        recorder.close()
+    if error := getattr(recorder, "error", ""):
+        raise InputError("--record", args.record, f"a file that can be written ({error})")
+
+
+def _given_scene(args: argparse.Namespace):
+    if not args.scene:
+        return None
+    from ..offline import read_scene
+
+    return read_scene(args.scene, None, lambda text: print(f"rigid_proto replay: {text}", file=sys.stderr))
+
+
+def _branch(session, args: argparse.Namespace) -> None:
+    from ..scenario import nanoseconds
+    from ..session_branch import branch_at, recorded_branch
+
+    given, time_ns = _given_scene(args), nanoseconds(args.at)
+    if given is None and session.missing:
+        raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", "--scene FILE with it")
+    branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)
+    scene = Path(args.as_scene)
+    scene.write_text(branch.scene, encoding="utf-8")
+    print(f"  scene at {args.at:g} s: {scene}")
+    if branch.pokes:
+        pokes = scene.with_name(f"{scene.stem}_pokes.yaml")
+        pokes.write_text(branch.pokes_text, encoding="utf-8")
+        print(f"  what was acting then, no scene can say: fly it with --script {pokes}")
+    for note in branch.notes:
+        print(f"  {note}")
+
+
+def _publish(session, args: argparse.Namespace) -> int:
+    try:
+        from ..ros import replay_publisher
+    except ImportError as error:
+        raise InputError("--publish", args.publish, f"rclpy to be installed ({error})") from None
+    if args.publish == "states":
+        return replay_publisher.publish_states(session, args.speed or 1.0)
+    return replay_publisher.publish_commands(session, args.node or f"/{session.node_name}")

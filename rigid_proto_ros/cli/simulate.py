@@ -19,6 +19,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="simulated seconds (default 10)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter")
     parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
+    parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(run=run)
 
@@ -28,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from ..offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
     from ..poke_script import read_script
     from ..scenario import nanoseconds
+    from ..session_recorder import is_mcap
 
     if not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
         raise InputError("--duration", args.duration, "seconds from 0 to 1e9")
@@ -35,12 +37,10 @@ def run(args: argparse.Namespace) -> int:
     for warning in scenario.warnings:
         _warn(warning)
     script = read_script(args.script, scenario.values["wrench_timeout"]) if args.script else []
-    observer = None
-    record = args.record or scenario.values["record"]
-    if record:
-        from ..rerun_view import RerunObserver
-
-        observer = RerunObserver(record=record)
+    recordings = [file for file in (args.record or scenario.values["record"], args.bag) if file]
+    if args.bag and not is_mcap(args.bag):
+        raise InputError("--bag", args.bag, "a file that ends in .mcap")
+    observer = _recorder(recordings, scenario.values)
     try:
         flight = OfflineRun(scenario, script, observer)
         wall_time = run_with_progress(flight, nanoseconds(args.duration))
@@ -53,18 +53,36 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(result))
     else:
-        _print_summary(result, record)
+        _print_summary(result, recordings)
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1
     return 0
 
 
+def _recorder(files: list[str], values):
+    """One observer that records to all of these files; None without any."""
+    if not files:
+        return None
+    from ..core.observer import Observers
+    from ..session_recorder import make_recorder
+
+    opened: list = []
+    try:
+        for file in files:
+            opened.append(make_recorder(file, values=values, on_error=_warn, simulated_log=True))
+    except InputError:
+        for recorder in opened:
+            recorder.close()
+        raise
+    return Observers(*opened)
+
+
 def _warn(message: str) -> None:
     print(f"rigid_proto simulate: {message}", file=sys.stderr)
 
 
-def _print_summary(result: dict, record: str) -> None:
+def _print_summary(result: dict, recordings: list[str]) -> None:
     def vector(name: str) -> str:
         return "  ".join(f"{x: .9g}" for x in result[name])
 
@@ -77,5 +95,5 @@ def _print_summary(result: dict, record: str) -> None:
     print(f"L (world)      {vector('angular_momentum')} N m s")
     print(f"integrator     {result['integrator']}, {result['steps']} steps")
     print(f"state hash     {result['state_hash']}")
-    if record:
-        print(f"recorded       {record}; open it with: rerun {record}")
+    for file in recordings:
+        print(f"recorded       {file}; open it with: rigid_proto replay {file}")

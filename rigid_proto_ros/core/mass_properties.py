@@ -104,7 +104,7 @@ def _loaded(mass, center, second, stretch, reference, points):
             offset[k] = place - moved[k]
         for i in range(3):
             for j in range(3):
-                gathered[i, j] += m * offset[i] * offset[j]
+                gathered[i, j] += m * (offset[i] * offset[j])  # symmetric to the bit
     inertia = np.empty((3, 3))
     for i in range(3):
         for j in range(3):

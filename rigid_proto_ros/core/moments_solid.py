@@ -28,6 +28,16 @@ def _accumulate(total: np.ndarray, carry: np.ndarray, k: int, value: float) -> N
     carry[k] += error
 
 
+# Apart from the sums, since no reassociation may touch it: these subtractions are exact, sums of three corners aren't.
+@njit(cache=True, nogil=True)
+def _centre(w: np.ndarray, count: int, rx: float, ry: float, rz: float, factor: float) -> None:
+    for corner in range(3):
+        for t in range(count):
+            w[3 * corner, t] = (w[3 * corner, t] - rx) * factor
+            w[3 * corner + 1, t] = (w[3 * corner + 1, t] - ry) * factor
+            w[3 * corner + 2, t] = (w[3 * corner + 2, t] - rz) * factor
+
+
 # Contraction and reassociation only choose the order and the fusing of the block's own sums; every such order has the
 # bound BLOCK·2⁻⁵³·Σ|terms|. Neither infinities nor NaN nor signed zeros are assumed away.
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
@@ -86,9 +96,10 @@ def blocked_sums(vertices, triangles, first, last, reference, factor):
                 if np.uint64(i) >= known:  # negative numbers wrap to large ones
                     total[10] = -1.0
                     return total, carry
-                w[3 * corner, t] = (vertices[i, 0] - rx) * factor
-                w[3 * corner + 1, t] = (vertices[i, 1] - ry) * factor
-                w[3 * corner + 2, t] = (vertices[i, 2] - rz) * factor
+                w[3 * corner, t] = vertices[i, 0]
+                w[3 * corner + 1, t] = vertices[i, 1]
+                w[3 * corner + 2, t] = vertices[i, 2]
+        _centre(w, size, rx, ry, rz, factor)
         _block_sums(w, size, total, carry)
     return total, carry
 

@@ -113,6 +113,9 @@ class Observer:
     def status(self, time_ns: int, track: str, value: str) -> None:
         """From ``time_ns`` on ``track`` is ``value``, such as motion: flying, sleeping, paused; string: taut, slack."""
 
+    def effort(self, time_ns: int, steps: int, force_evaluations: int) -> None:
+        """What the motion has cost since start or reset, some times a simulated second."""
+
     def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
         """A second body that gets the same commands is this one from ``time_ns`` on."""
 

@@ -42,6 +42,9 @@ from .string_control import StringControl
 NEVER = 1 << 63
 """Later than any simulated time [ns]."""
 
+EFFORT_PERIOD_NS = 50_000_000
+"""[ns, simulated] How often observers are told what the motion has cost."""
+
 
 @dataclass
 class _Acting:
@@ -247,6 +250,9 @@ class Simulation:
             if self._told.get(track) != value:
                 self._told[track] = value
                 self.observer.status(self.time_ns, track, value)
+        if self.time_ns >= self._next_effort_ns:
+            self._next_effort_ns = self.time_ns + EFFORT_PERIOD_NS
+            self.observer.effort(self.time_ns, self.steps, self.force_evaluations)
 
     def advance(self, until_ns: int) -> State:
         """Carry the body to ``until_ns`` and return its state there, before what acts at that very time.
@@ -436,6 +442,7 @@ class Simulation:
         self.state = State(0, self.setup.initial.copy())
         self._string = StringControl(self.setup, self.state)
         self._segment = self._new_segment(self.state)
+        self._next_effort_ns = 0
         self._told_string: Tied | None = None
         self._tell_string()
 

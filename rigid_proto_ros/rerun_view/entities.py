@@ -22,6 +22,7 @@ TRAIL = "world/trail"
 STRING = "world/string"
 HAND = "world/string/hand"
 STRING_TENSION = "plots/string_tension"
+STRING_ENERGY = "plots/energy/string"
 
 ANGULAR_VELOCITY = "world/centre/angular_velocity"
 MOMENTUM = "world/centre/angular_momentum"
@@ -52,6 +53,7 @@ ANGULAR_MOMENTUM = "plots/angular_momentum"
 ANGULAR_MOMENTUM_ANGLE = "plots/angular_momentum_angle"
 ANGULAR_VELOCITY_BODY = "plots/angular_velocity_body"
 DRIFT = "plots/drift"
+EFFORT = "plots/effort"
 GHOST_ANGLE = "plots/ghost_angle"
 
 STATUS = "status"
@@ -81,10 +83,12 @@ LOAD_COLOURS = {"wrench": ORANGE, "poke": (255, 80, 80), "impulse": (255, 70, 20
 TORQUE_COLOUR = (255, 210, 120)
 
 SERIES = {
-    ENERGY: (("translational", BLUE), ("rotational", ORANGE), ("potential", GREEN), ("total", GREY)),
+    ENERGY: (("translational", BLUE), ("rotational", ORANGE), ("gravity", GREEN), ("sum of these", GREY)),
     ANGULAR_MOMENTUM: (("Lx", RED), ("Ly", GREEN), ("Lz", BLUE), ("|L|", GREY)),
     ANGULAR_MOMENTUM_ANGLE: (("angle of L to its start", VIOLET),),
     DRIFT: (("energy, relative", ORANGE), ("L as a vector, relative", VIOLET)),
+    EFFORT: (("steps", BLUE), ("force evaluations", ORANGE)),
+    STRING_ENERGY: (("string, elastic", YELLOW),),
     STRING_TENSION: (("string", ORANGE),),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
     ANGULAR_VELOCITY_BODY: (("ω1", RED), ("ω2", GREEN), ("ω3", BLUE)),

@@ -58,7 +58,7 @@ def debugging(size: float) -> Any:
                 command_view(),
                 rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
             ),
-            row_shares=[3, 1, 1],
+            row_shares=[5, 3, 2],
         ),
         rrb.Grid(
             plot(e.ENERGY, "Energy [J]"),
@@ -68,6 +68,7 @@ def debugging(size: float) -> Any:
             plot(e.DRIFT, "Drift since the last command"),
             plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]"),
             plot(e.STRING_TENSION, "Tension of the string [N]"),
+            plot(e.EFFORT, "Effort per simulated second"),
             grid_columns=2,
         ),
         name="Debugging",

@@ -32,7 +32,7 @@ INITIAL_VIEWS = ("lesson", "debugging", "plain")
 
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
-LIVE_MEMORY_LIMIT = "256MiB"
+LIVE_MEMORY_LIMIT = "64MiB"
 """What the server keeps for viewers that come late; the oldest is dropped first."""
 
 _REMEMBERED = ("started", "mesh_changed", "body_changed", "scene_changed", "string_changed", "ghost_began")
@@ -134,6 +134,10 @@ class RerunObserver(Observer):
     def status(self, time_ns: int, track: str, value: str) -> None:
         """Note that a lane of the state line changes."""
         self._mark(time_ns, "status", track, value)
+
+    def effort(self, time_ns: int, steps: int, force_evaluations: int) -> None:
+        """Note what the motion has cost."""
+        self._mark(time_ns, "effort", steps, force_evaluations)
 
     def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
         """Note the ghost from ``time_ns`` on."""

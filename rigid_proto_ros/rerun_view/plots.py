@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.observer import BodySnapshot
 from . import entities as e
-from .columns import Send, scalar_columns
+from .columns import Send, scalar_columns, time_columns
 from .derived import angle_to, derive
 
 
@@ -19,6 +19,24 @@ class Plots:
     def __init__(self) -> None:
         self._momentum_at_start: np.ndarray | None = None
         self._free_from: tuple[float, np.ndarray] | None = None
+        self._effort_before: tuple[int, int, int] | None = None
+        self._efforts: list[tuple[int, int, float, float]] = []
+
+    def effort(self, time_ns: int, wall_ns: int, steps: int, force_evaluations: int) -> None:
+        """What the motion has cost up to ``time_ns``; plotted as rates since it was told before."""
+        if self._effort_before is not None and time_ns > self._effort_before[0]:
+            before_ns, steps_before, evaluations_before = self._effort_before
+            seconds = 1e-9 * (time_ns - before_ns)
+            rates = ((steps - steps_before) / seconds, (force_evaluations - evaluations_before) / seconds)
+            self._efforts.append((time_ns, wall_ns, *rates))
+        self._effort_before = (time_ns, steps, force_evaluations)
+
+    def send_effort(self, send: Send) -> None:
+        """Send the rates collected so far."""
+        if self._efforts:
+            times_ns, walls, *rates = zip(*self._efforts, strict=True)
+            send(e.EFFORT, time_columns(np.array(times_ns), np.array(walls)), scalar_columns(np.column_stack(rates)))
+            self._efforts.clear()
 
     def disturbed(self) -> None:
         """A load or a change of the body: drift counts anew from the next state."""

@@ -53,6 +53,7 @@ class StringPicture:
         self._strips: list[np.ndarray] = []
         self._hands: list[np.ndarray] = []
         self._tensions: list[np.ndarray] = []
+        self._energies: list[np.ndarray] = []
         self._counts: list[np.ndarray] = []
 
     @property
@@ -68,6 +69,7 @@ class StringPicture:
             self._walls.append(np.array([wall_ns]))
             self._counts.append(np.zeros(1, dtype=int))
             self._tensions.append(np.zeros(1))
+            self._energies.append(np.zeros(1))
             self._shown = False
         self._string = string
 
@@ -90,6 +92,9 @@ class StringPicture:
         self._walls.append(block.walls[chosen])
         self._counts.append(np.ones(len(chosen), dtype=int))
         self._tensions.append(tension)
+        stretch = distance - string.rest_length
+        stretch = stretch if string.bilateral else np.maximum(stretch, 0.0)
+        self._energies.append(0.5 * string.stiffness * stretch**2)
         self._hands.append(free_end)
         self._strips.extend(_drawn(string, free_end, span, distance))
         self._shown = True
@@ -107,6 +112,7 @@ class StringPicture:
         hands = np.concatenate(self._hands) if self._hands else np.empty((0, 3))
         send(e.HAND, times, rr.Points3D.columns(positions=hands).partition(counts))
         send(e.STRING_TENSION, times, scalar_columns(tensions[:, np.newaxis]))
+        send(e.STRING_ENERGY, times, scalar_columns(np.concatenate(self._energies)[:, np.newaxis]))
         self._reset()
 
 

@@ -137,6 +137,7 @@ class SceneWriter:
         self._write_rows(block, begin, end)
         self._loads.send(self._send)
         self._string.send(self._send)
+        self._plots.send_effort(self._send)
         self._words.send(self._send)
         self._lanes.send(self._send)
 
@@ -168,6 +169,9 @@ class SceneWriter:
 
     def _status(self, mark: Mark) -> None:
         self._lane(mark, *mark.content)
+
+    def _effort(self, mark: Mark) -> None:
+        self._plots.effort(mark.time_ns, mark.wall_ns, *mark.content)
 
     def _event(self, mark: Mark) -> None:
         self._words.event(mark.time_ns, mark.wall_ns, *mark.content)
@@ -228,7 +232,10 @@ class SceneWriter:
 
     def _send_styles(self, stream: Stream) -> None:
         send_styles(stream, self._size)
-        stream.send_blueprint(layout(self._view_size, self._initial_view, self._ghost_body is not None))
+        ghost = self._ghost_body is not None
+        if not stream.is_framed_for(self._view_size, ghost):
+            stream.send_blueprint(layout(self._view_size, self._initial_view, ghost))
+            stream.framed = (self._view_size, ghost)
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None:
@@ -323,6 +330,7 @@ _ALONG_WITH_ROWS = {
     "string_changed": SceneWriter._string_changed,
     "scene_changed": SceneWriter._scene_changed,
     "status": SceneWriter._status,
+    "effort": SceneWriter._effort,
     "event": SceneWriter._event,
     "refused": SceneWriter._refused,
 }

@@ -111,23 +111,35 @@ def _warn(warning: str) -> None:
 
 
 def _make_observer(scenario, node_name: str):
-    """Rerun is imported only when something is to be shown or recorded."""
-    from ..core.observer import Observer
+    """Rerun is imported only when something is to be shown or recorded with it."""
+    from ..core.observer import Observer, Observers
+    from ..session_recorder import is_mcap, make_recorder
+
+    def tell(line: str) -> None:
+        print(f"{node_name}: {line}", file=sys.stderr)
 
     values = scenario.values
-    if not values["record"] and values["viewer"] == "none":
-        return Observer()
-    from ..rerun_view import RerunObserver
+    record, observers = values["record"], []
+    if is_mcap(record):
+        observers.append(make_recorder(record, node_name, values, tell))
+        record = ""
+    if record or values["viewer"] != "none":
+        from ..rerun_view import RerunObserver
 
-    return RerunObserver(
-        record=values["record"],
-        viewer=values["viewer"],
-        rerun_port=_asked_for(values, "rerun_port"),
-        web_port=_asked_for(values, "web_port"),
-        name=node_name,
-        report=lambda line: print(f"{node_name}: {line}", file=sys.stderr),
-        on_error=lambda line: print(f"{node_name}: {line}", file=sys.stderr),
-    )
+        observers.append(
+            RerunObserver(
+                record=record,
+                viewer=values["viewer"],
+                rerun_port=_asked_for(values, "rerun_port"),
+                web_port=_asked_for(values, "web_port"),
+                name=node_name,
+                report=tell,
+                on_error=tell,
+            )
+        )
+    if len(observers) < 2:
+        return observers[0] if observers else Observer()
+    return Observers(*observers)
 
 
 def _asked_for(values, port: str) -> int | None:

@@ -73,7 +73,11 @@ def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
     wx = 0.0 if abs(wx) < NO_SPIN else wx
     wy = 0.0 if abs(wy) < NO_SPIN else wy
     wz = 0.0 if abs(wz) < NO_SPIN else wz
-    side = i3 * (i3 - i2) * wz * wz - i1 * (i2 - i1) * wx * wx
+    third, first = i3 * (i3 - i2) * wz * wz, i1 * (i2 - i1) * wx * wx
+    side = third - first
+    if abs(side) < 1e-14 * third:
+        # The sign is in digits that doubles have lost.
+        side = _side_of_separatrix(i1, i2, i3, wx, wz)
     about_third = side > 0.0 if side != 0.0 else i3 - i2 >= i2 - i1
     if about_third:
         A, B, C, u, v, w = i1, i2, i3, wx, wy, wz
@@ -145,6 +149,15 @@ def _short(A, B, C, w1, w2, w3, P, rate, m, h):
     d1 = (w1 * (beta * ss - less_c) - (C - B) / A * w2 * w3 * S * d) / bottom
     d2 = (w2 * (beta * ss - less_c - c * less_d) + (C - A) / B * w1 * w3 * S) / bottom
     d3 = (w3 * (beta * ss - less_d) - twist * S * c) / bottom
+    # Roundings of S, c and d are the same every step; what they do to Q and P is taken out, lest it add up.
+    gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
+    Q = A * gca * w1 * w1 + B * gcb * w2 * w2
+    excess = 0.5 * (A * gca * d1 * (2.0 * w1 + d1) + B * gcb * d2 * (2.0 * w2 + d2)) / Q
+    d1, d2 = d1 - excess * (w1 + d1), d2 - excess * (w2 + d2)
+    share = C * gca * w3 * w3
+    # Where the third axis has a small share in P, Q keeps P as well.
+    if share > 0.5 * P:
+        d3 -= 0.5 * (B * gba * d2 * (2.0 * w2 + d2) + C * gca * d3 * (2.0 * w3 + d3)) / share * (w3 + d3)
     M1, M2, M3 = A * w1, B * w2, C * w3
     L = math.sqrt(M1 * M1 + M2 * M2 + M3 * M3)
     E2 = w1 * M1 + w2 * M2 + w3 * M3
@@ -169,7 +182,7 @@ def _short(A, B, C, w1, w2, w3, P, rate, m, h):
 def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
     """w and ψ after any h."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
-    m, m1 = gba * Q / (gcb * P), gca * _distance_from_separatrix(A, B, C, w1, w3) / (gcb * P)
+    m, m1 = gba * Q / (gcb * P), gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P)
     M1, M2, M3 = A * w1, B * w2, C * w3
     L = math.sqrt(M1 * M1 + M2 * M2 + M3 * M3)
     E2 = w1 * M1 + w2 * M2 + w3 * M3
@@ -217,8 +230,8 @@ def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _distance_from_separatrix(A, B, C, w1, w3):
-    """C|C−B| w₃² − A|B−A| w₁² ≥ 0 in pairs of doubles: near the separatrix the motion hangs on its last digits."""
+def _side_of_separatrix(A, B, C, w1, w3):
+    """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion hangs on its last digits."""
     g, g_low = two_sum(C, -B)
     x, x_low = pair_multiply(g, g_low, C, 0.0)
     s, s_low = two_product(w3, w3)
@@ -228,7 +241,7 @@ def _distance_from_separatrix(A, B, C, w1, w3):
     s, s_low = two_product(w1, w1)
     y, y_low = pair_multiply(y, y_low, s, s_low)
     distance, _ = pair_add(x, x_low, -y, -y_low)
-    return abs(distance)
+    return distance
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""What `auto` costs against the cheapest catalogue integrator that keeps the same error rate.
+
+For a scene and an accuracy, `auto` flies it first. Starts of steps are then taken from that flight, and each catalogue
+integrator is given the largest fixed step of a √2 grid whose local error stays within accuracy·h on all of them; the
+cheapest of these by run time is what a well-informed user would have picked. Both are timed as whole simulations.
+
+    python benchmarks/auto_cost.py [--scenes N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE.parent / "test")]
+
+from random_scenes import DURATION_S, random_scene
+
+from problems import PROBLEMS
+from result_table import ResultTable
+from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.core.integrators import INTEGRATORS
+from rigid_proto_ros.core.integrators.error_measure import FLOOR, scales, size
+from work_precision_ours import simulation_of
+
+ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)
+GRID = [2.0 ** (-k / 2) for k in range(44)]
+"""Fixed steps [s] from 1 s down to 0.3 µs."""
+STARTS = 40
+MOST_EVALUATIONS = 2e7
+"""Beyond it a fixed step takes seconds and is never the cheapest."""
+SUBSTEPS = 16
+COLUMNS = (
+    "scene",
+    "accuracy",
+    "auto_s",
+    "auto_choice",
+    "auto_steps",
+    "floor_binds",
+    "catalogue_s",
+    "catalogue_integrator",
+    "catalogue_step_s",
+    "ratio",
+)
+
+
+@njit(cache=False)
+def _difference(y, exact, p, elapsed):
+    """Local error of y in the measure of ``accuracy``; the quaternion is taken in its nearer sign."""
+    e = y - exact
+    attitude, spin, place, speed = scales(exact, p, elapsed)
+    return size(e, attitude, spin, place, speed)
+
+
+def starts_of(simulation, until_ns: int, count: int) -> list[tuple]:
+    """(problem, variables, time in the segment [s], time left in it [s]) at random times of a flight."""
+    rng = np.random.default_rng(1)
+    found = []
+    for at_ns in np.sort(rng.integers(1, until_ns, count)):
+        simulation.advance(int(at_ns))
+        segment = simulation._segment
+        if simulation._segment.start.time_ns == at_ns:
+            continue
+        y = segment._variables.copy()
+        if segment.stepper.look(y, segment._problem, int(at_ns) - segment.committed_ns):
+            found.append((segment._problem.copy(), y, (at_ns - segment.start.time_ns) * 1e-9))
+    return found
+
+
+def keeps_rate(integrator, starts, h: float, accuracy: float) -> bool:
+    """Whether one step of h from each start errs at most accuracy·h, judged by dop853 in many substeps."""
+    exact = INTEGRATORS["dop853"]
+    for p, y, elapsed in starts:
+        mine, fine = y.copy(), y.copy()
+        if integrator.kernel_for(p)(mine, p, h, 1) != 1:
+            return False
+        if exact.kernel_for(p)(fine, p, h / SUBSTEPS, SUBSTEPS) != SUBSTEPS:
+            return False
+        # Rounding of the judge's own substeps is not the judged one's.
+        if not _difference(mine, fine, p, elapsed + h) <= accuracy * h + 2.0 * FLOOR:
+            return False
+    return True
+
+
+def run_time(make, until_ns: int) -> tuple[float, object]:
+    """Median seconds of whole flights, and the last of them."""
+    times = []
+    while len(times) < 3 or (len(times) < 15 and sum(times) < 0.05):
+        simulation = make()
+        begin = time.perf_counter()
+        simulation.advance(until_ns)
+        times.append(time.perf_counter() - begin)
+        if sum(times) > 2.0:
+            break
+    return float(np.median(times)), simulation
+
+
+def compare(name: str, make, until_ns: int, accuracy: float) -> dict:
+    """One row: auto and the cheapest of the catalogue. make(integrator, accuracy, step) gives a fresh Simulation."""
+    make("auto", accuracy, 1e-3).advance(until_ns)
+    auto_s, flown = run_time(lambda: make("auto", accuracy, 1e-3), until_ns)
+    starts = starts_of(make("auto", accuracy, 1e-3), until_ns, STARTS)
+    best = (math.nan, "none", math.nan)
+    for _, h, candidate in sorted(_able(make, starts, until_ns * 1e-9, accuracy)):
+        # At 20 ns an evaluation, less than any takes, its steps alone would be longer than the best so far.
+        if until_ns * 1e-9 / h * max(1, INTEGRATORS[candidate].evaluations) * 20e-9 > best[0]:
+            continue
+        make(candidate, accuracy, h).advance(min(until_ns, round(3e9 * h)))
+        seconds, simulation = run_time(lambda c=candidate, h=h: make(c, accuracy, h), until_ns)
+        if not (simulation.failure or simulation.refused) and not seconds >= best[0]:
+            best = (seconds, candidate, h)
+    return {
+        "scene": name,
+        "accuracy": accuracy,
+        "auto_s": auto_s,
+        "auto_choice": flown.choice.replace(",", ";"),
+        "auto_steps": flown.steps,
+        "floor_binds": flown.floor_binds,
+        "catalogue_s": best[0],
+        "catalogue_integrator": best[1],
+        "catalogue_step_s": best[2],
+        "ratio": auto_s / best[0],
+    }
+
+
+def _able(make, starts, duration: float, accuracy: float) -> list[tuple[float, float, str]]:
+    """(evaluations needed, step [s], name) of every catalogue integrator that keeps the rate at some step of the grid."""
+    found = []
+    for name, integrator in INTEGRATORS.items():
+        if integrator.kernel is None:
+            continue
+        try:
+            make(name, accuracy, 1e-3)
+        except InputError:
+            continue
+        h = _largest_step(integrator, starts, duration, accuracy)
+        if h is not None and duration / h * integrator.evaluations <= MOST_EVALUATIONS:
+            found.append((duration / h * integrator.evaluations, h, name))
+    return found
+
+
+def _largest_step(integrator, starts, duration: float, accuracy: float) -> float | None:
+    """The largest step of the grid at which the rate is kept, by bisection; the exact one may take the whole duration."""
+    if integrator.order is None and keeps_rate(integrator, starts, duration, accuracy):
+        return duration
+    grid = [h for h in GRID if h <= duration]
+    low, high = 0, len(grid)
+    while low < high:
+        middle = (low + high) // 2
+        if keeps_rate(integrator, starts, grid[middle], accuracy):
+            high = middle
+        else:
+            low = middle + 1
+    return grid[low] if low < len(grid) else None
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=int, default=60)
+    parser.add_argument("--out", type=Path, default=HERE / "results")
+    options = parser.parse_args()
+    table = ResultTable(options.out / "work_precision_auto.csv", COLUMNS)
+    for name in ("P1", "P2", "P2x100", "P4rod", "P4plate", "heavy", "damped", "pokes"):
+        problem = PROBLEMS[name]
+        for accuracy in ACCURACIES:
+            table.add(
+                compare(
+                    name,
+                    lambda integrator, accuracy, step, p=problem: _checked(
+                        simulation_of(p, integrator, step, accuracy)
+                    ),
+                    round(problem.duration * 1e9),
+                    accuracy,
+                )
+            )
+    for seed in range(options.scenes):
+        sys.stderr.write(f"\rscene {seed + 1}/{options.scenes}")
+        for accuracy in ACCURACIES:
+            table.add(
+                compare(
+                    f"random{seed}",
+                    lambda integrator, accuracy, step, s=seed: random_scene(s, integrator, accuracy, step),
+                    round(DURATION_S * 1e9),
+                    accuracy,
+                )
+            )
+    sys.stderr.write("\n")
+    table.write()
+    for line in summary(table.rows):
+        print(line)
+
+
+def _checked(simulation):
+    if simulation is None:
+        raise InputError("integrator", "", "one that carries the problem")
+    return simulation
+
+
+def summary(rows: list[dict]) -> list[str]:
+    """Median, 95 % and worst of the ratio over all scenes, and the problems one by one."""
+    lines = []
+    ratios = np.array([r["ratio"] for r in rows if str(r["scene"]).startswith("random") and math.isfinite(r["ratio"])])
+    if ratios.size:
+        lines.append(
+            f"auto / cheapest catalogue, {ratios.size} of random scenes and accuracies: median {np.median(ratios):.2f} "
+            f"(target 1.5), 95 % {np.quantile(ratios, 0.95):.2f} (target 3), worst {ratios.max():.2f}"
+        )
+    alone = sum(str(r["scene"]).startswith("random") and not math.isfinite(r["ratio"]) for r in rows)
+    lines.append(f"kept by auto alone, by no fixed step of the catalogue: {alone}")
+    lines += [
+        f"{r['scene']} at {r['accuracy']:g}: auto {r['auto_s'] * 1e6:.0f} us, {r['catalogue_integrator']} "
+        f"{r['catalogue_s'] * 1e6:.0f} us at h = {r['catalogue_step_s']:.3g} s: {r['ratio']:.2f}"
+        for r in rows
+        if not str(r["scene"]).startswith("random")
+    ]
+    return lines
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""A recorded session over ROS once more: its states with their own stamps, or its commands to a node that flies."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.signals import SignalHandlerOptions
+
+from .. import cdr
+from ..core.errors import InputError
+from ..poke_script import ScriptCommand
+from ..recorded_session import RecordedSession
+from ..scene_file import read_scene_text
+from ..session_messages import PROJECTIONS, StampedRows, inertia_bytes
+from ..session_playback import sorted_states
+from ..session_runs import decode_event
+from . import qos
+from .script_sender import ScriptSender
+
+WAIT_FOR_SUBSCRIBERS_S = 3.0
+"""States wait this long for somebody to listen; then they go out all the same."""
+
+NOT_SENT = ("record", "viewer")
+"""Parameters of the recording node's own surroundings: sent to another, they would overwrite its recordings."""
+
+
+@dataclass(frozen=True)
+class InertiaCommand(ScriptCommand):
+    """An inertia message: mass, then com (3,) and tensor (6,) as ``numbers``."""
+
+    numbers: tuple = ()
+
+    @property
+    def topic(self) -> str:
+        """Below the node's name."""
+        return "inertia/set"
+
+    def message(self, stamp_ns: int) -> bytes:
+        """The message as it goes over the topic."""
+        return inertia_bytes(stamp_ns, self.frame_id, self.numbers[0], self.numbers[1:4], self.numbers[4:])
+
+
+class CommandSender(ScriptSender):
+    """Sends a session's commands; beside a script's these may be inertia messages."""
+
+    def __init__(self, node_name: str, timeout_s: float = 10.0) -> None:
+        super().__init__(node_name, timeout_s)
+        inertia = self.create_publisher(InertiaStamped, f"{self.target}/inertia/set", qos.COMMAND)
+        self._topics["inertia/set"] = inertia
+        self._spin_until(lambda: inertia.get_subscription_count() > 0, f"{self.target} to listen for inertia")
+
+
+def publish_commands(session: RecordedSession, node_name: str) -> int:
+    """Reset the node and send it the session's commands, each at its time; returns the exit status, 1 if any was late.
+
+    Raises InputError when no such node answers.
+    """
+    commands = session_commands(session)
+    with _context():
+        sender = CommandSender(node_name)
+        try:
+            report = sender.send(commands, reset=True)
+        finally:
+            sender.destroy_node()
+    print(f"  {report.text}")
+    return 0 if report.all_in_time else 1
+
+
+def session_commands(session: RecordedSession) -> list[ScriptCommand]:
+    """What moved the body, at the times at which it acted; pauses and steps are of the clock alone."""
+    commands = []
+    for number, line in enumerate(session.lines, 1):
+        time_ns, kind, content = decode_event(line, number)
+        try:
+            commands += _command(time_ns, kind, content)
+        except (KeyError, TypeError, ValueError):
+            raise InputError(f"event {number}", str(content)[:80], "the content of a recorded event") from None
+    return commands
+
+
+def _command(time_ns: int, kind: str, content: dict) -> Iterator[ScriptCommand]:
+    if kind in ("wrench", "poke"):
+        force, torque = tuple(map(float, content["force"])), tuple(map(float, content["torque"]))
+        yield ScriptCommand(time_ns, kind, content["frame_id"], force, torque)
+    elif kind in ("string_target", "string_attach"):
+        yield ScriptCommand(time_ns, kind, content["frame_id"], point=tuple(map(float, content["point"])))
+    elif kind == "set":
+        changes = {name: value for name, value in content.items() if name not in NOT_SENT}
+        if changes:
+            yield ScriptCommand(time_ns, kind, changes=changes)
+    elif kind == "inertia":
+        numbers = tuple(map(float, (content["mass"], *content["com"], *content["tensor"])))
+        yield InertiaCommand(time_ns, kind, content["frame_id"], numbers=numbers)
+    elif kind in ("clear_wrench", "string_release"):
+        yield ScriptCommand(time_ns, kind)
+
+
+def publish_states(session: RecordedSession, speed: float) -> int:
+    """Publish the recorded states on the topics that they came from, with their stamps; returns the exit status."""
+    if not len(session.times):
+        raise InputError("session", "no states", "a session with states to publish")
+    with _context():
+        node = rclpy.create_node("replay", start_parameter_services=False, enable_rosout=False)
+        try:
+            _send_states(node, session, speed)
+        finally:
+            node.destroy_node()
+    return 0
+
+
+def _send_states(node, session: RecordedSession, speed: float) -> None:
+    types = {"pose": PoseStamped, "twist": TwistStamped, "odom": Odometry}
+    streams, senders = _streams(session), {}
+    for name in streams:
+        publisher = node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE)
+        senders[name] = (publisher, _template(name, session))
+    deadline = time.monotonic() + WAIT_FOR_SUBSCRIBERS_S
+    while time.monotonic() < deadline and not any(p.get_subscription_count() for p, _ in senders.values()):
+        rclpy.spin_once(node, timeout_sec=0.05)
+    merged = sorted(
+        ((t, k, name) for name, rows in streams.items() for k, t in enumerate(rows.times.tolist())),
+        key=lambda message: message[0],
+    )
+    first_ns, begin = merged[0][0], time.monotonic()
+    for time_ns, k, name in merged:
+        rest_s = begin + 1e-9 * (time_ns - first_ns) / speed - time.monotonic()
+        if rest_s > 0.0:
+            time.sleep(rest_s)
+        publisher, pack = senders[name]
+        publisher.publish(pack(time_ns, streams[name].rows[k].tolist()))
+    for publisher, _ in senders.values():
+        publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
+
+
+def _streams(session: RecordedSession) -> dict[str, StampedRows]:
+    """What is to be published: the very numbers where a bag holds them, else what the node makes of a state."""
+    if session.published:
+        return {name: rows for name, rows in session.published.items() if len(rows)}
+    states = list(sorted_states(session))
+    times = np.array([time_ns for time_ns, _ in states], dtype=np.int64)
+    return {
+        name: StampedRows(times, np.array([project(row.tolist()) for _, row in states]))
+        for name, project in PROJECTIONS.items()
+    }
+
+
+def _template(name: str, session: RecordedSession) -> Callable[[int, list[float]], bytes]:
+    """How a row of a topic becomes bytes, with the frames' names that the session flew with."""
+    values = read_scene_text(session.scene, "the recorded scene").values if session.scene else {}
+    world = str(values.get("world_frame") or "world")
+    if name != "odom":
+        template = cdr.StampedTemplate(world, {"pose": 7, "twist": 6}[name])
+        return lambda time_ns, row: bytes(template.pack(time_ns, row))
+    body = str(values.get("body_frame") or session.node_name.rpartition("/")[2])
+    template = cdr.StampedTemplate(world, cdr.ODOMETRY_DOUBLES, child_frame_id=body)
+
+    def pack(time_ns: int, row: list[float]) -> bytes:
+        template.pack(time_ns, row[:7])
+        return bytes(template.pack(time_ns, row[7:], at=cdr.ODOMETRY_TWIST_AT))
+
+    return pack
+
+
+@contextmanager
+def _context():
+    rclpy.init(args=[sys.argv[0]], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: MIT
+"""Refused input: exit status 2 and one line that names what, where and what would be accepted; through the real commands."""
+
+import os
+
+import pytest
+from ros_process import READY_S, refusal, run
+
+from rigid_proto_ros.bundled import scene_path
+from rigid_proto_ros.cli.main import main as rigid_proto
+from rigid_proto_ros.ros.main import main as rigid_body_node
+from rigid_proto_ros.ros.poke_client import main as poke_client
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+MESHES = {
+    "missing.obj": None,
+    "empty.obj": "",
+    "vertices_only.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
+    "text.obj": "this is no mesh\n",
+    "nan.obj": TETRAHEDRON.replace("v 0 0 1", "v 0 0 nan"),
+    "inf.obj": TETRAHEDRON.replace("v 0 0 1", "v 0 0 inf"),
+    "flat.obj": TETRAHEDRON.replace("v 0 0 1", "v 1 1 0"),
+    "point.obj": "v 1 1 1\nv 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+    "open.obj": TETRAHEDRON.replace("f 2 3 4\n", ""),
+    "index.obj": TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"),
+    "what.xyz": TETRAHEDRON,
+}
+
+
+def scene_text(lines: str, section: str = "rigid_body") -> str:
+    indented = "".join(f"    {line}\n" for line in lines.splitlines())
+    return f"{section}:\n  ros__parameters:\n{indented}"
+
+
+SCENES = {
+    "negative_mass": (scene_text("mass: -1.0"), "mass", "-1.0", ">= 0"),
+    "zero_density": (scene_text("density: 0.0"), "density", "0.0", "> 0"),
+    "infinite_mass": (scene_text("mass: .inf"), "mass", "inf", "finite"),
+    "nan_gravity": (scene_text("gravity: [0.0, 0.0, .nan]"), "gravity", "nan", "3 finite numbers"),
+    "short_gravity": (scene_text("gravity: [0.0, 0.0]"), "gravity", "0.0, 0.0", "3 finite numbers"),
+    "long_scale": (scene_text("scale: [1.0, 1.0]"), "scale", "1.0, 1.0", "1 or 3"),
+    "zero_scale": (scene_text("scale: [1.0, 0.0, 1.0]"), "scale", "0.0", "1e-9 <= |s|"),
+    "unknown": (scene_text("gravitation: [0.0, 0.0, 1.0]"), "gravitation", "0.0, 0.0, 1.0", "did you mean gravity?"),
+    "model": (scene_text("inertia_model: wire"), "inertia_model", "wire", "solid"),
+    "integrator": (scene_text("integrator: rk5"), "integrator", "rk5", "rk4"),
+    "text_for_bool": (scene_text("gyroscopic: perhaps"), "gyroscopic", "perhaps", "true or false"),
+    "bool_for_double": (scene_text("mass: true"), "mass", "True", "finite number"),
+    "list_for_double": (scene_text("mass: [1.0]"), "mass", "1.0", "finite number"),
+    "number_for_text": (scene_text("mesh: 5"), "mesh", "5", "text"),
+    "mixed_list": (scene_text("mass: 1.0\ngravity: [0, 0, -9.81]"), "line 4", "seq", "[0.0, 0.0, -9.81]"),
+    "no_value": (scene_text("mass:"), "line 3", "mass", "a value"),
+    "not_yaml": ("rigid_body: {ros__parameters: [", "line 1", "", "valid YAML"),
+    "tab": ("rigid_body:\n\tros__parameters: {}\n", "line 2", "", "valid YAML"),
+    "list": ("- 1\n- 2\n", "line 1", "seq", "a mapping"),
+    "no_section": ("mass: 1.0\n", "line 1", "1.0", "section"),
+    "zero_quaternion": (
+        scene_text("initial.orientation_xyzw: [0.0, 0.0, 0.0, 0.0]"),
+        "initial.orientation",
+        "0.0",
+        "not all",
+    ),
+    "contact_word": (scene_text("contacts.world: [0.0, 0.0, 0.0]"), "contacts.world", "world", "none of"),
+    "flat_tensor": (
+        scene_text('mesh: ""\ninertia_model: explicit\nexplicit_inertia.tensor: [1.0, 0.0, 0.0, 1.0, 0.0, 3.0]'),
+        *("", "", ""),
+    ),
+    "no_mesh": (scene_text('mesh: ""'), "mesh", "''", "explicit"),
+}
+
+SCRIPTS = {
+    "not_yaml": ("- {t: 1", "line"),
+    "mapping": ("t: 1\n", "a list"),
+    "text_entry": ("- hello\n", "entry 1"),
+    "no_time": ("- {force: [0, 0, 1]}\n", "entry 1, t"),
+    "negative_time": ("- {t: -1, force: [0, 0, 1]}\n", "entry 1, t"),
+    "nan_time": ("- {t: .nan, force: [0, 0, 1]}\n", "entry 1, t"),
+    "text_time": ("- {t: soon, force: [0, 0, 1]}\n", "entry 1, t"),
+    "bool_time": ("- {t: true, force: [0, 0, 1]}\n", "entry 1, t"),
+    "nothing": ("- {t: 1, at: com}\n", "entry 1"),
+    "unknown_key": ("- {t: 1, farce: [0, 0, 1]}\n", "farce"),
+    "two_forces": ("- {t: 1, force: [0, 0, 1], push: 1}\n", "one of"),
+    "short_force": ("- {t: 1, force: [0, 1]}\n", "three numbers"),
+    "nan_force": ("- {t: 1, force: [0, 1, .nan]}\n", "entry 1, force"),
+    "text_force": ("- {t: 1, force: up}\n", "three numbers"),
+    "axes": ("- {t: 1, force: [0, 0, 1], axes: moon}\n", "world, body"),
+    "push_and_axes": ("- {t: 1, push: 1, axes: body}\n", "inward normal"),
+    "impulse_and_duration": ("- {t: 1, impulse: [0, 0, 1], duration: 1}\n", "impulses alone"),
+    "zero_duration": ("- {t: 1, force: [0, 0, 1], duration: 0}\n", "duration"),
+    "point": ("- {t: 1, at: {point: [1, 2]}, force: [0, 0, 1]}\n", "point"),
+    "negative_vertex": ("- {t: 1, at: {vertex: -1}, force: [0, 0, 1]}\n", "at"),
+    "vertex": ("- {t: 1, at: {vertex: 123456}, force: [0, 0, 1]}\n", "vertex/0 to vertex/"),
+    "contact": ("- {t: 1, at: nose, force: [0, 0, 1]}\n", "tip"),
+    "ray": ("- {t: 1, at: {ray: {origin: [0, 0, 0], direction: [0, 0, 0]}}, push: 1}\n", "isn't zero"),
+    "push_at_com": ("- {t: 1, at: com, push: 1}\n", "normal"),
+    "set": ("- {t: 1, set: 5}\n", "parameter"),
+    "set_unknown": ("- {t: 1, set: {masse: 5}}\n", "did you mean mass?"),
+    "set_value": ("- {t: 1, set: {mass: heavy}}\n", "finite number"),
+    "service": ("- {t: 1, service: dance}\n", "clear_wrench"),
+    "wrench": ("- {t: 1, wrench: 5}\n", "wrench"),
+    "wrench_impulse": ("- {t: 1, wrench: {impulse: [0, 0, 1]}}\n", "impulse"),
+    "huge": ("- {t: 1, force: [0, 0, 1e90]}\n", "at most"),
+}
+
+
+def one_line(capfd, main, arguments) -> str:
+    """Run a command's main function in this process: as ``refusal``, without an interpreter's start."""
+    try:
+        status = main(arguments)
+    except SystemExit as leaving:
+        status = leaving.code
+    out, err = capfd.readouterr()
+    assert status == 2, (status, out, err)
+    assert len(err.splitlines()) == 1 and not out, (out, err)
+    return err
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_that_bounds_no_solid_is_refused(name, tmp_path, capfd):
+    if MESHES[name] is not None:
+        (tmp_path / name).write_text(MESHES[name])
+    line = one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={tmp_path / name}"])
+    assert name.split(".")[0] in line and "accepted" in line
+
+
+def test_an_unreadable_mesh_or_a_folder_is_refused(tmp_path, capfd):
+    assert "folder" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={tmp_path}"])
+    unreadable = tmp_path / "cow.obj"
+    unreadable.write_text(TETRAHEDRON)
+    unreadable.chmod(0)
+    if os.access(unreadable, os.R_OK):
+        pytest.skip("root reads everything")
+    assert "cow.obj" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={unreadable}"])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_that_makes_no_sense_is_refused(name, tmp_path, capfd):
+    text, *parts = SCENES[name]
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(text)
+    line = one_line(capfd, rigid_proto, ["simulate", str(scene)])
+    assert "accepted" in line
+    for part in parts:
+        assert part in line
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
+    text, part = SCRIPTS[name]
+    script = tmp_path / "pokes.yaml"
+    script.write_text(text)
+    assert part in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--script", str(script)])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["simulate", "nowhere.yaml"], "bundled"),
+        (["simulate", "/"], "/"),
+        (["simulate", "t_handle", "--set", "mass"], "name=value"),
+        (["simulate", "t_handle", "--set", "gravty=[0, 0, 1]"], "did you mean gravity?"),
+        (["simulate", "t_handle", "--set", "mass=-1"], ">= 0"),
+        (["simulate", "t_handle", "--set", "mass=nan"], "finite"),
+        (["simulate", "t_handle", "--set", "gravity=[0, 0, 1"], "3 finite numbers"),
+        (["simulate", "t_handle", "--duration", "-1"], "--duration"),
+        (["simulate", "t_handle", "--duration", "nan"], "--duration"),
+        (["simulate", "t_handle", "--duration", "long"], "--duration"),
+        (["simulate", "t_handle", "--script", "nowhere.yaml"], "nowhere.yaml"),
+        (["simulate"], "SCENE"),
+        (["fly"], "simulate"),
+        (["replay", "nowhere.rrd"], "nowhere.rrd"),
+        (["demo", "--duration", "1"], "--duration"),
+    ],
+)
+def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
+    assert part in one_line(capfd, rigid_proto, arguments)
+
+
+def test_a_binary_file_is_no_scene_script_or_session(tmp_path, capfd):
+    binary = tmp_path / "cow.bin"
+    binary.write_bytes(bytes(range(256)) * 10)
+    for arguments in (["simulate", binary], ["simulate", "t_handle", "--script", binary], ["replay", binary]):
+        assert "cow.bin" in one_line(capfd, rigid_proto, [str(a) for a in arguments])
+
+
+def test_an_unknown_name_under_the_wildcard_is_only_warned_of(tmp_path, capfd):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(scene_text("speed_of_light: 3.0", "/**"))
+    assert rigid_proto(["simulate", str(scene), "--duration", "0.1"]) == 0
+    assert "speed_of_light under /** is not a parameter" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["-p", "gravty:=[0.0, 0.0, 1.0]"], "did you mean gravity?"),
+        (["-p", "mass"], "name:=value"),
+        (["-p", "gravity:=[0, 0, -9.81]"], "[0.0, 0.0, -9.81]"),
+        (["--params-file", "nowhere.yaml"], "nowhere.yaml"),
+        (["-p"], "behind it"),
+    ],
+)
+def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
+    assert part in one_line(capfd, rigid_body_node, ["rigid_body_node", "--ros-args", *arguments])
+
+
+@pytest.mark.parametrize(
+    "arguments", [["nowhere.yaml"], ["poke"], ["poke", "--at", "point/1,2"], ["--lead", "x", "poke"]]
+)
+def test_the_client_refuses_a_slip(arguments, capfd):
+    assert "poke_client" in one_line(capfd, poke_client, arguments)
+
+
+def test_the_node_itself_ends_with_one_line(ros_environment, tmp_path):
+    """The real process, where ROS has started and has to be taken down again."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(scene_text("mass: -1.0"))
+    bad = (
+        (["-p", "mesh:=nowhere.obj"], "nowhere.obj"),
+        (["--params-file", scene], "mass"),
+        (["-p", "integrator:=rk5"], "rk4"),
+        (["-p", "mass:=-1"], ">= 0"),
+    )
+    for arguments, part in bad:
+        line = refusal("rigid_body_node", "--ros-args", *arguments, environment=ros_environment)
+        assert part in line
+
+
+def test_the_client_without_a_node_says_so(ros_environment):
+    line = refusal("poke_client", "poke", "--force", 0, 0, 1, "--timeout", 0.5, environment=ros_environment)
+    assert "/rigid_body" in line
+
+
+def test_what_is_refused_by_the_installed_command_is_one_line_too(ros_environment):
+    assert "gravity" in refusal(
+        "rigid_proto", "simulate", "t_handle", "--set", "gravity=1", environment=ros_environment
+    )
+    done = run("rigid_proto", "simulate", scene_path("book"), "--json", environment=ros_environment, timeout=READY_S)
+    assert done.returncode == 0 and done.stderr == ""
