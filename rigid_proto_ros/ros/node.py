@@ -30,6 +30,7 @@ from .node_name import NODE_NAME
 from .parameter_server import converted, declare_parameters, descriptor, ros_parameter
 from .physics_thread import PhysicsThread
 from .state_publisher import StatePublisher
+from .warm_up import warm_up
 
 
 class RigidBodyNode(Node):
@@ -76,18 +77,18 @@ class RigidBodyNode(Node):
             self._command_refused,
         )
         self._parameters_guard = self.create_guard_condition(self._store_parameters)
-        self.create_service(Trigger, "~/reset", self._on_reset)
-        self.create_service(Trigger, "~/step", self._on_step)
-        self.create_service(Trigger, "~/clear_wrench", self._on_clear_wrench)
-        self.create_service(SetBool, "~/pause", self._on_pause)
-        self.create_service(Trigger, "~/string/release", self._on_string_release)
+        self.create_service(Trigger, "~/reset", _answering(self._on_reset))
+        self.create_service(Trigger, "~/step", _answering(self._on_step))
+        self.create_service(Trigger, "~/clear_wrench", _answering(self._on_clear_wrench))
+        self.create_service(SetBool, "~/pause", _answering(self._on_pause))
+        self.create_service(Trigger, "~/string/release", _answering(self._on_string_release))
         self._diagnostics = Diagnostics(self, self._diagnostic_values)
         tell_start(self.observer, scenario)
         self.flight.simulation.announce()
         self._tell_scene(scenario)
 
     def call(self, function: Callable):
-        """Run a function on the physics thread; returns what it returns."""
+        """Run a function on the physics thread; returns what it returns. Raises InputError when that is too busy."""
         if self.thread is None:
             return function()
         return self.thread.call(self.flight, function)
@@ -210,14 +211,17 @@ class RigidBodyNode(Node):
                 self.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
 
     def _change(self, changes: dict) -> None:
-        # Loading a mesh takes time that the physics thread hasn't got: this fills the caches before it.
-        scenario = self.flight.scenario.with_changes(changes)
+        # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
+        present = self.flight.scenario
+        planned = present.with_changes(changes)
+        if planned.setup.integrator is not present.setup.integrator:
+            self._warm_up(planned)
         recorder = None
         if "record" in changes:
-            if changes["record"] == self.flight.scenario.values["record"]:
+            if changes["record"] == present.values["record"]:
                 changes = {name: value for name, value in changes.items() if name != "record"}
             else:
-                recorder = self._open_recorder(scenario)
+                recorder = self._open_recorder(planned)
 
         def change() -> None:
             scenario = self.flight.scenario.with_changes(changes)
@@ -234,6 +238,12 @@ class RigidBodyNode(Node):
         if "record" in changes:
             self.call(lambda: self._switch_recording(recorder))
         self.states.configure(self.flight.scenario.values)
+
+    def _warm_up(self, scenario: Scenario) -> None:
+        try:
+            warm_up(scenario.setup)
+        except CommandRefused:
+            pass  # what acts now decides whether it is refused, and that is counted
 
     def _store_parameters(self) -> None:
         """Bring the ROS parameters up to what scheduled commands and inertia messages have changed."""
@@ -311,6 +321,18 @@ class RigidBodyNode(Node):
 def _plain(value):
     """rclpy keeps arrays of doubles as array.array."""
     return value if isinstance(value, (str, bool, int, float)) else list(value)
+
+
+def _answering(callback: Callable) -> Callable:
+    """A service callback that answers with what was wrong instead of raising it."""
+
+    def answer(request, response):
+        try:
+            return callback(request, response)
+        except InputError as error:
+            return _answer(response, str(error), success=False)
+
+    return answer
 
 
 def _answer(response, message: str, success: bool = True):
