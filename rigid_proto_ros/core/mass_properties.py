@@ -165,7 +165,7 @@ class MeshMoments:
         self.name = name
         self.stand_in = stand_in
         self._remember = remember
-        self._moments: dict[str | tuple, Moments] = dict(known or {})
+        self._moments: dict[str | tuple, Moments] = {name: moments for name, moments in (known or {}).items()}
 
     @property
     def turned(self) -> bool:
