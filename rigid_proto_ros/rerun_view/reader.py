@@ -78,7 +78,7 @@ def _read(path: Path, session: RecordedSession) -> None:
             session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
         elif entity.startswith(e.BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
             session.mesh_chunks += 1
-        elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity < first_mesh):
+        elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity <= first_mesh):
             # A run may have had several; it began with the first.
             first_mesh = entity
             # Columns of one entity may lie in chunks of their own, as in a file that was mended.
