@@ -59,7 +59,7 @@ BUDGET_S = 0.6
 """Seconds of cold calls after which a tool gets no further repetition of a mesh; one whose first call takes longer is
 timed by that."""
 PATIENCE_S = 6.0
-"""Seconds a call beyond which a tool is left out of a mesh."""
+"""Seconds of processor time a call beyond which a tool is left out of a mesh."""
 REPETITIONS = 15
 PLACES = {"base": 0.0, "+1e3": 1e3, "+1e6": 1e6}
 
@@ -251,7 +251,7 @@ def one_mesh(
         for tool in everything:
             if tool.name not in first or (tool.name, "base") in notes:
                 continue
-            if first[tool.name][0] > BUDGET_S:
+            if first[tool.name][1] > BUDGET_S:
                 cold[tool.name], warm[tool.name] = [first[tool.name][0]], [first[tool.name]]
             elif sum(cold[tool.name]) < BUDGET_S:
                 cold[tool.name].append(timed(tool, vertices, triangles)[0])
@@ -259,7 +259,7 @@ def one_mesh(
     for tool in everything:
         walls, cpus = zip(*(warm[tool.name] or [(float("nan"), float("nan"))]), strict=True)
         median = statistics.median(walls)
-        rates[tool.name] = max(rates.get(tool.name, 0.0), 0.0 if np.isnan(median) else median / len(triangles))
+        rates[tool.name] = max(rates.get(tool.name, 0.0), np.nan_to_num(statistics.median(cpus)) / len(triangles))
         for place in PLACES:
             row = {"what": "mass properties", "tool": tool.name, "version": tool.version, "mesh": name}
             row |= {"triangles": len(triangles), "place": place, "note": notes.get((tool.name, place), "")}
