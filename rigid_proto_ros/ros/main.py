@@ -64,9 +64,9 @@ def _run(argv: list[str], stop: threading.Event) -> int:
             if bodies:
                 for body_name, values in bodies.items():
                     overrides = given_parameters(values)
-                    nodes.append(RigidBodyNode(_make_observer, body_name, parameter_overrides=overrides))
+                    nodes.append(RigidBodyNode(_make_viewer, body_name, parameter_overrides=overrides))
             else:
-                nodes.append(RigidBodyNode(_make_observer))
+                nodes.append(RigidBodyNode(_make_viewer))
             for node in nodes:
                 node.states.pack_all(warm_up(node.flight.scenario.setup))
         physics = PhysicsThread([node.flight for node in nodes], on_crash)
@@ -110,36 +110,24 @@ def _warn(warning: str) -> None:
     print(f"rigid_body_node: {warning}", file=sys.stderr)
 
 
-def _make_observer(scenario, node_name: str):
-    """Rerun is imported only when something is to be shown or recorded with it."""
-    from ..core.observer import Observer, Observers
-    from ..session_recorder import is_mcap, make_recorder
+def _make_viewer(scenario, node_name: str):
+    """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
+    values = scenario.values
+    if values["viewer"] == "none":
+        return None
+    from ..rerun_view import RerunObserver
 
     def tell(line: str) -> None:
         print(f"{node_name}: {line}", file=sys.stderr)
 
-    values = scenario.values
-    record, observers = values["record"], []
-    if is_mcap(record):
-        observers.append(make_recorder(record, node_name, values, tell))
-        record = ""
-    if record or values["viewer"] != "none":
-        from ..rerun_view import RerunObserver
-
-        observers.append(
-            RerunObserver(
-                record=record,
-                viewer=values["viewer"],
-                rerun_port=_asked_for(values, "rerun_port"),
-                web_port=_asked_for(values, "web_port"),
-                name=node_name,
-                report=tell,
-                on_error=tell,
-            )
-        )
-    if len(observers) < 2:
-        return observers[0] if observers else Observer()
-    return Observers(*observers)
+    return RerunObserver(
+        viewer=values["viewer"],
+        rerun_port=_asked_for(values, "rerun_port"),
+        web_port=_asked_for(values, "web_port"),
+        name=node_name,
+        report=tell,
+        on_error=tell,
+    )
 
 
 def _asked_for(values, port: str) -> int | None:
