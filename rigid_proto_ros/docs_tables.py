@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import ast
+import csv
+import math
 import re
 import sys
 from collections.abc import Iterable
@@ -94,12 +96,53 @@ def modules() -> str:
     return "\n".join([*lines[1:], ""])
 
 
+def masses() -> str:
+    """Mass properties here and elsewhere, from the last benchmark's own numbers."""
+    with (ROOT / "benchmarks" / "results" / "mass_properties.csv").open(encoding="utf-8", newline="") as file:
+        measured = [row for row in csv.DictReader(file) if row["what"] == "mass properties"]
+    found = {
+        (row["tool"], row["mesh"].split(",")[0], row["place"]): row for row in measured if "shuffled" not in row["mesh"]
+    }
+    rows = []
+    for tool in dict.fromkeys(row["tool"] for row in measured):
+        place = found[tool, "ellipsoid 100k", "base"]
+        errors = [found[tool, mesh, at]["inertia_error"] for mesh, at in _INERTIA_ERRORS]
+        time = f"{float(place['ns_per_triangle']):,.0f}"
+        rows.append((tool, place["version"], time, *(_error(error) for error in errors)))
+    sentence = f"Measured {place['date'][:10]} on one {place['cpu']}, in one process, medians."
+    head = (
+        "tool",
+        "version",
+        "ns per triangle",
+        "error in place",
+        "moved by 10³",
+        "moved by 10⁶",
+        "plate 1 × 1 × 10⁻⁵",
+    )
+    return f"{sentence}\n\n{_table(head, rows)}"
+
+
+_INERTIA_ERRORS = (
+    ("ellipsoid 100k", "base"),
+    ("ellipsoid 100k", "+1e3"),
+    ("ellipsoid 100k", "+1e6"),
+    ("plate 1 x 1 x 1e-5", "base"),
+)
+"""Mesh and place of the errors shown; times are those of the first."""
+
+
+def _error(text: str) -> str:
+    value = float(text)
+    return "refuses" if math.isnan(value) else f"{value:.0e}"
+
+
 TABLES = {
     "topics": topics,
     "services": services,
     "parameters": parameters,
     "integrators": integrators,
     "modules": modules,
+    "masses": masses,
 }
 
 

@@ -4,6 +4,7 @@
 import os
 import socket
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,8 @@ def meshes() -> Path:
     return path.resolve()
 
 
-@pytest.fixture(scope="session")
-def ros_domain_id() -> Iterator[int]:
+@contextmanager
+def held_domain() -> Iterator[int]:
     """A ROS domain in 1..101 that no other test session on this machine holds, whichever checkout it runs from."""
     # An abstract socket is the lock: the kernel frees it with the process, so a crash leaves nothing behind.
     first = os.getpid() % 101
@@ -41,6 +42,13 @@ def ros_domain_id() -> Iterator[int]:
 
 
 @pytest.fixture(scope="session")
+def ros_domain_id() -> Iterator[int]:
+    """The ROS domain of this test session."""
+    with held_domain() as domain:
+        yield domain
+
+
+@pytest.fixture(scope="session")
 def ros_environment(ros_domain_id: int) -> dict[str, str]:
     """Environment for child processes of this interpreter: own domain, nothing leaves the machine."""
     return {**os.environ, "ROS_DOMAIN_ID": str(ros_domain_id), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
@@ -51,3 +59,22 @@ def foreign_environment(ros_environment: dict[str, str]) -> dict[str, str]:
     """The same for an interpreter of another virtual environment, whose ROS wheels must find their own libraries."""
     marks = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
     return {key: value for key, value in ros_environment.items() if key not in marks}
+
+
+@pytest.fixture(scope="session")
+def commanded(ros_environment, tmp_path_factory):
+    """A flying node and a client of it, in a domain of their own, shared by all tests of commands (test/command_rig.py)."""
+    from command_rig import Commanded
+
+    with held_domain() as domain:
+        shared = Commanded({**ros_environment, "ROS_DOMAIN_ID": str(domain)}, tmp_path_factory.mktemp("commanded"))
+        yield shared
+        shared.close()
+
+
+@pytest.fixture
+def rig(commanded):
+    """The shared node with its first parameters in force again, reset and running, and nothing heard yet."""
+    commanded.restore()
+    yield commanded
+    assert commanded.node_process.alive, commanded.node_process.log.read_text()

@@ -95,12 +95,25 @@ def test_make_target_exists(command: str) -> None:
 
 
 @pytest.mark.slow
-def test_rigid_proto_commands_run(in_a_copy: Path, capsys: pytest.CaptureFixture) -> None:
+def test_rigid_proto_commands_run(
+    in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture
+) -> None:
     pytest.importorskip("rerun")
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):
         if command.startswith(STAYS_UP) or " demo" in command:
+            continue
+        if "--publish" in command:
+            sent = subprocess.run(
+                [sys.executable, "-m", "rigid_proto_ros.cli.main", *words(command)[1:]],
+                env={**ros_environment, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                capture_output=True,
+                text=True,
+                timeout=120,
+                check=False,
+            )
+            assert sent.returncode == 0, (command, sent.stderr)
             continue
         if words(command)[1] == "snapshot" and not os.path.isdir("/usr/share/vulkan/icd.d"):
             continue  # the snapshot's own test says what is missing

@@ -284,6 +284,40 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
         assert np.isclose(length, max(0.4, 0.4 + stretch[k]), rtol=5e-3)
 
 
+def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends(tmp_path):
+    path = tmp_path / "poinsot.rrd"
+    rows = flight.rows(60)
+    rows[-10:, 10:13] = 0.0
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, rows)
+    observer.close()
+    assert observer.error == ""
+    omegas = dict(zip(*cells(path, e.POINSOT_OMEGA, "Arrows3D:vectors"), strict=True))
+    polhodes = dict(zip(*cells(path, e.POINSOT_POLHODE, "LineStrips3D:strips"), strict=True))
+    times, centres = cells(path, e.POINSOT_PLANE, "Boxes3D:centers")
+    _, sizes = cells(path, e.POINSOT_ELLIPSOID, "Ellipsoids3D:half_sizes")
+    frame = PrincipalFrame.of(flight.INERTIA)
+    touched = 0
+    for time_ns, centre in zip(times, centres, strict=True):
+        row = rows[time_ns // flight.PERIOD_NS]
+        if not row[10:13].any():
+            assert centre == [] and polhodes[time_ns] == []
+            continue
+        touched += 1
+        tip, plane = np.array(omegas[time_ns][0]), np.array(centre[0])
+        distance = np.linalg.norm(plane)
+        assert np.isclose(tip @ plane / distance, distance, rtol=1e-5)
+        (R,) = rotation_matrices(row[np.newaxis, 3:7])
+        principal = frame.axes.T @ R.T @ tip
+        assert np.isclose(np.sum((principal / sizes[0][0]) ** 2), 1.0, rtol=1e-5)
+        # The plane is square to the ellipsoid there: its normal is the gradient I ω.
+        gradient = R @ frame.axes @ (frame.moments * principal)
+        assert np.allclose(gradient / np.linalg.norm(gradient), plane / distance, atol=1e-5)
+        curve = np.array(polhodes[time_ns][0])
+        assert np.linalg.norm(curve - principal, axis=1).min() < 0.1
+    assert touched >= 8 and touched < len(times)
+
+
 def test_effort_is_plotted_as_a_rate_since_it_was_told_before(tmp_path):
     path = tmp_path / "effort.rrd"
     observer = RerunObserver(record=str(path))
@@ -321,8 +355,8 @@ def test_the_next_run_starts_from_the_parameters_then_in_force(tmp_path):
     ("line", "said"),
     [
         (
-            '{"time_ns": 5, "kind": "poke", "content": {"stamp_ns": 5, "frame_id": "world@rim", "force": [0.0, 0.0, 3.0], '
-            '"torque": [0.0, 0.0, 0.0]}, "sha256": "ab"}',
+            '{"time_ns": 5, "kind": "poke", "content": {"stamp_ns": 5, "frame_id": "world@rim", "force": '
+            '[0.0, 0.0, 3.0], "torque": [0.0, 0.0, 0.0]}, "sha256": "ab"}',
             "poke world@rim, force [0, 0, 3]",
         ),
         ('{"time_ns": 5, "kind": "reset", "content": {}, "sha256": "ab"}', "reset"),

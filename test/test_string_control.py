@@ -208,7 +208,9 @@ def test_a_string_pulls_when_stretched_and_pushes_only_when_bilateral(bilateral)
     """Tension k(l − rest), against the momentum that 1 ms of it gives: 1e-4, for the distance hardly changes."""
     for distance, stretched in ((0.7, True), (0.3, False)):
         simulation, scenario = simulated(
-            **{"string__attached": True, "string__rest_length": 0.5, "string__bilateral": bilateral},
+            string__attached=True,
+            string__rest_length=0.5,
+            string__bilateral=bilateral,
             **{"string__damping_ratio": 0.0, "initial.angular_velocity": [0.0, 0.0, 0.0]},
             string__target=[0.2, -0.1, 0.3 + distance],
             string__attach=(make_scenario(SCENE).setup.body.center_of_mass / SCENE["scale"]).tolist(),

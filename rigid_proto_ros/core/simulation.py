@@ -71,9 +71,7 @@ class Simulation:
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
-        self.observer = observer or Observer()
-        self._shows_loads = listens(self.observer, "load_began")
-        self._shows_status = listens(self.observer, "status")
+        self.watch(observer or Observer())
         self.follower: Follower | None = None
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
@@ -81,6 +79,13 @@ class Simulation:
         self._load_ids = 0
         check_carried(setup.integrator, _needs(setup, (), setup.string.attached))
         self._start_over()
+
+    def watch(self, observer: Observer) -> None:
+        """Tell this observer from now on, and no other."""
+        self.observer = observer
+        self._shows_loads = listens(observer, "load_began")
+        self._shows_status = listens(observer, "status")
+        self._told: dict[str, str] = {}
 
     # What a caller may ask
 
@@ -234,6 +239,16 @@ class Simulation:
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
         self.observer.body_changed(self.time_ns, self.snapshot())
+
+    def introduce(self, observer: Observer) -> None:
+        """Tell an observer that comes in flight about the body, what acts on it and the string."""
+        observer.body_changed(self.time_ns, self.snapshot())
+        if listens(observer, "load_began"):
+            for acting in self._acting():
+                kind = "wrench" if acting is self._held else "poke"
+                observer.load_began(self.time_ns, acting.load_id, self._shown(kind, acting.load))
+        if self.string is not None:
+            observer.string_changed(self.time_ns, self._shown_string(self.string))
 
     def tell_status(self, paused: bool = False) -> None:
         """Tell the observer what the body is doing, where that changed since it was last told."""
@@ -468,12 +483,12 @@ class Simulation:
         self._told_string = tied
         if not listens(self.observer, "string_changed"):
             return
-        shown = None
-        if tied is not None:
-            arm = np.asarray(tied.arm(self.setup.body))
-            ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
-            shown = ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
-        self.observer.string_changed(self.time_ns, shown)
+        self.observer.string_changed(self.time_ns, None if tied is None else self._shown_string(tied))
+
+    def _shown_string(self, tied: Tied) -> ShownString:
+        arm = np.asarray(tied.arm(self.setup.body))
+        ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
+        return ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
 
     def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
         """The body as an observer is told of it; of another setup, when one is given."""

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Draws Poinsot's construction beside the flight; see poinsot.py for the mathematics.
 
-Lengths are ω divided by the mean of the ellipsoid's two longer semi-axes (the geometric one), so that the picture has about the
+Lengths are ω divided by the geometric mean of the ellipsoid's two longer semi-axes, so that the picture has about the
 same size for every body and spin. It is turned to have the invariable plane as floor.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -23,8 +25,8 @@ RATE = 100
 REDRAWN_PER_S = 20
 """[1/s, simulated] How often curve and plane are drawn anew while a torque changes T and L."""
 
-CHANGE = 1e-6
-"""Relative change of T or L beyond which they are."""
+CHANGE = 5e-4
+"""Relative change of T or L beyond which they are; less can't be seen."""
 
 PLANE_HALF_SIZE = 1.6
 REST = 1e-12
@@ -53,10 +55,11 @@ class PoinsotPicture:
         strips = rr.LineStrips3D.columns(strips=curves).partition([len(curves)])
         send(e.POINSOT_SEPARATRIX, times, strips)
 
-    def _scale(self, energy: float) -> float:
-        """What ω is multiplied with to be drawn."""
-        longer = semi_axes(self._frame.moments, energy)[:2]
-        return 1.0 / float(np.sqrt(longer[0] * longer[1]))
+    def _scale(self, energy: Any) -> Any:
+        """What ω is multiplied with to be drawn at energies T (n,) or a number; 0 at rest."""
+        I1, I2, _ = self._frame.moments
+        product = 2.0 * np.asarray(energy) / np.sqrt(I1 * I2)
+        return np.divide(1.0, np.sqrt(product), out=np.zeros_like(product), where=product > 0.0)[()]
 
     def rows(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, L: np.ndarray, send: Send) -> None:
         """States (n, 13) with their angular momenta (n, 3) in world axes."""
@@ -69,8 +72,7 @@ class PoinsotPicture:
         changes = self._changes(times_ns, energy, L)
         if changes:
             self._draw(times_ns[changes], walls[changes], energy[changes], w[changes], L[changes], send)
-        scales = np.array([self._scale(T) if T > 0.0 else 0.0 for T in energy])
-        tips = scales[:, np.newaxis] * to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
+        tips = self._scale(energy)[:, np.newaxis] * to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
         times = time_columns(times_ns, walls)
         send(e.POINSOT_BODY, times, rr.Transform3D.columns(quaternion=rows[:, 3:7]))
         send(e.POINSOT_OMEGA, times, rr.Arrows3D.columns(vectors=tips))

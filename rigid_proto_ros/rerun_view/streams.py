@@ -34,6 +34,9 @@ class Stream:
     may_skip = False
     """Whether states may be left out when the machine doesn't keep up."""
 
+    framed: tuple[float, bool] | None = None
+    """Size of the view and presence of a ghost that the layout was last sent for."""
+
     def __init__(self, recording_id: str, sink: Any, name: str) -> None:
         self.recording = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
@@ -53,6 +56,10 @@ class Stream:
     def log_static(self, entity: str, *values: Any) -> None:
         """Log values that hold at all times."""
         rr.log(entity, *values, static=True, recording=self.recording)
+
+    def is_framed_for(self, size: float, ghost: bool) -> bool:
+        """Whether the layout sent last still fits: each that is sent costs two threads that the SDK never gives back."""
+        return self.framed is not None and self.framed[1] == ghost and 0.5 <= size / self.framed[0] <= 2.0
 
     def send_blueprint(self, blueprint: Any) -> None:
         """Make this the layout that a viewer opens with."""
@@ -127,7 +134,10 @@ class LiveServer:
         if self._host is None:
             self._host = LiveStream(recording_id, self._sink, name)
             return self._host
-        return LiveStream(recording_id, rr.GrpcSink(self.address), name)
+        stream = LiveStream(recording_id, rr.GrpcSink(self.address), name)
+        # Viewers keep the layout from run to run.
+        stream.framed = self._host.framed
+        return stream
 
     def end_run(self, stream: LiveStream) -> None:
         """Finish a run that no more data follows; the server stays."""

@@ -232,7 +232,10 @@ class SceneWriter:
 
     def _send_styles(self, stream: Stream) -> None:
         send_styles(stream, self._size)
-        stream.send_blueprint(layout(self._view_size, self._initial_view, self._ghost_body is not None))
+        ghost = self._ghost_body is not None
+        if not stream.is_framed_for(self._view_size, ghost):
+            stream.send_blueprint(layout(self._view_size, self._initial_view, ghost))
+            stream.framed = (self._view_size, ghost)
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None:

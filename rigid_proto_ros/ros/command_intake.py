@@ -15,17 +15,16 @@ import yaml
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
 from ..core.frames import parse_frame
-from ..poke_script import MAX_TIME_S, MESH_FRAME, core_command, parse_script, string_attach, string_target
+from ..poke_script import MESH_FRAME, core_command, parse_script, string_attach, string_target
 from ..scenario import check_inertia, nanoseconds
 from . import qos
-from .message_bytes import read_wrench_stamped
+from .message_bytes import read_message, read_wrench_stamped, whole_stamp
 from .stamps import effective_time
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
@@ -37,8 +36,11 @@ QUIET_NS = 4_000_000
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
 
-MAX_SCHEDULE_LENGTH = 100_000
+MAX_SCHEDULE_LENGTH = 10_000
 """Characters of one schedule entry."""
+
+MAX_BRACKETS = 100
+"""Lists and mappings opened in one: the YAML reader takes seconds over thousands, and the body would wait for it."""
 
 
 class _TakenByHand(CallbackGroup):
@@ -159,10 +161,7 @@ class CommandIntake:
         self._submit_wrench(False, data, simulation, scenario)
 
     def _submit_wrench(self, held: bool, data: bytes, simulation, scenario) -> None:
-        try:
-            stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
-        except UnicodeDecodeError:
-            raise CommandRefused("frame", "frame_id", "bytes that aren't UTF-8", "text") from None
+        stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
         frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
@@ -179,9 +178,9 @@ class CommandIntake:
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
     def _inertia(self, data: bytes, simulation, scenario) -> None:
-        message = deserialize_message(data, InertiaStamped)
+        message = read_message(data, InertiaStamped)
         stamp, given = message.header.stamp, message.inertia
-        stamp_ns, frame_id = stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id
+        stamp_ns, frame_id = whole_stamp(stamp.sec, stamp.nanosec), message.header.frame_id
         body = self._frames[1]
         if frame_id not in ("", "body", body, MESH_FRAME, f"{body}/mesh"):
             raise CommandRefused("frame", "frame_id", frame_id[:80], f"{body}/mesh, or {body} (from the present COM)")
@@ -198,16 +197,18 @@ class CommandIntake:
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
     def _schedule(self, data, simulation, scenario) -> None:
-        text = deserialize_message(data, String).data
+        text = read_message(data, String).data
         if len(text) > MAX_SCHEDULE_LENGTH:
             raise CommandRefused("schedule", "schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
+        if text.count("[") + text.count("{") > MAX_BRACKETS:
+            raise CommandRefused("schedule", "schedule", text[:80], f"at most {MAX_BRACKETS} opening brackets")
         try:
             entry = yaml.safe_load(text)
             (command,) = parse_script(yaml.safe_dump([entry]), "schedule") if isinstance(entry, dict) else (None,)
             if command is None or command.topic != "schedule":
                 accepted = "one entry {t, set}, {t, string: release} or {t, service: clear_wrench}"
                 raise InputError("schedule", text[:80], accepted)
-            stamp_ns = nanoseconds(min(float(entry["t"]), MAX_TIME_S))
+            stamp_ns = command.t_ns
             if command.kind == "set":
                 scenario.with_changes(command.changes)
         except CommandRefused:
@@ -230,6 +231,6 @@ class CommandIntake:
 
 
 def _read_point_stamped(data: bytes) -> tuple[int, str, tuple[float, float, float]]:
-    message = deserialize_message(data, PointStamped)
+    message = read_message(data, PointStamped)
     stamp, point = message.header.stamp, message.point
-    return stamp.sec * 1_000_000_000 + stamp.nanosec, message.header.frame_id, (point.x, point.y, point.z)
+    return whole_stamp(stamp.sec, stamp.nanosec), message.header.frame_id, (point.x, point.y, point.z)

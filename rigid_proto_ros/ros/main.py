@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 import time
-from dataclasses import replace
+import traceback
 
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
@@ -43,6 +43,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
     from .node import RigidBodyNode
     from .parameter_server import given_parameters
     from .physics_thread import PhysicsThread
+    from .warm_up import warm_up
 
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
@@ -63,21 +64,26 @@ def _run(argv: list[str], stop: threading.Event) -> int:
             if bodies:
                 for body_name, values in bodies.items():
                     overrides = given_parameters(values)
-                    nodes.append(RigidBodyNode(_make_observer, body_name, parameter_overrides=overrides))
+                    nodes.append(RigidBodyNode(_make_viewer, body_name, parameter_overrides=overrides))
             else:
-                nodes.append(RigidBodyNode(_make_observer))
+                nodes.append(RigidBodyNode(_make_viewer))
             for node in nodes:
-                _warm_up(node)
+                node.states.pack_all(warm_up(node.flight.scenario.setup))
         physics = PhysicsThread([node.flight for node in nodes], on_crash)
         for node in nodes:
             node.thread = physics
             executor.add_node(node)
 
         def spin() -> None:
-            try:
-                executor.spin()
-            except ExternalShutdownException:
-                pass
+            while not stop.is_set():
+                try:
+                    executor.spin()
+                    break
+                except ExternalShutdownException:
+                    break
+                except Exception:
+                    # One request that fails by a fault of ours must not take the other services with it.
+                    traceback.print_exc()
             stop.set()
 
         executor_thread = threading.Thread(target=spin, name="executor", daemon=True)
@@ -104,69 +110,29 @@ def _warn(warning: str) -> None:
     print(f"rigid_body_node: {warning}", file=sys.stderr)
 
 
-def _make_observer(scenario, node_name: str):
-    """Rerun is imported only when something is to be shown or recorded with it."""
-    from ..core.observer import Observer, Observers
-    from ..session_recorder import is_mcap, make_recorder
+def _make_viewer(scenario, node_name: str):
+    """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
+    values = scenario.values
+    if values["viewer"] == "none":
+        return None
+    from ..rerun_view import RerunObserver
 
     def tell(line: str) -> None:
         print(f"{node_name}: {line}", file=sys.stderr)
 
-    values = scenario.values
-    record, observers = values["record"], []
-    if is_mcap(record):
-        observers.append(make_recorder(record, node_name, values, tell))
-        record = ""
-    if record or values["viewer"] != "none":
-        from ..rerun_view import RerunObserver
-
-        observers.append(
-            RerunObserver(
-                record=record,
-                viewer=values["viewer"],
-                rerun_port=_asked_for(values, "rerun_port"),
-                web_port=_asked_for(values, "web_port"),
-                name=node_name,
-                report=tell,
-                on_error=tell,
-            )
-        )
-    if len(observers) < 2:
-        return observers[0] if observers else Observer()
-    return Observers(*observers)
+    return RerunObserver(
+        viewer=values["viewer"],
+        rerun_port=_asked_for(values, "rerun_port"),
+        web_port=_asked_for(values, "web_port"),
+        name=node_name,
+        report=tell,
+        on_error=tell,
+    )
 
 
 def _asked_for(values, port: str) -> int | None:
     """None for a default port, which may move to the next free one."""
     return None if values[port] == PARAMETERS[port].default else values[port]
-
-
-def _warm_up(node) -> None:
-    """Compile, or load from the cache, what the first command of each kind would otherwise wait for."""
-    from ..core.commands import MoveString, WrenchCommand
-    from ..core.errors import CommandRefused
-    from ..core.frames import parse_frame
-    from ..core.simulation import Simulation
-
-    setup = node.flight.scenario.setup
-    force, none = (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0)
-    spinning = setup.initial.copy()
-    spinning[10:13] += (0.1, 0.2, 0.3)
-
-    def wrench(frame: str) -> WrenchCommand:
-        return WrenchCommand(False, parse_frame(frame), force, none, 0, frame, b"")
-
-    commands = [wrench(f) for f in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")]
-    commands.append(MoveString(tuple(setup.initial[:3].tolist())))
-    for command in commands:
-        trial = Simulation(replace(setup, initial=spinning))
-        try:
-            trial.submit(command)
-        except CommandRefused:
-            continue  # an integrator that can't carry it will refuse it in flight too
-        for until_ns in (1_000_000, 2_000_001):
-            state = trial.advance(until_ns)
-    node.states.pack_all(state)
 
 
 class _saying_when_slow:

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
+from ..core.errors import InputError
 from .flight import Flight
 
 SHORT_NS = 3_000_000
@@ -43,11 +44,22 @@ class PhysicsThread:
             future.cancel()
 
     def call(self, flight: Flight, function: Callable, timeout_s: float = 10.0):
-        """Run ``function`` on the physics thread between two ticks and return what it returns, or raise what it raises."""
+        """Run ``function`` on the physics thread between two ticks and return what it returns, or raise what it raises.
+
+        Raises InputError when the thread is too busy to begin it within timeout_s; then it is never run.
+        """
         future: Future = Future()
         self._requests.append((flight, function, future))
         self._wake.set()
-        return future.result(timeout_s)
+        try:
+            return future.result(timeout_s)
+        except TimeoutError:
+            if future.cancel():
+                raise InputError(
+                    "request", "no time for it", f"a motion that leaves some every {timeout_s:g} s"
+                ) from None
+        # It has begun, so it will end.
+        return future.result()
 
     def _run(self) -> None:
         try:

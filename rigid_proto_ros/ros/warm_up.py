@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""Kernels compiled, or loaded from the cache, before a command waits for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..core.commands import MoveString, WrenchCommand
+from ..core.errors import CommandRefused
+from ..core.frames import parse_frame
+from ..core.setup import Setup
+from ..core.simulation import Simulation
+from ..core.state import State
+
+
+def warm_up(setup: Setup) -> State:
+    """Fly this setup for a moment under a command of each kind that its integrator carries; returns the last state."""
+    force, none = (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0)
+    spinning = setup.initial.copy()
+    spinning[10:13] += (0.1, 0.2, 0.3)
+
+    def wrench(frame: str) -> WrenchCommand:
+        return WrenchCommand(False, parse_frame(frame), force, none, 0, frame, b"")
+
+    commands = [wrench(f) for f in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")]
+    commands.append(MoveString(tuple(setup.initial[:3].tolist())))
+    for command in commands:
+        trial = Simulation(replace(setup, initial=spinning))
+        try:
+            trial.submit(command)
+        except CommandRefused:
+            continue  # an integrator that can't carry it will refuse it in flight too
+        for until_ns in (1_000_000, 2_000_001):
+            trial.advance(until_ns)
+    return trial.state

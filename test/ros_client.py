@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+"""A ROS client in a process of its own, told what to do in lines of JSON: {"do": name, ...} in, {"done": result} out.
+
+Messages and requests go in and out as nested dicts and lists, in the fields of their types.
+"""
+
+import json
+import os
+import sys
+import threading
+import time
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import InertiaStamped, PointStamped, PoseStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+TYPES = {
+    t.__name__: t
+    for t in (
+        *(DiagnosticArray, InertiaStamped, PointStamped, PoseStamped, TwistStamped, WrenchStamped, Odometry, Clock),
+        *(String, SetBool, Trigger, DescribeParameters, GetParameters, ListParameters, SetParameters),
+        SetParametersAtomically,
+    )
+}
+
+
+def plain(value):
+    """A message as dicts, lists and numbers."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, (bytes, bytearray)):
+        return int.from_bytes(value, "little")
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return [plain(v) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+def stamp_ns(message) -> int:
+    """The header's stamp [ns]."""
+    return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+
+
+def filled(message, content: dict):
+    """A message with these fields set."""
+    for name, value in content.items():
+        if isinstance(value, dict):
+            filled(getattr(message, name), value)
+        else:
+            setattr(message, name, value)
+    return message
+
+
+def profile(depth=5000, latched=False, best_effort=False) -> QoSProfile:
+    return QoSProfile(
+        depth=depth,
+        history=HistoryPolicy.KEEP_LAST,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+class Client:
+    """What can be done; each method is a ``do``."""
+
+    def __init__(self) -> None:
+        rclpy.init()
+        self.node = rclpy.create_node("tester", start_parameter_services=False, enable_rosout=False)
+        self.received: dict[str, list] = {}
+        self.publishers = {}
+        self.clients = {}
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        threading.Thread(target=self.executor.spin, daemon=True).start()
+
+    def listen(self, topic, type, wait=True, **qos):
+        """Collect what comes on a topic, in order."""
+        messages = self.received.setdefault(topic, [])
+        subscription = self.node.create_subscription(TYPES[type], topic, messages.append, profile(**qos))
+        if wait:
+            # A first start compiles its kernels.
+            _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}", 300.0)
+
+    def heard(self, topic, clear=False, last=0, stamp=None):
+        """What has come on a topic; only the ``last`` ones, or those with this stamp [ns], if that is given."""
+        messages = list(self.received[topic])
+        if clear:
+            del self.received[topic][: len(messages)]
+        if stamp is not None:
+            messages = [m for m in messages if stamp_ns(m) == stamp]
+        return [plain(m) for m in (messages[-last:] if last else messages)]
+
+    def heard_count(self, topic):
+        """How many messages have come on a topic."""
+        return len(self.received[topic])
+
+    def advertise(self, topic, type, wait=True, **qos):
+        """A publisher, matched with the node's subscription."""
+        publisher = self.node.create_publisher(TYPES[type], topic, profile(**qos))
+        self.publishers[topic] = (publisher, TYPES[type])
+        if wait:
+            _until(lambda: publisher.get_subscription_count(), f"a subscription of {topic}")
+
+    def publish(self, topic, messages, rate=0.0):
+        """Messages in order; rate per second, 0 as fast as it goes."""
+        publisher, message_type = self.publishers[topic]
+        start = time.monotonic()
+        for k, content in enumerate(messages):
+            if rate:
+                time.sleep(max(0.0, start + k / rate - time.monotonic()))
+            publisher.publish(filled(message_type(), content))
+
+    def repeat(self, topic, content, count, rate=0.0):
+        """One message ``count`` times; rate per second, 0 as fast as it goes."""
+        publisher, message_type = self.publishers[topic]
+        message = filled(message_type(), content)
+        start = time.monotonic()
+        for k in range(count):
+            if rate and k % 10 == 0:
+                time.sleep(max(0.0, start + k / rate - time.monotonic()))
+            publisher.publish(message)
+        return time.monotonic() - start
+
+    def publish_bytes(self, topic, messages):
+        """Serialized messages, in hex, as they are."""
+        publisher, _ = self.publishers[topic]
+        for text in messages:
+            publisher.publish(bytes.fromhex(text))
+
+    def acknowledged(self, topic):
+        """Wait until all that was published has been received by everybody."""
+        return self.publishers[topic][0].wait_for_all_acked(rclpy.duration.Duration(seconds=20))
+
+    def call(self, service, type, request=None, timeout=20.0):
+        """A service's answer."""
+        if service not in self.clients:
+            self.clients[service] = self.node.create_client(TYPES[type], service)
+            _until(self.clients[service].service_is_ready, f"the service {service}")
+        future = self.clients[service].call_async(filled(TYPES[type].Request(), request or {}))
+        _until(future.done, f"an answer of {service}", timeout)
+        return plain(future.result())
+
+    def set_parameters(self, node, values, atomically=False):
+        """[[name, value]] through the standard services; [[successful, reason]]."""
+        kind = "SetParametersAtomically" if atomically else "SetParameters"
+        service = f"{node}/set_parameters{'_atomically' if atomically else ''}"
+        messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values]
+        answer = self.call(service, kind, {"parameters": messages})
+        results = [answer["result"]] if atomically else answer["results"]
+        return [[r["successful"], r["reason"]] for r in results]
+
+    def get_parameters(self, node, names):
+        """Values by name through the standard service."""
+        service = f"{node}/get_parameters"
+        self.call(service, "GetParameters", {"names": []})
+        future = self.clients[service].call_async(GetParameters.Request(names=names))
+        _until(future.done, f"an answer of {service}")
+        return {n: plain(parameter_value_to_python(v)) for n, v in zip(names, future.result().values, strict=True)}
+
+    def topics(self):
+        """Names and types of all topics."""
+        return self.node.get_topic_names_and_types()
+
+    def services(self):
+        """Names and types of all services."""
+        return self.node.get_service_names_and_types()
+
+    def endpoints(self, topic):
+        """QoS of the topic's publishers and subscriptions: [side, node, reliability, durability]."""
+        found = []
+        for side, infos in (
+            ("pub", self.node.get_publishers_info_by_topic(topic)),
+            ("sub", self.node.get_subscriptions_info_by_topic(topic)),
+        ):
+            for info in infos:
+                q = info.qos_profile
+                name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+                found.append([side, name, q.reliability.name, q.durability.name])
+        return found
+
+
+def _until(condition, what, timeout=60.0):
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"no {what} within {timeout} s")
+        time.sleep(0.002)
+
+
+def main() -> None:
+    client = Client()
+    # The interpreter's own stdout carries answers alone.
+    for line in sys.stdin:
+        job = json.loads(line)
+        try:
+            answer = {"done": getattr(client, job.pop("do"))(**job)}
+        except Exception as error:  # told to the test, which fails with it
+            answer = {"failed": f"{type(error).__name__}: {error}"}
+        print(json.dumps(answer), flush=True)
+    # The executor's thread still sits in the middleware: the orderly way out races with it.
+    sys.stdout.flush()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

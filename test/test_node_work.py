@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""What a scene doesn't need isn't done: counted, not timed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ros_process import from_source
+
+WORK = Path(__file__).parent / "node_work.py"
+
+
+@pytest.fixture(scope="module")
+def counted(ros_environment):
+    def run(scenario: str) -> dict:
+        done = subprocess.run(
+            [sys.executable, str(WORK), scenario],
+            env=from_source(ros_environment),
+            capture_output=True,
+            text=True,
+            timeout=180,
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout.splitlines()[-1])
+
+    return run
+
+
+def test_without_subscribers_nothing_is_published_and_the_body_still_flies(counted):
+    work = counted("alone")
+    assert set(work["publications"].values()) == {0}
+    assert work["simulated_ns"] > 0.8e9
+    # A free body crosses the time between two looks in one exact step: none is taken per publication period of 2 ms.
+    assert work["steps"] <= 1
+    assert work["message_objects"] == {}
+
+
+def test_neither_rerun_nor_trimesh_is_imported_for_a_bundled_mesh_without_a_viewer(counted):
+    assert counted("alone")["imported"] == []
+
+
+def test_a_body_at_rest_takes_no_step(counted):
+    work = counted("at_rest")
+    assert work["steps"] == 0
+    assert work["simulated_ns"] > 0.8e9
+    assert set(work["publications"].values()) == {0}
+
+
+def test_the_steady_state_makes_no_message_objects(counted):
+    work = counted("listened_to")
+    published = work["publications"]
+    # Odometry is subscribed too, the IMU is not.
+    for topic in ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom"):
+        assert 350 <= published[topic] <= 650, published
+    assert published["/rigid_body/imu"] == 0
+    assert work["wrenches"] >= 30
+    assert work["message_objects"] == {}
