@@ -26,6 +26,11 @@ class Ghost:
         """Tell the observer what the ghost is."""
         self._observer.ghost_began(self.simulation.time_ns, self.simulation.snapshot())
 
+    def watch(self, observer: Observer) -> None:
+        """Tell another observer from now on."""
+        self._observer = observer
+        self.announce()
+
     def submit(self, command: Command, when_ns: int) -> None:
         """Take a command of the followed simulation; what the ghost can't carry passes it by."""
         if isinstance(command, Change):

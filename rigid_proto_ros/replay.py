@@ -14,6 +14,7 @@ from .core.errors import InputError
 from .core.frames import parse_frame
 from .core.observer import Observer
 from .core.simulation import Simulation
+from .ghost import Ghost
 from .mesh_io import Mesh, load_mesh
 from .parameters import convert_all
 from .poke_script import string_attach, string_target
@@ -67,7 +68,7 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
 class Resimulation:
     """A session's simulation; its commands are submitted when their time has come, as they were then.
 
-    ``scenario`` is the one in force. mesh_of(name) gives the mesh that a change names, or None to load it.
+    ``scenario`` is the one in force; ``ghost`` is told of its changes. mesh_of(name) gives the mesh that a change names, or None to load it.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class Resimulation:
         self.scenario = scenario
         self.simulation = Simulation(scenario.setup, observer)
         self._observer = observer or Observer()
+        self.ghost: Ghost | None = None
         self._mesh_of = mesh_of
         self._node_name = node_name.rpartition("/")[2] or "rigid_body"
         waiting: list[tuple[int, str, dict, Command | None]] = []
@@ -155,6 +157,8 @@ class Resimulation:
         self.simulation.check_change(scenario.setup)
         self.scenario = scenario
         self._observer.scene_changed(self.simulation.time_ns, scenario.text)
+        if self.ghost is not None:
+            self.ghost.change(self.simulation.time_ns, scenario)
         return scenario.setup
 
 

@@ -31,6 +31,9 @@ from .session_mesh import file_sha256, scene_sha256
 FLUSH_PERIOD_S = 0.4
 """What a kill -9 loses at most."""
 
+CHUNK_NS = 500_000_000
+"""Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
+
 CLOSE_TIMEOUT_S = 10.0
 """A disk that doesn't take the rest in this time is given up."""
 
@@ -224,8 +227,16 @@ class McapObserver(Observer):
     def _write_rows(self, block: Block, begin: int, end: int) -> None:
         if begin == end:
             return
-        times, walls, rows = block.times[begin:end], block.walls[begin:end], block.rows[begin:end]
-        log_times = np.array([self._log_time(*both) for both in zip(times.tolist(), walls.tolist(), strict=True)])
+        chunk_of_row = block.times[begin:end] // CHUNK_NS
+        cuts = (begin + 1 + np.flatnonzero(np.diff(chunk_of_row))).tolist()
+        for first, last in zip([begin, *cuts], [*cuts, end], strict=True):
+            if first > begin:
+                self._file.flush()
+            self._add_rows(block.times[first:last], block.walls[first:last], block.rows[first:last])
+
+    def _add_rows(self, times: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
+        log_times = self._run_begins_ns + times if self._simulated_log else walls.copy()
+        self._latest_log_ns = max(self._latest_log_ns, int(log_times.max()))
         listed = rows.tolist()
         for name in ("pose", "twist"):
             project = session_messages.PROJECTIONS[name]

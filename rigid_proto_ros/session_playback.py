@@ -8,6 +8,7 @@ import numpy as np
 from .core.errors import InputError
 from .core.observer import BodySnapshot, Observer
 from .core.simulation import Simulation
+from .ghost import ghost_of
 from .offline import tell_start
 from .recorded_session import RecordedSession
 from .replay import resimulation
@@ -27,6 +28,7 @@ def play(session: RecordedSession, observer: Observer, given: Scenario | None = 
     again = resimulation(session, observer)
     tell_start(observer, again.scenario)
     again.simulation.announce()
+    again.ghost = ghost_of(again.scenario, again.simulation, observer)
     for time_ns, row in sorted_states(session):
         try:
             computed = again.advance(time_ns)
@@ -34,6 +36,9 @@ def play(session: RecordedSession, observer: Observer, given: Scenario | None = 
             # A command that can't have been taken: from here on what was recorded is all there is.
             computed = row
         observer.state(time_ns, computed if _published_alike(session, computed, row) else row)
+        again.simulation.tell_status()
+        if again.ghost is not None:
+            again.ghost.advance(time_ns)
 
 
 def sorted_states(session: RecordedSession):

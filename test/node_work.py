@@ -16,7 +16,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from rigid_proto_ros import cdr
-from rigid_proto_ros.core.observer import Observer
 from rigid_proto_ros.ros import main as node_main
 from rigid_proto_ros.ros.node import RigidBodyNode
 from rigid_proto_ros.ros.physics_thread import PhysicsThread
@@ -32,7 +31,7 @@ def main(scenario: str) -> None:
     counts: Counter[str] = Counter()
     parameters = dict(SPIN) if scenario != "at_rest" else {"publish_rate": 500.0}
     overrides = [rclpy.parameter.Parameter(name, value=value) for name, value in parameters.items()]
-    node = RigidBodyNode(lambda *_: Observer(), parameter_overrides=overrides)
+    node = RigidBodyNode(parameter_overrides=overrides)
     node_main._warm_up(node)
     count_publications(counts)
     messages = count_messages(counts)

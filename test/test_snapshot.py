@@ -65,6 +65,18 @@ def test_the_whole_layout_is_drawn_also_from_a_cut_file(recording, tmp_path):
         assert image.width == 1200 and 600 < image.height <= 700
 
 
+def test_tabs_and_views_behind_the_front_one_can_be_drawn_by_name(recording, tmp_path):
+    for name in ("debugging", "State", "Plain"):
+        picture = tmp_path / f"{name}.png"
+        take(str(recording), "--at", "0.3", "-o", str(picture), "--view", name, "--size", "1000x600")
+        assert not is_blank(picture.read_bytes())
+    with Image.open(tmp_path / "State.png") as part, Image.open(tmp_path / "debugging.png") as whole:
+        assert part.width < whole.width == 1000
+    args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"), "--view", "nothing")
+    with pytest.raises(InputError, match="Debugging.*Flight.*Lesson"):
+        args.run(args)
+
+
 @pytest.mark.parametrize(
     ("words", "field"),
     [

@@ -19,7 +19,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument("session", metavar="SESSION", help="an .rrd recording")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
     parser.add_argument("-o", "--output", metavar="X.png", required=True, help="the picture to write")
-    parser.add_argument("--view", metavar="NAME", default="", help="one view of the layout, such as Flight, alone")
+    parser.add_argument(
+        "--view",
+        metavar="NAME",
+        default="",
+        help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Flight",
+    )
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
     parser.set_defaults(run=run)
 

@@ -137,8 +137,8 @@ class MeshMoments:
 
     vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``closed``
     False says that the surface bounds no solid: the solid model, and a density, are then refused with
-    ``closed_reason`` and ``remedy``, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is then taken
-    instead. A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed earlier, by
+    ``closed_reason`` and ``remedy``, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is
+    then taken instead. A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed earlier, by
     model; ``remember`` is called with all of them whenever another one has been computed.
     """
 
@@ -165,7 +165,7 @@ class MeshMoments:
         self.name = name
         self.stand_in = stand_in
         self._remember = remember
-        self._moments: dict[str | tuple, Moments] = dict(known or {})
+        self._moments: dict[str | tuple, Moments] = dict((known or {}).items())
 
     @property
     def turned(self) -> bool:

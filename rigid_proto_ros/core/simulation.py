@@ -71,16 +71,22 @@ class Simulation:
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
-        self.observer = observer or Observer()
-        self._shows_loads = listens(self.observer, "load_began")
-        self._shows_status = listens(self.observer, "status")
+        self.watch(observer or Observer())
         self.follower: Follower | None = None
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self._load_ids = 0
+        self._held: _Acting | None = None
         check_carried(setup.integrator, _needs(setup, (), setup.string.attached))
         self._start_over()
+
+    def watch(self, observer: Observer) -> None:
+        """Tell this observer from now on, and no other."""
+        self.observer = observer
+        self._shows_loads = listens(observer, "load_began")
+        self._shows_status = listens(observer, "status")
+        self._told: dict[str, str] = {}
 
     # What a caller may ask
 
@@ -235,6 +241,16 @@ class Simulation:
         """Tell the observer about the body as it is now."""
         self.observer.body_changed(self.time_ns, self.snapshot())
 
+    def introduce(self, observer: Observer) -> None:
+        """Tell an observer that comes in flight about the body, what acts on it and the string."""
+        observer.body_changed(self.time_ns, self.snapshot())
+        if listens(observer, "load_began"):
+            for acting in self._acting():
+                kind = "wrench" if acting is self._held else "poke"
+                observer.load_began(self.time_ns, acting.load_id, self._shown(kind, acting.load))
+        if self.string is not None:
+            observer.string_changed(self.time_ns, self._shown_string(self.string))
+
     def tell_status(self, paused: bool = False) -> None:
         """Tell the observer what the body is doing, where that changed since it was last told."""
         if not self._shows_status:
@@ -363,8 +379,9 @@ class Simulation:
             self.observer.load_began(self.time_ns, self._load_ids, self._shown(command.kind, load))
 
     def _set_held_end(self) -> None:
-        timeout_ns = self.setup.wrench_timeout_ns
-        self._held.end_ns = max(self._held.begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
+        held, timeout_ns = self._held, self.setup.wrench_timeout_ns
+        if held is not None:
+            held.end_ns = max(held.begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
 
     def _end_loads(self, ends) -> bool:
         ended = [acting for acting in self._acting() if ends(acting)]
@@ -390,9 +407,10 @@ class Simulation:
             row[0:3] += shift
             row[7:10] += cross(self.state.angular_velocity, shift)
             self.state = replace(self.state, row=row)
-        if self._held is not None:
-            self._set_held_end()
+        self._set_held_end()
         self._string.change(old, new, self.state)
+        if new.surface is not old.surface and new.surface is not None:
+            self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))
         self.announce()
 
     # Segments
@@ -429,9 +447,9 @@ class Simulation:
         return loads
 
     def _start_over(self) -> None:
-        self._told: dict[str, str] = {}
+        self._told = {}
         self._pending: list[tuple] = []
-        self._held: _Acting | None = None
+        self._held = None
         self._pulses: list[_Acting] = []
         self._finished_steps = 0
         self._finished_evaluations = 0
@@ -468,12 +486,12 @@ class Simulation:
         self._told_string = tied
         if not listens(self.observer, "string_changed"):
             return
-        shown = None
-        if tied is not None:
-            arm = np.asarray(tied.arm(self.setup.body))
-            ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
-            shown = ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
-        self.observer.string_changed(self.time_ns, shown)
+        self.observer.string_changed(self.time_ns, None if tied is None else self._shown_string(tied))
+
+    def _shown_string(self, tied: Tied) -> ShownString:
+        arm = np.asarray(tied.arm(self.setup.body))
+        ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
+        return ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
 
     def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
         """The body as an observer is told of it; of another setup, when one is given."""

@@ -78,12 +78,17 @@ def _read(path: Path, session: RecordedSession) -> None:
             session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
         elif entity.startswith(e.BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
             session.mesh_chunks += 1
-        elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity < first_mesh):
+        elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity <= first_mesh):
             # A run may have had several; it began with the first.
             first_mesh = entity
-            session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
-            session.vertices = _flat(batch, "vertices").reshape(-1, 3)
-            session.triangles = _flat(batch, "triangles").reshape(-1, 3)
+            # Columns of one entity may lie in chunks of their own, as in a file that was mended.
+            held = batch.schema.names
+            if "sha256" in held:
+                session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
+            if "vertices" in held:
+                session.vertices = _flat(batch, "vertices").reshape(-1, 3)
+            if "triangles" in held:
+                session.triangles = _flat(batch, "triangles").reshape(-1, 3)
     session.events, session.refusals = events, refusals
     if times:
         session.times, session.rows = np.concatenate(times), np.concatenate(rows)

@@ -20,6 +20,7 @@ from . import entities as e
 from .ports import LOOPBACK, any_free_port
 from .reader import read_session
 from .rrd_file import whole_part
+from .tabs import bring_to_front
 from .viewers import ViewerProcess, open_headless
 
 START_TIMEOUT_S = 60.0
@@ -39,7 +40,7 @@ DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan
 def take_picture(
     session_path: str | Path, at_s: float, picture: str | Path, view: str = "", size: tuple[int, int] = (1600, 900)
 ) -> None:
-    """Write a .png of the recording at simulated time ``at_s``: the whole layout, or the view of this name.
+    """Write a .png of the recording at simulated time ``at_s``: the whole layout, its tab of this name, or the view.
 
     Raises InputError for a time that wasn't recorded, a view that isn't there, a picture that can't be written, and a
     machine without the drivers.
@@ -55,8 +56,9 @@ def take_picture(
         client = stack.enter_context(headless_viewer(*size))
         show(client, readable)
         client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
-        if view:
-            pixels = _settled(client, _view_id(client, view))
+        view_id = bring_to_front(client, view) if view else None
+        if view_id is not None:
+            pixels = _settled(client, view_id)
         else:
             client.run_command("ui.toggle_top_panel")
             time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
@@ -139,14 +141,6 @@ def complaints(client: Any) -> list[str]:
         if entry.level in ("WARN", "ERROR") and not entry.target.startswith(MACHINE_TARGETS)
     ]
     return reports + logged
-
-
-def _view_id(client: Any, name: str) -> str:
-    views = {view.name: view.view_id for view in client.get_state().views}
-    for known, view_id in views.items():
-        if known.lower() == name.lower():
-            return view_id
-    raise InputError("--view", name, "one of " + ", ".join(sorted(views)))
 
 
 def _settled(client: Any, view_id: str | None) -> bytes:

@@ -61,7 +61,7 @@ class Flight:
         on_failure: Callable[[str], None],
         followed_clock: Callable[[], int] | None = None,
         anybody_listens: Callable[[], bool] = lambda: True,
-        is_viewed: bool = False,
+        is_viewed: Callable[[], bool] = lambda: False,
     ) -> None:
         self.scenario = scenario
         self.observer = observer
@@ -89,12 +89,21 @@ class Flight:
         self.scenario = scenario
         if self._ghost is not None:
             self._ghost.change(self.simulation.time_ns, scenario)
-        elif self._is_viewed and scenario.ghost is not None:
+        elif self._is_viewed() and scenario.ghost is not None:
             self._ghost = ghost_of(scenario, self.simulation, self.observer)
         if rate_changed:
             self._find_next_publication()
         if pace_changed:
             self._anchor()
+
+    def watch(self, observer: Observer) -> None:
+        """Tell another observer from now on."""
+        self.observer = observer
+        self.simulation.watch(observer)
+        if self._ghost is not None:
+            self._ghost.watch(observer)
+        elif self._is_viewed():
+            self._ghost = ghost_of(self.scenario, self.simulation, observer)
 
     def pause(self, paused: bool) -> None:
         """Stop or resume simulated time."""
@@ -130,7 +139,7 @@ class Flight:
 
     def start(self) -> None:
         """Simulated time begins now."""
-        if self._is_viewed:
+        if self._is_viewed():
             self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
         self._anchor()
 
@@ -173,7 +182,7 @@ class Flight:
     def _pass_over(self, present_ns: int) -> None:
         """Make no publication up to the present, but for what a run without pacing goes by."""
         if self._factor > 0.0 or self._followed_clock:
-            numerator, denominator = self.scenario.values["publish_rate"].as_integer_ratio()
+            numerator, denominator = float(self.scenario.values["publish_rate"]).as_integer_ratio()
             # One early, and then on: the estimate is floored and publications are rounded.
             self._publication = max(self._publication, present_ns * numerator // (1_000_000_000 * denominator) - 1)
             while self._publication_ns() <= present_ns:

@@ -6,8 +6,9 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-import time
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
@@ -60,13 +61,13 @@ def _run(argv: list[str], stop: threading.Event) -> int:
 
     physics = None
     try:
-        with _saying_when_slow():
+        with _saying_when_compiling():
             if bodies:
                 for body_name, values in bodies.items():
                     overrides = given_parameters(values)
-                    nodes.append(RigidBodyNode(_make_observer, body_name, parameter_overrides=overrides))
+                    nodes.append(RigidBodyNode(_make_viewer, body_name, parameter_overrides=overrides))
             else:
-                nodes.append(RigidBodyNode(_make_observer))
+                nodes.append(RigidBodyNode(_make_viewer))
             for node in nodes:
                 node.states.pack_all(warm_up(node.flight.scenario.setup))
         physics = PhysicsThread([node.flight for node in nodes], on_crash)
@@ -110,36 +111,24 @@ def _warn(warning: str) -> None:
     print(f"rigid_body_node: {warning}", file=sys.stderr)
 
 
-def _make_observer(scenario, node_name: str):
-    """Rerun is imported only when something is to be shown or recorded with it."""
-    from ..core.observer import Observer, Observers
-    from ..session_recorder import is_mcap, make_recorder
+def _make_viewer(scenario, node_name: str):
+    """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
+    values = scenario.values
+    if values["viewer"] == "none":
+        return None
+    from ..rerun_view import RerunObserver
 
     def tell(line: str) -> None:
         print(f"{node_name}: {line}", file=sys.stderr)
 
-    values = scenario.values
-    record, observers = values["record"], []
-    if is_mcap(record):
-        observers.append(make_recorder(record, node_name, values, tell))
-        record = ""
-    if record or values["viewer"] != "none":
-        from ..rerun_view import RerunObserver
-
-        observers.append(
-            RerunObserver(
-                record=record,
-                viewer=values["viewer"],
-                rerun_port=_asked_for(values, "rerun_port"),
-                web_port=_asked_for(values, "web_port"),
-                name=node_name,
-                report=tell,
-                on_error=tell,
-            )
-        )
-    if len(observers) < 2:
-        return observers[0] if observers else Observer()
-    return Observers(*observers)
+    return RerunObserver(
+        viewer=values["viewer"],
+        rerun_port=_asked_for(values, "rerun_port"),
+        web_port=_asked_for(values, "web_port"),
+        name=node_name,
+        report=tell,
+        on_error=tell,
+    )
 
 
 def _asked_for(values, port: str) -> int | None:
@@ -147,23 +136,24 @@ def _asked_for(values, port: str) -> int | None:
     return None if values[port] == PARAMETERS[port].default else values[port]
 
 
-class _saying_when_slow:
-    """Says that kernels are being compiled when the start takes longer than it does with cached ones."""
+@contextmanager
+def _saying_when_compiling() -> Iterator[None]:
+    """Says once that kernels are being compiled; cached ones compile nothing and nothing is said."""
+    from numba.core import event
 
-    def __enter__(self):
-        self._started = time.monotonic()
-        self._timer = threading.Timer(
-            2.0,
-            lambda: print(
-                "rigid_body_node: still starting; a first start compiles kernels, which takes a while ...",
-                file=sys.stderr,
-            ),
-        )
-        self._timer.daemon = True
-        self._timer.start()
+    class Listener(event.Listener):
+        said = False
 
-    def __exit__(self, *_):
-        self._timer.cancel()
+        def on_start(self, _) -> None:
+            if not self.said:
+                self.said = True
+                print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
+
+        def on_end(self, _) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
 
 
 def _described(node) -> str:

@@ -7,6 +7,7 @@ physics thread takes them itself (command_intake).
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -32,7 +33,7 @@ from .warm_up import warm_up
 
 
 class RigidBodyNode(Node):
-    """make_observer(scenario, node name) gives the viewer and recorder, or a null Observer. thread: the physics thread that
+    """make_viewer(scenario, node name) gives an observer that shows the flight, or None. thread: the physics thread that
     carries ``flight``, to be set before anything is asked of the running node.
 
     Raises InputError when a parameter given at start is refused.
@@ -40,7 +41,7 @@ class RigidBodyNode(Node):
 
     def __init__(
         self,
-        make_observer: Callable[[Scenario, str], Observer] | None = None,
+        make_viewer: Callable[[Scenario, str], Observer | None] = lambda *_: None,
         node_name: str = NODE_NAME,
         **node_options,
     ) -> None:
@@ -51,9 +52,10 @@ class RigidBodyNode(Node):
             self.get_logger().warning(warning)
         self.world_frame = scenario.values["world_frame"]
         self.body_frame = scenario.values["body_frame"] or self.get_name()
-        viewer = make_observer(scenario, self.get_name()) if make_observer else Observer()
-        self._is_viewed = type(viewer) is not Observer
-        self.observer = Observers(EventPublisher(self, self.body_frame, self._mesh_path), viewer)
+        self._event_publisher = EventPublisher(self, self.body_frame, self._mesh_path)
+        self._viewer = make_viewer(scenario, self.get_name())
+        self._recorder = self._open_recorder(scenario)
+        self.observer = self._observers()
         self.states = StatePublisher(self, self.world_frame, self.body_frame, self._specific_force)
         self.states.configure(scenario.values)
         self.flight = Flight(
@@ -94,6 +96,37 @@ class RigidBodyNode(Node):
         """After the physics thread has ended: whatever the observers hold goes out."""
         self.observer.close()
 
+    def _observers(self) -> Observers:
+        """All who watch the flight now."""
+        return Observers(*filter(None, (self._event_publisher, self._viewer, self._recorder)))
+
+    def _is_viewed(self) -> bool:
+        return self._viewer is not None or self._recorder is not None
+
+    def _open_recorder(self, scenario: Scenario) -> Observer | None:
+        """The recorder that ``record`` asks for; raises InputError when its file can't be written."""
+        path = scenario.values["record"]
+        if not path:
+            return None
+        from ..session_recorder import make_recorder
+
+        return make_recorder(path, self.get_name(), scenario.values, self._recording_failed)
+
+    def _recording_failed(self, message: str) -> None:
+        print(f"{self.get_name()}: {message}", file=sys.stderr)
+
+    def _switch_recording(self, recorder: Observer | None) -> None:
+        """On the physics thread: the old recording is finished, the new one is told what flies."""
+        finished, self._recorder = self._recorder, recorder
+        self.observer = self._observers()
+        self.flight.watch(self.observer)
+        if recorder is not None:
+            tell_start(recorder, self.flight.scenario)
+            recorder.scene_changed(self.flight.simulation.time_ns, self.flight.scenario.text)
+            self.flight.simulation.introduce(recorder)
+        if finished is not None:
+            finished.close()
+
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
         """/clock, when use_sim_time asks for it and it isn't our own."""
         if not self.get_parameter("use_sim_time").value or scenario.values["publish_clock"]:
@@ -104,7 +137,7 @@ class RigidBodyNode(Node):
     # Commands, on the physics thread
 
     def _anybody_listens(self) -> bool:
-        return self.states.look_for_subscribers() or self._is_viewed
+        return self.states.look_for_subscribers() or self._is_viewed()
 
     def _take_commands(self, wall_ns: int) -> bool:
         return self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
@@ -182,6 +215,12 @@ class RigidBodyNode(Node):
         planned = present.with_changes(changes)
         if planned.setup.integrator is not present.setup.integrator:
             self._warm_up(planned)
+        recorder = None
+        if "record" in changes:
+            if changes["record"] == present.values["record"]:
+                changes = {name: value for name, value in changes.items() if name != "record"}
+            else:
+                recorder = self._open_recorder(planned)
 
         def change() -> None:
             scenario = self.flight.scenario.with_changes(changes)
@@ -195,6 +234,8 @@ class RigidBodyNode(Node):
             self._tell_scene(scenario)
 
         self.call(change)
+        if "record" in changes:
+            self.call(lambda: self._switch_recording(recorder))
         self.states.configure(self.flight.scenario.values)
 
     def _warm_up(self, scenario: Scenario) -> None:
@@ -271,7 +312,7 @@ class RigidBodyNode(Node):
             "steps": simulation.steps,
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
-            "recording": flight.scenario.values["record"],
+            "recording": "" if getattr(self._recorder, "error", "") else flight.scenario.values["record"],
             "warning": simulation.failure or simulation.too_coarse,
         }
 

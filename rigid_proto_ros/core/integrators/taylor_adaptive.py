@@ -23,8 +23,8 @@ scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed.
 
 
 def degree_for(accuracy: float) -> int:
-    """The degree at which work per time is smallest for this accuracy."""
-    return min(max(round(-1.15 * math.log10(accuracy) + 6.0), 6), 24)
+    """The degree at which work per time is smallest for this accuracy: measured, a flat minimum (12 at 1e-3, 19 at 1e-9)."""
+    return min(max(round(8.5 - 1.15 * math.log10(accuracy)), 6), 26)
 
 
 @njit(cache=True, error_model="numpy")
