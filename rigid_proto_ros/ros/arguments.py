@@ -6,11 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..core.errors import InputError
-from ..parameters import parameter_named
+from ..parameters import is_ros_parameter, parameter_named
 from ..scene_file import compose_text, read_scene_file, scalar
-
-ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-"""Parameters that every rclpy node has; a name ending in a dot is a prefix."""
 
 
 def check_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> None:
@@ -73,8 +70,3 @@ def _check_assignment(text: str, node_name: str) -> None:
             raise InputError(
                 f"-p {name}", value, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]"
             )
-
-
-def is_ros_parameter(name: str) -> bool:
-    """Whether the name is one that every rclpy node has."""
-    return any(name == known or (known.endswith(".") and name.startswith(known)) for known in ROS_PARAMETERS)
