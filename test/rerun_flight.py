@@ -42,7 +42,7 @@ def rows(count: int, seed: int = 7) -> np.ndarray:
 
 
 def fly(observer: Observer, states: np.ndarray) -> None:
-    """A run of ``states``: a poke acts from 200 to 400 ms, a wrench from 305 ms to the end, a refusal comes at 500 ms."""
+    """A run of ``states``: a poke from 200 to 400 ms, a wrench from 305 ms to the end, a refusal at 500 ms."""
     observer.started(SCENE, VERTICES, TRIANGLES, SHA256)
     observer.body_changed(0, BODY)
     for k, row in enumerate(states):

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import os
 import socket
+import subprocess
+import sys
 import time
 import urllib.request
 from pathlib import Path
@@ -93,6 +96,41 @@ def _page(address: str) -> bytes:
             return answer.read()
     except OSError:
         return b""
+
+
+WATCHED_RUN = """
+import time
+from rigid_proto_ros.rerun_view import RerunObserver
+observer = RerunObserver(viewer="web")
+print(observer._processes[0].process.pid, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux ends a child with its parent")
+def test_a_killed_run_leaves_no_viewer_behind():
+    run = subprocess.Popen(
+        [sys.executable, "-c", WATCHED_RUN],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    try:
+        viewer_pid = int(run.stdout.readline())
+        assert _is_running(viewer_pid)
+    finally:
+        run.kill()
+        run.wait()
+        run.stdout.close()
+    wait_for(lambda: not _is_running(viewer_pid))
+
+
+def _is_running(pid: int) -> bool:
+    """Neither gone nor a zombie that nobody has collected."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_a_missing_viewer_is_a_warning_and_the_run_is_recorded(tmp_path, monkeypatch):

@@ -355,8 +355,8 @@ def test_the_next_run_starts_from_the_parameters_then_in_force(tmp_path):
     ("line", "said"),
     [
         (
-            '{"time_ns": 5, "kind": "poke", "content": {"stamp_ns": 5, "frame_id": "world@rim", "force": [0.0, 0.0, 3.0], '
-            '"torque": [0.0, 0.0, 0.0]}, "sha256": "ab"}',
+            '{"time_ns": 5, "kind": "poke", "content": {"stamp_ns": 5, "frame_id": "world@rim", "force": '
+            '[0.0, 0.0, 3.0], "torque": [0.0, 0.0, 0.0]}, "sha256": "ab"}',
             "poke world@rim, force [0, 0, 3]",
         ),
         ('{"time_ns": 5, "kind": "reset", "content": {}, "sha256": "ab"}', "reset"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import signal
 import sys
 
 from .. import __version__
@@ -44,13 +45,17 @@ def main(argv: list[str] | None = None) -> int:
         else:
             subparsers.add_parser(name, help=summary)
     args = parser.parse_args(argv)
+    # SIGTERM ends a command as Ctrl-C does, through every finally.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return args.run(args)
     except InputError as error:
         print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        return 130
+        # Asked to end, and ended: files are closed, children are gone.
+        print(f"rigid_proto {args.command}: stopped", file=sys.stderr)
+        return 0
     except BrokenPipeError:
         # The reader of our output went away, as `| head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -34,7 +34,7 @@ class Processes:
         self._handler = None
 
     def __enter__(self) -> Processes:
-        self._handler = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+        self._handler = signal.signal(signal.SIGTERM, signal.default_int_handler)
         return self
 
     def __exit__(self, *_) -> None:

@@ -22,7 +22,8 @@ class IntegrationFailed(ArithmeticError):
 
     def __init__(self, last_good: State) -> None:
         self.last_good = last_good
-        super().__init__(f"the motion passed {MAX_SPEED:g} or was not finite after {last_good.time_ns * 1e-9:.9g} s")
+        when = f"{last_good.time_ns * 1e-9:.9g} s"
+        super().__init__(f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}")
 
 
 class Segment:

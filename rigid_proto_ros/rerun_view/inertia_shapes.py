@@ -42,7 +42,7 @@ class PrincipalFrame:
 
 
 def bounding_box(vertices: np.ndarray, scale: np.ndarray, center_of_mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centre (3,) and half sizes (3,) [m, body axes from the COM] of the box along the mesh axes around all vertices."""
+    """Centre (3,) and half sizes (3,) [m, body axes from the COM] of the box along the mesh axes around the mesh."""
     scaled = vertices * scale
     low, high = scaled.min(axis=0), scaled.max(axis=0)
     return 0.5 * (low + high) - center_of_mass, 0.5 * (high - low)

@@ -4,9 +4,9 @@
 The stepping thread only copies a row into a buffer. One thread of our own empties it every half second and sends
 columns: into a file, to viewers on this machine, or both.
 
-Runs. A reset starts simulated time again at 0, and rows of two runs on one timeline could not be told apart, so every run is
-a recording of its own. Viewers show them side by side. In files, FILE.rrd always holds the newest run; at a reset the one
-before is kept beside it as FILE.run1.rrd, FILE.run2.rrd and so on, unless its time never left 0.
+Runs. A reset starts simulated time again at 0, and rows of two runs on one timeline could not be told apart, so every
+run is a recording of its own. Viewers show them side by side. In files, FILE.rrd always holds the newest run; at a
+reset the one before is kept beside it as FILE.run1.rrd, FILE.run2.rrd and so on, unless its time never left 0.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ class RerunObserver(Observer):
 
     viewer: ``none``; ``serve`` hosts the live stream on loopback; ``web`` serves the web viewer too; ``native`` opens
     the viewer's window. rerun_port and web_port: None takes the first free port from the default on; a number is used
-    or refused. initial_view: the tab of the layout that is in front. ``report`` gets one line for every address and every
-    warning, ``on_error`` one line when recording has stopped because the file can't be written; both may be called from
-    another thread.
+    or refused. initial_view: the tab of the layout that is in front. ``report`` gets one line for every address and
+    every warning, ``on_error`` one line when recording has stopped because the file can't be written; both may be
+    called from another thread.
 
     Raises InputError for a file that can't be written, a port that is taken, an unknown viewer.
     """
@@ -180,7 +180,8 @@ class RerunObserver(Observer):
     def start_recording(self, path: str) -> None:
         """Record to this file from now on; one that was being written is finished first.
 
-        Raises InputError where the file can't be written. A recording that begins in flight shows everything from there on.
+        Raises InputError where the file can't be written. A recording that begins in flight shows everything from then
+        on.
         """
         self._begin().open_file(Path(path))
 

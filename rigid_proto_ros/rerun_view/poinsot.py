@@ -27,8 +27,8 @@ def semi_axes(moments: np.ndarray, energy: float) -> np.ndarray:
 def polhode(moments: np.ndarray, energy: float, w: np.ndarray) -> np.ndarray:
     """The closed curve (n, 3) on the ellipsoid through ω (3,), which has the energy T.
 
-    The curve surrounds the axis of the largest moment if L² > 2T·I2, else that of the smallest. L² − 2T·Ii is taken from
-    ω directly: as a difference of L² and 2T it would cancel near the axis.
+    The curve surrounds the axis of the largest moment if L² > 2T·I2, else that of the smallest. L² − 2T·Ii is taken
+    from ω directly: as a difference of L² and 2T it would cancel near the axis.
     """
     I1, I2, I3 = moments
     squares = w * w

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Draws Poinsot's construction beside the flight; see poinsot.py for the mathematics.
 
-Lengths are ω divided by the mean of the ellipsoid's two longer semi-axes (the geometric one), so that the picture has about the
+Lengths are ω divided by the geometric mean of the ellipsoid's two longer semi-axes, so that the picture has about the
 same size for every body and spin. It is turned to have the invariable plane as floor.
 """
 

@@ -58,7 +58,7 @@ class Stream:
         rr.log(entity, *values, static=True, recording=self.recording)
 
     def is_framed_for(self, size: float, ghost: bool) -> bool:
-        """Whether the layout sent last still fits: every layout sent costs two threads that the SDK never gives back."""
+        """Whether the layout sent last still fits: each that is sent costs two threads that the SDK never gives back."""
         return self.framed is not None and self.framed[1] == ghost and 0.5 <= size / self.framed[0] <= 2.0
 
     def send_blueprint(self, blueprint: Any) -> None:

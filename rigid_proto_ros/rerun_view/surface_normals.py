@@ -43,7 +43,7 @@ def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
 
 
 def _corner_normals(corner_vertex: np.ndarray, corner_face: np.ndarray, face_area_normals: np.ndarray) -> np.ndarray:
-    """Per corner the area-weighted mean of the normals around its vertex that lie within the crease angle of its own."""
+    """Per corner the area-weighted mean of the normals around its vertex that lie within the crease angle of it."""
     unit = _unit(face_area_normals)
     order = np.argsort(corner_vertex, kind="stable")
     counts = np.bincount(corner_vertex)

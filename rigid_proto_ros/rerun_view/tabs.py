@@ -11,8 +11,8 @@ from ..core.errors import InputError
 def bring_to_front(client: Any, name: str) -> str | None:
     """The id of the view of this name, in front now; None for a name of a whole tab, such as ``Lesson``.
 
-    Case doesn't matter; of views with equal names that of the tab in front comes first. Raises InputError with the names
-    there are.
+    Case doesn't matter; of views with equal names that of the tab in front comes first. Raises InputError with the
+    names there are.
     """
     blueprint = client.get_blueprint(of="recording").blueprint
     views = {f"view/{view.view_id}": view.name for view in client.get_state().views}

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""SIGINT and SIGTERM end every command with status 0, a complete recording and no orphan."""
+
+import signal
+
+import pytest
+from ros_process import RosProcess, alive, descendants, running_node
+
+from rigid_proto_ros.rerun_view.reader import read_session
+
+BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+
+
+@BOTH
+def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
+    demo = RosProcess("rigid_proto", "demo", "--out", tmp_path, environment=ros_environment, log=tmp_path / "demo")
+    demo.wait_for("3. flying")
+    children = descendants(demo.pid)
+    assert children
+    assert demo.end(number) == 0, demo.errors
+    assert "Traceback" not in demo.errors
+    assert not [pid for pid in children if alive(pid)]
+    assert read_session(tmp_path / "session.rrd").complete
+
+
+@BOTH
+def test_up_without_a_viewer_ends(ros_environment, tmp_path, number):
+    up = RosProcess("rigid_proto", "up", "--viewer", "none", environment=ros_environment, log=tmp_path / "up")
+    up.wait_for("is flying")
+    children = descendants(up.pid)
+    assert up.end(number) == 0, up.errors
+    assert not [pid for pid in children if alive(pid)]
+
+
+@BOTH
+def test_a_waiting_client_and_an_offline_run_end(ros_environment, tmp_path, number):
+    script = tmp_path / "late.yaml"
+    script.write_text("- {t: 1000, at: com, force: [0, 0, 1]}\n")
+    session = tmp_path / "run.rrd"
+    with running_node(environment=ros_environment, log=tmp_path / "node"):
+        client = RosProcess("poke_client", script, environment=ros_environment, log=tmp_path / "client")
+        # The command lies too far ahead to be sent: it waits, beside a long offline run.
+        flight = RosProcess(
+            *("rigid_proto", "simulate", "t_handle", "--duration", 1e6, "--record", session),
+            environment=ros_environment,
+            log=tmp_path / "flight",
+        )
+        while not (session.exists() and session.stat().st_size > 10_000):
+            assert flight.process.poll() is None, flight.errors
+        assert flight.end(number) == 0, flight.errors
+        assert client.end(number) == 0, client.errors
+    assert "Traceback" not in flight.errors + client.errors
+    assert read_session(session).complete
