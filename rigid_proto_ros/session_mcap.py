@@ -263,7 +263,7 @@ def read_mcap(data: bytes, name: str, wanted: Any = lambda topic: True) -> McapC
     return content
 
 
-_READERS: dict[int, type] = {
+_READERS: dict[int, Any] = {
     Opcode.SCHEMA: records.Schema,
     Opcode.CHANNEL: records.Channel,
     Opcode.ATTACHMENT: records.Attachment,

@@ -136,3 +136,28 @@ def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_
     assert main(["replay", str(path), "--verify"]) == 0
     if ending == ".mcap":
         assert runs[0].node_name == "flyer"
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
+    ros_environment, tmp_path, ending
+):
+    path = tmp_path / f"session{ending}"
+    arguments = ["--params-file", scene_path("hammer")]
+    with running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"):
+        client = NodeClient(ros_environment)
+        try:
+            client.wrench("poke", 0, "body@com;impulse", (0.0, 0.3, 0.0))
+            client.set(record=str(path))
+            client.states.clear()
+            client.spin_until(lambda: len(client.states) > 100, "half a second of states")
+            client.set(record="")
+            late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
+            assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
+            assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
+            client.set(record=str(path))
+            client.trigger("reset")
+            client.fly_until(SECOND // 2)
+        finally:
+            client.close()
+    assert main(["replay", str(path), "--verify"]) == 0

@@ -47,7 +47,7 @@ def fly_on(folder, seconds: float) -> np.ndarray:
     return run.simulation.state.row
 
 
-# What acts at the time; the difference from the session half a second later, measured 1e-15 to 4e-13.
+# auto begins its steps anew and errs by accuracy, 1e-9 a second; measured 4e-15 without loads, 5e-10 with them.
 @pytest.mark.parametrize("at", [0.0, 0.1, 0.3, 0.45, 0.85, 1.05, 1.75, 2.2])
 def test_a_branch_flies_on_as_the_session_did(session, tmp_path, at, capsys):
     until = {0.0: 0.15, 0.1: 0.05, 0.3: 0.08, 0.45: 0.3, 0.85: 0.04, 1.05: 0.5, 1.75: 0.5, 2.2: 0.5}[at]
@@ -56,7 +56,7 @@ def test_a_branch_flies_on_as_the_session_did(session, tmp_path, at, capsys):
     (recorded,) = read_runs(session)
     k = recorded.times.tolist().index(round((at + until) * SECOND))
     row = fly_on(tmp_path, until)
-    assert np.abs(row - recorded.rows[k]).max() < 1e-9
+    assert np.abs(row - recorded.rows[k]).max() < 2e-9
     acting = 0.2 < at < 1.7
     assert (tmp_path / "x_pokes.yaml").exists() == acting
     assert ("--script" in said) == acting
