@@ -71,7 +71,7 @@ class ScriptCommand:
 
     def schedule_text(self, stamp_ns: int) -> str:
         """A ``set``, ``release`` or ``clear_wrench`` entry for the schedule topic, with an absolute time."""
-        content = {"set": {"set": self.changes}, "string_release": {"string": "release"}}
+        content: dict[str, dict] = {"set": {"set": self.changes}, "string_release": {"string": "release"}}
         entry = {"t": stamp_ns / 1e9, **content.get(self.kind, {"service": self.kind})}
         return yaml.safe_dump(entry, default_flow_style=True, width=math.inf).strip()
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 _MODULES = {"rigid_body_node": "rigid_proto_ros.ros.main", "poke_client": "rigid_proto_ros.ros.poke_client"}
 GRACE_S = 5.0
@@ -31,7 +32,7 @@ class Processes:
 
     def __init__(self) -> None:
         self._running: list[subprocess.Popen] = []
-        self._handler = None
+        self._handler: Any = None
 
     def __enter__(self) -> Processes:
         self._handler = signal.signal(signal.SIGTERM, signal.default_int_handler)

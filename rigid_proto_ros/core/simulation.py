@@ -77,6 +77,7 @@ class Simulation:
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self._load_ids = 0
+        self._held: _Acting | None = None
         check_carried(setup.integrator, _needs(setup, (), setup.string.attached))
         self._start_over()
 
@@ -378,8 +379,9 @@ class Simulation:
             self.observer.load_began(self.time_ns, self._load_ids, self._shown(command.kind, load))
 
     def _set_held_end(self) -> None:
-        timeout_ns = self.setup.wrench_timeout_ns
-        self._held.end_ns = max(self._held.begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
+        held, timeout_ns = self._held, self.setup.wrench_timeout_ns
+        if held is not None:
+            held.end_ns = max(held.begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
 
     def _end_loads(self, ends) -> bool:
         ended = [acting for acting in self._acting() if ends(acting)]
@@ -405,9 +407,10 @@ class Simulation:
             row[0:3] += shift
             row[7:10] += cross(self.state.angular_velocity, shift)
             self.state = replace(self.state, row=row)
-        if self._held is not None:
-            self._set_held_end()
+        self._set_held_end()
         self._string.change(old, new, self.state)
+        if new.surface is not old.surface and new.surface is not None:
+            self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))
         self.announce()
 
     # Segments
@@ -444,9 +447,9 @@ class Simulation:
         return loads
 
     def _start_over(self) -> None:
-        self._told: dict[str, str] = {}
+        self._told = {}
         self._pending: list[tuple] = []
-        self._held: _Acting | None = None
+        self._held = None
         self._pulses: list[_Acting] = []
         self._finished_steps = 0
         self._finished_evaluations = 0

@@ -183,7 +183,7 @@ class Flusher:
                 live = self.server.open_run(self.run_id, self.run_name)
                 self.server.end_run(stream)
                 writer.attach(live)
-            else:
+            elif isinstance(stream, FileStream):
                 try:
                     stream.close()
                     if moved:

@@ -182,7 +182,7 @@ class Flight:
     def _pass_over(self, present_ns: int) -> None:
         """Make no publication up to the present, but for what a run without pacing goes by."""
         if self._factor > 0.0 or self._followed_clock:
-            numerator, denominator = self.scenario.values["publish_rate"].as_integer_ratio()
+            numerator, denominator = float(self.scenario.values["publish_rate"]).as_integer_ratio()
             # One early, and then on: the estimate is floored and publications are rounded.
             self._publication = max(self._publication, present_ns * numerator // (1_000_000_000 * denominator) - 1)
             while self._publication_ns() <= present_ns:

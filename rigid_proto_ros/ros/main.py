@@ -6,8 +6,9 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-import time
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
@@ -60,7 +61,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
 
     physics = None
     try:
-        with _saying_when_slow():
+        with _saying_when_compiling():
             if bodies:
                 for body_name, values in bodies.items():
                     overrides = given_parameters(values)
@@ -135,23 +136,24 @@ def _asked_for(values, port: str) -> int | None:
     return None if values[port] == PARAMETERS[port].default else values[port]
 
 
-class _saying_when_slow:
-    """Says that kernels are being compiled when the start takes longer than it does with cached ones."""
+@contextmanager
+def _saying_when_compiling() -> Iterator[None]:
+    """Says once that kernels are being compiled; cached ones compile nothing and nothing is said."""
+    from numba.core import event
 
-    def __enter__(self):
-        self._started = time.monotonic()
-        self._timer = threading.Timer(
-            2.0,
-            lambda: print(
-                "rigid_body_node: still starting; a first start compiles kernels, which takes a while ...",
-                file=sys.stderr,
-            ),
-        )
-        self._timer.daemon = True
-        self._timer.start()
+    class Listener(event.Listener):
+        said = False
 
-    def __exit__(self, *_):
-        self._timer.cancel()
+        def on_start(self, _) -> None:
+            if not self.said:
+                self.said = True
+                print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
+
+        def on_end(self, _) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
 
 
 def _described(node) -> str:

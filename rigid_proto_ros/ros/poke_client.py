@@ -42,15 +42,21 @@ def main(argv: list[str] | None = None) -> int:
         return 0
 
 
+class _Parser(argparse.ArgumentParser):
+    """Usage errors as one line."""
+
+    def error(self, message: str):
+        self.exit(2, f"poke_client: {message} (see poke_client --help)\n")
+
+
 def _arguments(argv: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="poke_client",
         description="Send a poke script, or one command, to a running rigid_body node.",
         usage="poke_client (SCRIPT.yaml | poke ... | wrench ...) [--reset] [--lead S] [--node NAME]",
     )
     # argparse takes -2e-4 for an option: it knows no exponents.
     parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
-    parser.error = lambda message: parser.exit(2, f"poke_client: {message} (see poke_client --help)\n")
     parser.add_argument("what", metavar="SCRIPT.yaml | poke | wrench", help="a script, or one command from the line")
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")

@@ -9,6 +9,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
@@ -39,8 +40,8 @@ class StatePublisher:
         self._twist_template = cdr.StampedTemplate(world_frame, 6)
         self._odom_template = cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame)
         self._imu = publisher(Imu, "imu")
-        self._clock = None
-        self._tf = None
+        self._clock: Publisher | None = None
+        self._tf: Publisher | None = None
         self._wanted: list = []
 
     def configure(self, values: Mapping[str, object]) -> None:
