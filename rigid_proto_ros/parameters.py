@@ -206,6 +206,15 @@ def parameter_named(name: str) -> Parameter:
     raise InputError("parameter", name, f"a known parameter{hint}")
 
 
+ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+"""Parameters that every rclpy node has, so a dump of one holds them; a name ending in a dot is a prefix."""
+
+
+def is_ros_parameter(name: str) -> bool:
+    """Whether the name is one that every rclpy node has."""
+    return any(name == known or (known.endswith(".") and name.startswith(known)) for known in ROS_PARAMETERS)
+
+
 def convert_all(values: Mapping[str, object]) -> dict[str, object]:
     """Convert and check each value by its declaration; raises InputError."""
     return {name: parameter_named(name).convert(value) for name, value in values.items()}

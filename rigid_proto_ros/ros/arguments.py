@@ -6,11 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..core.errors import InputError
-from ..parameters import parameter_named
+from ..parameters import is_ros_parameter, parameter_named
 from ..scene_file import read_scene_file, typed_value
-
-ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-"""Parameters that every rclpy node has; a name ending in a dot is a prefix."""
 
 
 def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> dict[str, object]:
@@ -71,8 +68,3 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
     if not value.strip():
         raise InputError(f"-p {name}", value, parameter.accepted)
     return {name: typed_value(value, f"-p {name}")}
-
-
-def is_ros_parameter(name: str) -> bool:
-    """Whether the name is one that every rclpy node has."""
-    return any(name == known or (known.endswith(".") and name.startswith(known)) for known in ROS_PARAMETERS)
