@@ -13,7 +13,7 @@ from .core.errors import CommandRefused, InputError
 from .core.observer import Observer
 from .core.simulation import Simulation
 from .ghost import ghost_of
-from .parameters import parameter_named
+from .parameters import is_ros_parameter, parameter_named
 from .poke_script import ScriptCommand, core_command, with_contacts
 from .scenario import Scenario, make_scenario, publication_ns
 from .scene_file import read_scene_file, scalar
@@ -44,6 +44,8 @@ def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, o
     scene = read_scene_file(path)
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
+        if is_ros_parameter(parameter):
+            continue
         try:
             parameter_named(parameter)
         except InputError as error:

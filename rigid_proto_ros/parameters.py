@@ -9,8 +9,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import yaml
-
 from .core.errors import CommandRefused, InputError
 from .core.frames import check_contact_name
 from .core.integrators import INTEGRATORS
@@ -94,10 +92,9 @@ def _to_double(value):
 
 def _to_doubles(value):
     if isinstance(value, str):
-        try:
-            value = yaml.safe_load(value) if len(value) < 10_000 else None
-        except (yaml.YAMLError, ValueError, RecursionError):
-            return None
+        text = value.strip()
+        if text.startswith("[") and text.endswith("]"):
+            value = [item.strip(" '\"") for item in text[1:-1].split(",")]
     if _to_double(value) is not None:
         value = [value]
     if isinstance(value, (str, bytes, Mapping)) or not hasattr(value, "__iter__"):
@@ -207,6 +204,15 @@ def parameter_named(name: str) -> Parameter:
     near = difflib.get_close_matches(name, [*PARAMETERS, *PATTERNS], n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]}?" if near else ""
     raise InputError("parameter", name, f"a known parameter{hint}")
+
+
+ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+"""Parameters that every rclpy node has, so a dump of one holds them; a name ending in a dot is a prefix."""
+
+
+def is_ros_parameter(name: str) -> bool:
+    """Whether the name is one that every rclpy node has."""
+    return any(name == known or (known.endswith(".") and name.startswith(known)) for known in ROS_PARAMETERS)
 
 
 def convert_all(values: Mapping[str, object]) -> dict[str, object]:

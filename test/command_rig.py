@@ -230,6 +230,8 @@ def _text(value) -> str:
     return json.dumps(value)
 
 
+UNSTAMPED = {"header": {"stamp": {"sec": -1, "nanosec": 0}}}
+
 SCENE = {
     "mesh": "t_handle",
     "density": 7850.0,
@@ -287,12 +289,20 @@ class Commanded(RosClient):
 
     def start_over(self, paused: bool) -> None:
         """Time 0, paused or running; nothing heard of what was before."""
-        self.pause(paused)
+        self.pause(True)
+        self.heard("pose", clear=True)
         resets = len([event for event in self.events() if event["kind"] == "reset"])
         self.trigger("reset")
         self.until(lambda: len([e for e in self.events() if e["kind"] == "reset"]) > resets, "the reset")
+        # While paused states come at 10 Hz: once one of time 0 is here, no older one can follow.
+        for topic in ("pose", "twist", "odom"):
+            self.until(lambda topic=topic: stamp_ns((self.heard(topic, last=1) or [UNSTAMPED])[0]) == 0, "time 0")
         for topic in ("pose", "twist", "odom", "applied", "events"):
             self.heard(topic, clear=True)
+        if not paused:
+            self.pause(False)
+            self.until(lambda: [e for e in self.events() if e["kind"] == "pause"], "the start")
+            self.heard("events", clear=True)
 
     def counters(self) -> dict[str, int]:
         """All whole-number counters of a report that has everything sent so far, and its consequences."""

@@ -171,7 +171,7 @@ class Flight:
             if not self._publish_next():
                 return
             due_ns = self._publication_ns()
-            if due_ns <= present_ns and self._factor > 0.0:
+            if due_ns <= present_ns and self._factor > 0.0 and not self._followed_clock:
                 self.timekeeping.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
@@ -236,6 +236,7 @@ class Flight:
     def _anchor(self) -> None:
         self._last_drain_ns = time.monotonic_ns()
         self._anchor_wall_ns = self._followed_clock() if self._followed_clock else self._last_drain_ns
+        self._last_reading_ns = self._anchor_wall_ns
         self._anchor_simulated_ns = self.simulation.time_ns
         self._paused_publication_ns = 0
         self._next_look_ns = 0
@@ -243,8 +244,12 @@ class Flight:
     def _simulated_present_ns(self) -> int:
         """Simulated time that the wall clock asks for; time lost beyond MAX_LAG_NS is given up and counted."""
         if self._followed_clock:
-            passed_ns = self._followed_clock() - self._anchor_wall_ns
-            return max(self.simulation.time_ns, self._anchor_simulated_ns + passed_ns)
+            reading_ns = self._followed_clock()
+            if self._anchor_wall_ns == 0 or reading_ns < self._last_reading_ns:
+                # It hasn't begun before, or was set back: its steps count from here, simulated time goes on.
+                self._anchor()
+            self._last_reading_ns = reading_ns
+            return max(self.simulation.time_ns, self._anchor_simulated_ns + reading_ns - self._anchor_wall_ns)
         if self._factor == 0.0:
             return self._publication_ns()
         present_ns = self._anchor_simulated_ns + int((time.monotonic_ns() - self._anchor_wall_ns) * self._factor)

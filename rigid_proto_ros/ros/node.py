@@ -19,9 +19,8 @@ from ..core.commands import Change, ClearWrench, ReleaseString
 from ..core.errors import CommandRefused, InputError
 from ..core.observer import Observer, Observers
 from ..offline import tell_start
-from ..parameters import READ_ONLY, parameter_named
+from ..parameters import READ_ONLY, is_ros_parameter, parameter_named
 from ..scenario import Scenario, check_inertia, make_scenario
-from .arguments import is_ros_parameter
 from .command_intake import TOPICS, CommandIntake
 from .diagnostics import REFUSAL_REASONS, Diagnostics
 from .event_publisher import EventPublisher

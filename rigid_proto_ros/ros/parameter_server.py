@@ -9,8 +9,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from .. import parameters
 from ..core.errors import InputError
-from ..parameters import PARAMETERS, READ_ONLY, Parameter, parameter_named
-from .arguments import is_ros_parameter
+from ..parameters import PARAMETERS, READ_ONLY, Parameter, is_ros_parameter, parameter_named
 
 _TYPES = {
     "double": ParameterType.PARAMETER_DOUBLE,

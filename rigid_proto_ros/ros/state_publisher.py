@@ -42,19 +42,19 @@ class StatePublisher:
         self._imu = publisher(Imu, "imu")
         self._clock: Publisher | None = None
         self._tf: Publisher | None = None
+        self._made_clock: Publisher | None = None
+        self._made_tf: Publisher | None = None
         self._wanted: list = []
 
     def configure(self, values: Mapping[str, object]) -> None:
-        """Create or drop the publishers of /clock and /tf; runs on the executor's thread."""
-        if values["publish_clock"] and self._clock is None:
-            self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
-        elif not values["publish_clock"] and self._clock is not None:
-            # Kept, silent: the physics thread may be publishing on it at this moment.
-            self._clock = None
-        if values["publish_tf"] and self._tf is None:
-            self._tf = self._tf_publisher()
-        elif not values["publish_tf"] and self._tf is not None:
-            self._tf = None
+        """Switch /clock and /tf on and off; runs on the executor's thread."""
+        # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched off.
+        if values["publish_clock"] and self._made_clock is None:
+            self._made_clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
+        if values["publish_tf"] and self._made_tf is None:
+            self._made_tf = self._tf_publisher()
+        self._clock = self._made_clock if values["publish_clock"] else None
+        self._tf = self._made_tf if values["publish_tf"] else None
 
     def _tf_publisher(self):
         try:

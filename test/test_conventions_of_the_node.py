@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""What ROS users expect of any node: names, types, QoS, descriptors, namespaces, several at once."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+import yaml
+from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
+from conftest import held_domain
+
+from rigid_proto_ros.parameters import PARAMETERS, READ_ONLY
+from rigid_proto_ros.scenario import make_scenario
+from rigid_proto_ros.scene_file import read_scene_file
+
+PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs"}
+KEYS = (
+    *(
+        "sim_time_ns",
+        "publish_rate",
+        "overruns",
+        "real_time_lost_s",
+        "wrench_received",
+        "poke_received",
+        "string_received",
+    ),
+    *(
+        "inertia_received",
+        "commands_received",
+        "refused_total",
+        "refused_frame",
+        "refused_nonfinite",
+        "refused_magnitude",
+    ),
+    *(
+        "refused_stamp",
+        "refused_ray_miss",
+        "refused_tensor",
+        "refused_integrator",
+        "refused_schedule",
+        "late",
+        "wall_stamp",
+    ),
+    *(
+        "sequence_gaps",
+        "queue_full",
+        "kinetic_energy",
+        "potential_energy",
+        "angular_momentum_norm",
+        "angular_momentum_drift",
+    ),
+    *("integrator", "state", "recording"),
+)
+
+
+def test_all_topics_have_their_private_names_and_standard_types(rig):
+    topics = dict(rig.do("topics"))
+    for name, kind in TYPES.items():
+        package = PACKAGES.get(kind, "geometry_msgs")
+        assert topics[f"/rigid_body/{name}"] == [f"{package}/msg/{kind}"]
+    services = dict(rig.do("services"))
+    for name in ("reset", "step", "clear_wrench", "string/release"):
+        assert services[f"/rigid_body/{name}"] == ["std_srvs/srv/Trigger"]
+    assert services["/rigid_body/pause"] == ["std_srvs/srv/SetBool"]
+
+
+def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
+    for name in TYPES:
+        side = "sub" if name in COMMANDS else "pub"
+        (own,) = [e for e in rig.do("endpoints", topic=rig.name(name)) if e[0] == side and e[1] == "/rigid_body"]
+        assert own[2:] == ["RELIABLE", "TRANSIENT_LOCAL" if name in LATCHED else "VOLATILE"]
+
+
+def test_every_parameter_has_a_descriptor_with_description_bounds_and_read_only_mark(rig):
+    names = list(PARAMETERS)
+    answer = rig.do(
+        "call", service=rig.name("describe_parameters"), type="DescribeParameters", request={"names": names}
+    )
+    for descriptor in answer["descriptors"]:
+        declared = PARAMETERS[descriptor["name"]]
+        assert declared.description in descriptor["description"]
+        assert descriptor["read_only"] == (declared.changes == READ_ONLY)
+        if declared.type == "double" and declared.upper < float("inf"):
+            (bounds,) = descriptor["floating_point_range"]
+            assert (bounds["from_value"], bounds["to_value"]) == (declared.lower, declared.upper)
+
+
+def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal(rig):
+    report = rig.diagnostics()
+    assert report["name"] == "/rigid_body: simulation"
+    assert set(KEYS) <= report.keys()
+    before = rig.heard_count("/diagnostics")
+    rig.publish("poke", wrench_message(0, "nowhere", (1.0, 0, 0)))
+    rig.until_received(rig.sent)
+    rig.until(lambda: rig.heard_count("/diagnostics") >= before + 3, "reports")
+    reports = rig.all_diagnostics(last=rig.heard_count("/diagnostics") - before)
+    counts = [int(r["refused_total"]) for r in reports]
+    told = [k for k in range(1, len(counts)) if counts[k] > counts[k - 1]] or [0]
+    assert reports[told[0]]["level"] == 1
+    # The counter stays, the warning goes unless the machine itself was late.
+    assert counts == sorted(counts)
+    for earlier, later in zip(reports[told[0] :], reports[told[0] + 1 :], strict=False):
+        if all(earlier[k] == later[k] for k in ("overruns", "real_time_lost_s", "refused_total")):
+            assert later["level"] == 0
+
+
+def test_a_dump_of_the_parameters_is_a_scene_that_starts_the_same_simulation(rig, tmp_path):
+    """As ros2 param dump writes it: all parameters of the list and get services, dots as levels, under the node's name."""
+    rig.set(mass=1.5, ballast__nut=[0.1, 0.0, 0.0, 0.07], gravity=[0.0, 0.0, -1.0], string__stiffness=7.0)
+    tree: dict = {}
+    names = rig.names()
+    for name, value in rig.get(*names).items():
+        node = tree
+        *levels, last = name.split(".")
+        for level in levels:
+            node = node.setdefault(level, {})
+        node[last] = value
+    dump = tmp_path / "dump.yaml"
+    dump.write_text(yaml.dump({"/rigid_body": {"ros__parameters": tree}}, default_flow_style=False))
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(rig.heard("scene", last=1)[0]["data"])
+    run = [sys.executable, "-m", "rigid_proto_ros.cli.main", "simulate"]
+    hashes = []
+    for path in (dump, scene):
+        done = subprocess.run([*run, str(path), "--duration", "1", "--json"], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        hashes.append(json.loads(done.stdout)["state_hash"])
+    assert hashes[0] == hashes[1]
+    values = read_scene_file(scene).values
+    assert make_scenario(values).values == make_scenario({**rig.scene, **{k: values[k] for k in values}}).values
+
+
+def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_environment, tmp_path):
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        plain = NodeProcess(environment, tmp_path / "plain.log", {"mesh": "t_handle"})
+        other = NodeProcess(
+            environment,
+            tmp_path / "other.log",
+            {"mesh": "hammer", "qos_overrides./lab/tool/pose.publisher.depth": 3},
+            *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
+        )
+        one, two = RosClient(environment), RosClient(environment, "/lab/tool")
+        try:
+            for client in (one, two):
+                client.listen("pose", "odom", "events", "inertia")
+                client.watch_diagnostics()
+            two.do("advertise", topic="/lab/hit", type="WrenchStamped")
+            one.advertise("poke")
+            two.publish("/lab/hit", wrench_message(0, "tool@com;impulse", (1.0, 0.0, 0.0)))
+            two.until(two.events, "the poke")
+            reports = two.diagnostics(), one.diagnostics()
+            assert [r["poke_received"] for r in reports] == ["1", "0"]
+            assert [r["name"] for r in reports] == ["/lab/tool: simulation", "/rigid_body: simulation"]
+            assert one.events() == []
+            assert two.heard("odom", last=1)[0]["child_frame_id"] == "tool"
+            assert two.heard("inertia")[0]["header"]["frame_id"] == "tool/mesh"
+            assert one.heard("inertia")[0]["inertia"]["m"] != two.heard("inertia")[0]["inertia"]["m"]
+            two.trigger("reset")
+            two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")
+            assert one.events() == []
+        finally:
+            one.close()
+            two.close()
+            assert (plain.stop(), other.stop()) == (0, 0)
+
+
+TWO_IN_ONE = """
+import rclpy
+from rigid_proto_ros.ros.node import RigidBodyNode
+from rigid_proto_ros.ros.parameter_server import given_parameters
+from rigid_proto_ros.ros.physics_thread import PhysicsThread
+from rigid_proto_ros.core.commands import WrenchCommand
+from rigid_proto_ros.core.frames import parse_frame
+import time
+
+rclpy.init()
+nodes = [RigidBodyNode(node_name=n, parameter_overrides=given_parameters(v)) for n, v in (
+    ("one", {"mesh": "t_handle", "contacts.tip": [0.0, 0.0, 0.07]}), ("two", {"mesh": "hammer"}))]
+thread = PhysicsThread([node.flight for node in nodes])
+for node in nodes:
+    node.thread = thread
+thread.start()
+frame = "world@tip;impulse"
+command = WrenchCommand(False, parse_frame(frame, {"tip"}), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, frame, b"")
+nodes[0].call(lambda: nodes[0].flight.simulation.submit(command))
+while nodes[0].flight.simulation.events.count == 0 or nodes[1].flight.simulation.time_ns == 0:
+    time.sleep(0.01)
+thread.stop()
+print(nodes[0].flight.simulation.events.count, nodes[1].flight.simulation.events.count)
+print(nodes[0].flight.simulation.state.linear_velocity[0] > 0, nodes[1].flight.simulation.state.linear_velocity.any())
+print([n.get_fully_qualified_name() for n in nodes])
+"""
+
+
+def test_two_nodes_in_one_process_have_nothing_in_common(ros_environment):
+    done = subprocess.run(
+        [sys.executable, "-c", TWO_IN_ONE], env=ros_environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.stdout.splitlines()[-3:] == ["1 0", "True False", "['/one', '/two']"], done.stderr
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["qos_overrides./rigid_body/pose.publisher.reliability", "qos_overrides./rigid_body/wrench.subscription.depth"],
+)
+def test_qos_overrides_are_parameters_like_others(rig, name):
+    assert name in rig.names()
