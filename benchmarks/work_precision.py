@@ -81,6 +81,9 @@ def main() -> None:
     for k, (problem, contestant, step) in enumerate(jobs):
         progress(k, len(jobs), f"{problem.name} {contestant.tool} {contestant.name} {step:g}")
         key = (problem.name, contestant.tool, contestant.name)
+        if k and jobs[k - 1][0] is not problem:
+            # What has been measured is kept if the run is ended.
+            table.write()
         if key in given_up:
             continue
         entry = measure(problem, contestant, step, 1 if options.quick else 5, budget_s)

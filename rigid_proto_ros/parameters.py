@@ -9,8 +9,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import yaml
-
 from .core.errors import CommandRefused, InputError
 from .core.frames import check_contact_name
 from .core.integrators import INTEGRATORS
@@ -94,10 +92,9 @@ def _to_double(value):
 
 def _to_doubles(value):
     if isinstance(value, str):
-        try:
-            value = yaml.safe_load(value) if len(value) < 10_000 else None
-        except (yaml.YAMLError, ValueError, RecursionError):
-            return None
+        text = value.strip()
+        if text.startswith("[") and text.endswith("]"):
+            value = [item.strip(" '\"") for item in text[1:-1].split(",")]
     if _to_double(value) is not None:
         value = [value]
     if isinstance(value, (str, bytes, Mapping)) or not hasattr(value, "__iter__"):

@@ -123,6 +123,16 @@ def compose_text(text: str, name: str) -> yaml.Node | None:
         raise InputError(where, problem, "valid YAML") from None
 
 
+def typed_value(text: str, name: str):
+    """A value as rcl types it on a command line; raises InputError for what rcl refuses."""
+    node = compose_text(text, name)
+    if isinstance(node, yaml.SequenceNode):
+        return _sequence(name, node)
+    if not isinstance(node, yaml.ScalarNode):
+        raise InputError(name, text, "a plain value or a list")
+    return _typed(node)
+
+
 def _collect(path, node, prefix, values) -> None:
     if not isinstance(node, yaml.MappingNode):
         raise _refused(path, node, "name: value lines under ros__parameters")
@@ -156,4 +166,8 @@ def _sequence(path, node) -> list:
 
 def _refused(path, node, accepted) -> InputError:
     received = node.value if isinstance(node, yaml.ScalarNode) else node.tag.rsplit(":", 1)[-1]
-    return InputError(f"{path}, line {node.start_mark.line + 1}", received, accepted)
+    if isinstance(node, yaml.SequenceNode):
+        received = "[" + ", ".join(str(item.value) for item in node.value) + "]"
+    # A value from the command line has no lines to count.
+    where = path if str(path).startswith("-") else f"{path}, line {node.start_mark.line + 1}"
+    return InputError(str(where), received, accepted)

@@ -54,9 +54,7 @@ def flown(tmp_path_factory):
     path = tmp_path_factory.mktemp("flown") / "session.mcap"
     kept, recorder = Kept(), McapObserver(path, simulated_log=True)
     scenario = read_scene("t_handle")
-    run = OfflineRun(
-        scenario, read_script(example_path("heavier_in_flight"), 1.5), Observers(recorder, kept)
-    )
+    run = OfflineRun(scenario, read_script(example_path("heavier_in_flight"), 1.5), Observers(recorder, kept))
     assert run.advance(6 * SECOND)
     recorder.close()
     return path, kept
@@ -145,7 +143,9 @@ def test_the_mesh_comes_from_inside_where_its_file_is_gone(tmp_path):
     mesh.write_text("# mine\n" + body_path("book").read_text())
     session = tmp_path / "session.mcap"
     scene = tmp_path / "scene.yaml"
-    scene.write_text(f"rigid_body:\n  ros__parameters:\n    mesh: {mesh}\n    initial.angular_velocity: [1.0, 2.0, 3.0]\n")
+    scene.write_text(
+        f"rigid_body:\n  ros__parameters:\n    mesh: {mesh}\n    initial.angular_velocity: [1.0, 2.0, 3.0]\n"
+    )
     assert main(["simulate", str(scene), "--duration", "0.5", "--bag", str(session)]) == 0
     mesh.unlink()
     assert main(["replay", str(session), "--verify"]) == 0
@@ -155,7 +155,9 @@ def test_a_mesh_changed_in_flight_is_inside_too(tmp_path):
     for name in ("book", "hammer"):
         (tmp_path / f"{name}.obj").write_text("# mine\n" + body_path(name).read_text())
     script = tmp_path / "script.yaml"
-    script.write_text(f"- {{t: 0.2, set: {{mesh: {tmp_path / 'hammer.obj'}}}}}\n- {{t: 0.3, at: com, impulse: [1, 0, 0]}}\n")
+    script.write_text(
+        f"- {{t: 0.2, set: {{mesh: {tmp_path / 'hammer.obj'}}}}}\n- {{t: 0.3, at: com, impulse: [1, 0, 0]}}\n"
+    )
     session = tmp_path / "session.mcap"
     arguments = ["--set", f"mesh={tmp_path / 'book.obj'}", "--script", str(script), "--duration", "0.5"]
     assert main(["simulate", str(scene_path("book")), *arguments, "--bag", str(session)]) == 0
@@ -171,7 +173,9 @@ def test_without_rerun_a_session_is_recorded_and_verified(tmp_path):
         "status = main(['simulate', 'book', '--duration', '0.2', '--bag', sys.argv[1]])\n"
         "sys.exit(status or main(['replay', sys.argv[1], '--verify']))"
     )
-    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "s.mcap")], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "s.mcap")], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert "verified" in done.stdout
 

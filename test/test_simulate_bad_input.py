@@ -47,11 +47,11 @@ SCENES = {
     "bool_for_double": (scene_text("mass: true"), "mass", "True", "finite number"),
     "list_for_double": (scene_text("mass: [1.0]"), "mass", "1.0", "finite number"),
     "number_for_text": (scene_text("mesh: 5"), "mesh", "5", "text"),
-    "mixed_list": (scene_text("mass: 1.0\ngravity: [0, 0, -9.81]"), "line 4", "seq", "[0.0, 0.0, -9.81]"),
+    "mixed_list": (scene_text("mass: 1.0\ngravity: [0, 0, -9.81]"), "line 4", "[0, 0, -9.81]", "[0.0, 0.0, -9.81]"),
     "no_value": (scene_text("mass:"), "line 3", "mass", "a value"),
     "not_yaml": ("rigid_body: {ros__parameters: [", "line 1", "", "valid YAML"),
     "tab": ("rigid_body:\n\tros__parameters: {}\n", "line 2", "", "valid YAML"),
-    "list": ("- 1\n- 2\n", "line 1", "seq", "a mapping"),
+    "list": ("- 1\n- 2\n", "line 1", "[1, 2]", "a mapping"),
     "no_section": ("mass: 1.0\n", "line 1", "1.0", "section"),
     "zero_quaternion": (
         scene_text("initial.orientation_xyzw: [0.0, 0.0, 0.0, 0.0]"),

@@ -17,6 +17,7 @@ from .rrd_file import whole_bytes, whole_part
 
 STATES = "Scalars:scalars"
 TEXT = "TextLog:text"
+RECORDING = "__properties"
 
 
 def read_session(path: str | Path) -> RecordedSession:
@@ -74,6 +75,10 @@ def _read(path: Path, session: RecordedSession) -> None:
             target = events if entity == e.EVENTS else refusals
             texts = [cell[0] for cell in batch.column(TEXT).to_pylist()]
             target.extend(zip(_sim_times(batch).tolist(), texts, strict=True))
+        elif entity == RECORDING and "RecordingInfo:name" in batch.schema.names:
+            # The node's name, and which run of it.
+            name = batch.column("RecordingInfo:name").to_pylist()[0][0].split(",")[0]
+            session.node_name = name if name.isidentifier() else session.node_name
         elif entity == e.SCENE:
             session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
         elif entity.startswith(e.BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:

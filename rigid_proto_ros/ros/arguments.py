@@ -7,29 +7,33 @@ from collections.abc import Callable
 
 from ..core.errors import InputError
 from ..parameters import is_ros_parameter, parameter_named
-from ..scene_file import compose_text, read_scene_file, scalar
+from ..scene_file import read_scene_file, typed_value
 
 
-def check_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> None:
-    """Check parameter files and ``-p name:=value`` in ``argv``; raises InputError.
+def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> dict[str, object]:
+    """The parameters that files and ``-p name:=value`` in ``argv`` give this node, later ones winning; raises InputError.
 
-    A name that is no parameter is an error with the nearest known one; in a ``/**`` section, which other nodes share, a
-    warning.
+    rcl reads the same; but where a later value has another type than an earlier one it keeps the earlier one. A name that is no
+    parameter is an error with the nearest known one; in a ``/**`` section, which other nodes share, a warning.
     """
-    for option, value in _ros_options(argv):
+    given: dict[str, object] = {}
+    for option, text in _ros_options(argv):
         if option == "--params-file":
-            scene = read_scene_file(value, node_name)
-            for name, given in scene.values.items():
+            scene = read_scene_file(text, node_name)
+            for name, value in scene.values.items():
                 if is_ros_parameter(name):
                     continue
                 try:
                     parameter_named(name)
                 except InputError as error:
                     if name not in scene.wildcard:
-                        raise InputError(f"{value}, {name}", given, error.accepted) from None
-                    warn(f"{value}: {name} under /** is not a parameter of this node; ignored")
+                        raise InputError(f"{text}, {name}", value, error.accepted) from None
+                    warn(f"{text}: {name} under /** is not a parameter of this node; ignored")
+                    continue
+                given[name] = value
         else:
-            _check_assignment(value, node_name)
+            given.update(_assignment(text, node_name))
+    return given
 
 
 def _ros_options(argv: list[str]) -> list[tuple[str, str]]:
@@ -49,7 +53,7 @@ def _ros_options(argv: list[str]) -> list[tuple[str, str]]:
     return found
 
 
-def _check_assignment(text: str, node_name: str) -> None:
+def _assignment(text: str, node_name: str) -> dict[str, object]:
     left, assigned, value = text.partition(":=")
     if not assigned or not left:
         raise InputError("-p", text, "name:=value")
@@ -57,16 +61,10 @@ def _check_assignment(text: str, node_name: str) -> None:
     if not colon:
         name = left
     elif node.lstrip("/") not in (node_name, "**"):
-        return
+        return {}
     if is_ros_parameter(name):
-        return
+        return {}
     parameter = parameter_named(name)
-    tree = compose_text(value, f"-p {name}")
-    if tree is None:
+    if not value.strip():
         raise InputError(f"-p {name}", value, parameter.accepted)
-    if isinstance(tree.value, list):
-        types = {type(scalar(item.value)) for item in tree.value if isinstance(item.value, str)}
-        if len(types) > 1:
-            raise InputError(
-                f"-p {name}", value, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]"
-            )
+    return {name: typed_value(value, f"-p {name}")}

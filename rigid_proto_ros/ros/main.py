@@ -29,13 +29,13 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(argv: list[str], stop: threading.Event) -> int:
-    from .arguments import check_arguments
+    from .arguments import given_arguments
     from .bodies import bodies_of
     from .node_name import remapped_node_name
 
     argv, bodies = bodies_of(argv)
     name = remapped_node_name(argv)
-    check_arguments(argv, name, _warn)
+    given = given_arguments(argv, name, _warn)
 
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -67,7 +67,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
                     overrides = given_parameters(values)
                     nodes.append(RigidBodyNode(_make_viewer, body_name, parameter_overrides=overrides))
             else:
-                nodes.append(RigidBodyNode(_make_viewer))
+                nodes.append(RigidBodyNode(_make_viewer, parameter_overrides=given_parameters(given)))
             for node in nodes:
                 node.states.pack_all(warm_up(node.flight.scenario.setup))
         physics = PhysicsThread([node.flight for node in nodes], on_crash)

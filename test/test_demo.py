@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""The main job, end to end, as ``make run`` does it: node, scripted pokes, recording, on a bundled body and a real mesh."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from ros_process import run
+
+pytest.importorskip("rclpy")
+pytest.importorskip("rerun")
+
+
+def fly(ros_environment, folder, *arguments):
+    from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+
+    done = run("rigid_proto", "demo", "--out", folder, *arguments, environment=ros_environment, timeout=180)
+    assert done.returncode == 0, done.stderr
+    session = folder / "session.rrd"
+    assert str(session) in done.stdout
+    return session, read_session(session), list(record_batches(session))
+
+
+def check(session, recorded, batches, pokes):
+    """The mesh once, a pose for every published state, arrows while the pokes act."""
+    assert recorded.complete
+    assert recorded.mesh_chunks == 1
+    order = np.argsort(recorded.times)
+    times = recorded.times[order]
+    assert times[0] == 0
+    assert set(np.diff(times)) == {10_000_000}
+    poses = [
+        batch
+        for entity, _, batch in batches
+        if entity == "world/body" and "Transform3D:translation" in batch.schema.names
+    ]
+    positions = np.concatenate([np.array(b.column("Transform3D:translation").flatten().to_pylist()) for b in poses])
+    assert len(positions.reshape(-1, 3)) == len(times)
+    kinds = [json.loads(line)["kind"] for _, line in recorded.events]
+    assert kinds[0] == "reset"
+    assert kinds.count("poke") == pokes
+    arrows = [
+        entity
+        for entity, _, batch in batches
+        if any(name.startswith("Arrows3D:vectors") for name in batch.schema.names)
+    ]
+    assert any("load" in entity for entity in arrows), sorted(set(arrows))
+
+
+def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_environment, tmp_path):
+    session, recorded, batches = fly(ros_environment, tmp_path / "out", "--duration", "9")
+    check(session, recorded, batches, pokes=3)
+    verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
+    assert verified.returncode == 0, verified.stderr
+    assert "same to the bit" in verified.stdout
+
+
+def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, tmp_path, meshes):
+    session, recorded, batches = fly(
+        ros_environment, tmp_path / "out", "--duration", "7", "--mesh", meshes / "spot.obj"
+    )
+    check(session, recorded, batches, pokes=3)
+    assert len(recorded.vertices) == 11533
+    verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
+    assert verified.returncode == 0, verified.stderr
+
+
+def test_an_open_mesh_is_refused_in_one_line_that_names_what_helps(ros_environment, tmp_path, meshes):
+    done = run(
+        "rigid_proto", "demo", "--out", tmp_path, "--mesh", meshes / "teapot_open.obj", environment=ros_environment
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "mesh_repair" in line

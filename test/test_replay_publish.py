@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""A session sent again over ROS: its states with their stamps, its commands to a node that then flies the same motion."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+pytest.importorskip("mcap")
+
+from bag_recorder import BagRecorder
+from node_client import SECOND, NodeClient
+from ros_process import run, running_node
+
+from rigid_proto_ros.bundled import scene_path
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.session_messages import read_state
+from rigid_proto_ros.session_reader import read_runs
+
+SCRIPT = """
+- {t: 0.1, at: tip, force: [0.0, 0.01, 0.0], duration: 0.3}
+- {t: 0.2, at: {vertex: 3}, impulse: [0.0, 0.0, 0.002]}
+- {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-5, 0.0], axes: body, duration: 0.5}}
+- {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5], record: elsewhere.rrd}}
+- {t: 0.6, string: {attach: tip, target: [0.1, 0.0, 0.2]}}
+- {t: 0.9, string: release}
+- {t: 1.0, service: clear_wrench}
+"""
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flown")
+    (folder / "script.yaml").write_text(SCRIPT)
+    bag = folder / "s.mcap"
+    arguments = ["simulate", "t_handle", "--script", str(folder / "script.yaml"), "--duration", "2"]
+    assert main([*arguments, "--bag", str(bag), "--record", str(folder / "s.rrd")]) == 0
+    return bag
+
+
+def states_of(messages, name: str) -> tuple[list[int], list[list[float]]]:
+    read = [read_state(name, m.data, m.topic) for m in messages if m.topic.endswith(f"/{name}")]
+    return [stamp for stamp, _ in read], [row for _, row in read]
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tmp_path, ending):
+    recorder = BagRecorder(ros_environment)
+    done = run(
+        *("rigid_proto", "replay", session.with_suffix(ending), "--publish", "states", "--speed", "4"),
+        environment=ros_environment,
+    )
+    assert done.returncode == 0, done.stderr
+    time.sleep(0.3)
+    messages = recorder.close()
+    (recorded,) = read_runs(session)
+    for name in ("pose", "twist"):
+        stamps, rows = states_of(messages, name)
+        # Reliable topics: once a subscriber is matched, nothing is missing.
+        first = recorded.times.tolist().index(stamps[0])
+        assert len(stamps) > 150
+        assert stamps == recorded.times.tolist()[first:]
+        assert np.array(rows).tobytes() == recorded.published[name].rows[first:].tobytes()
+
+
+def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environment, tmp_path):
+    recorder = BagRecorder(ros_environment)
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(scene_path("t_handle").read_text().replace("rigid_body:", "other:"))
+    arguments = ["--ros-args", "--params-file", scene, "-r", "__node:=other"]
+    other = BagRecorder(ros_environment, name="other")
+    with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
+        client = NodeClient(ros_environment, "other")
+        try:
+            done = run(
+                *("rigid_proto", "replay", session, "--publish", "commands", "--node", "/other"),
+                environment=ros_environment,
+                cwd=tmp_path,
+            )
+            assert done.returncode == 0, done.stderr
+            client.fly_until(2 * SECOND)
+            assert client.get("record") == [""]
+        finally:
+            client.close()
+    assert not recorder.close()
+    messages = other.close()
+    (recorded,) = read_runs(session)
+    commands = [json.loads(line) for line in recorded.lines]
+    # The last reset's run.
+    last = max(k for k, m in enumerate(messages) if m.topic.endswith("events") and b'"reset"' in m.data)
+    seen = [m.data for m in messages[last:] if m.topic.endswith("events") and b'"pause"' not in m.data][1:]
+    assert len(seen) == len(commands)
+    for name in ("pose", "twist"):
+        stamps, rows = states_of(messages[last:], name)
+        flown = {stamp: row for stamp, row in zip(stamps, rows, strict=True) if stamp <= 2 * SECOND}
+        expected = dict(zip(recorded.times.tolist(), recorded.published[name].rows.tolist(), strict=True))
+        assert sum(stamp > 0 for stamp in flown) >= 199
+        assert all(flown[stamp] == expected[stamp] for stamp in flown if stamp > 0)
+
+
+def test_publishing_to_nobody_ends_in_one_line(session, ros_environment):
+    arguments = ["replay", session, "--publish", "commands", "--node", "/nobody"]
+    done = run("rigid_proto", *arguments, environment=ros_environment)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1 and "/nobody" in done.stderr
+
+
+def test_speed_without_states_to_publish_is_refused(session, capsys):
+    assert main(["replay", str(session), "--speed", "2"]) == 2
+    assert main(["replay", str(session), "--publish", "commands", "--speed", "2"]) == 2
+    assert "real_time_factor" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_environment, tmp_path, ending):
+    path = tmp_path / f"session{ending}"
+    arguments = ["--params-file", scene_path("hammer"), "-p", f"record:={path}", "-r", "__node:=flyer"]
+    with running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"):
+        client = NodeClient(ros_environment, "flyer")
+        try:
+            client.wrench("poke", 0, "flyer@com;impulse", (0.0, 0.3, 0.0))
+            client.set(gravity=[0.0, 0.0, -1.0])
+            client.fly_until(SECOND)
+            client.trigger("reset")
+            client.fly_until(SECOND // 2)
+        finally:
+            client.close()
+    runs = read_runs(path)
+    assert len(runs) == (2 if ending == ".mcap" else 1)
+    assert all(session.complete for session in runs)
+    assert "gravity: [0.0, 0.0, -1.0]" in runs[-1].scene
+    assert main(["replay", str(path), "--verify"]) == 0
+    if ending == ".rrd":
+        # A reset begins another file; the run before holds the command with the node's own frame.
+        runs = [*read_runs(tmp_path / "session.run1.rrd"), *runs]
+        assert main(["replay", str(tmp_path / "session.run1.rrd"), "--verify"]) == 0
+    assert [session.node_name for session in runs] == ["flyer", "flyer"]
+    assert any("flyer@com" in line for line in runs[0].lines)
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
+    ros_environment, tmp_path, ending
+):
+    path = tmp_path / f"session{ending}"
+    arguments = ["--params-file", scene_path("hammer")]
+    with running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"):
+        client = NodeClient(ros_environment)
+        try:
+            client.wrench("poke", 0, "body@com;impulse", (0.0, 0.3, 0.0))
+            client.set(record=str(path))
+            client.states.clear()
+            client.spin_until(lambda: len(client.states) > 100, "half a second of states")
+            client.set(record="")
+            late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
+            assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
+            assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
+            client.set(record=str(path))
+            client.trigger("reset")
+            client.fly_until(SECOND // 2)
+        finally:
+            client.close()
+    assert main(["replay", str(path), "--verify"]) == 0
