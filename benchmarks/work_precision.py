@@ -182,6 +182,8 @@ def drifts(problem: Problem, run: peers.Run) -> dict:
     for k in range(1, portions + 1):
         run.advance(duration * k / portions)
         rows.append(run.row())
+        if not sane(rows[-1]):
+            return {}
     energies, kinetic = np.array([energy(problem, row) for row in rows]).T
     drift = {"energy_drift": float(np.abs(energies - energies[0]).max() / kinetic.max())}
     if problem.torque_free:
