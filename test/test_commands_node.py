@@ -162,8 +162,17 @@ def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_sinc
     for event in rig.events():
         kinds[event["kind"]] = kinds.get(event["kind"], 0) + 1
     assert kinds == {
-        "reset": 1, "wrench": 1, "poke": 1, "string_attach": 1, "string_target": 1, "inertia": 1,
-        "set": 3, "string_release": 2, "clear_wrench": 2, "pause": 2, "step": 1,
+        "reset": 1,
+        "wrench": 1,
+        "poke": 1,
+        "string_attach": 1,
+        "string_target": 1,
+        "inertia": 1,
+        "set": 3,
+        "string_release": 2,
+        "clear_wrench": 2,
+        "pause": 2,
+        "step": 1,
     }
     events = rig.events()
     chain_is_whole(events)
@@ -191,7 +200,12 @@ def test_inertia_is_latched_and_comes_again_at_every_change_with_its_time(rig):
     assert message["inertia"] == {
         "m": scenario.setup.body.mass,
         "com": vector(com),
-        "ixx": I[0, 0], "ixy": I[0, 1], "ixz": I[0, 2], "iyy": I[1, 1], "iyz": I[1, 2], "izz": I[2, 2],
+        "ixx": I[0, 0],
+        "ixy": I[0, 1],
+        "ixz": I[0, 2],
+        "iyy": I[1, 1],
+        "iyz": I[1, 2],
+        "izz": I[2, 2],
     }
     before = len(rig.heard("inertia"))
     rig.set(mass=2.0)
