@@ -93,7 +93,7 @@ def test_poke_client_and_simulate_give_one_motion_and_the_recording_verifies(ros
 
 
 def test_a_changed_event_fails_the_verification(ros_environment, tmp_path):
-    from rigid_proto_ros.replay import verify
+    from rigid_proto_ros.session_check import verify
 
     session = tmp_path / "session.rrd"
     done = run(
