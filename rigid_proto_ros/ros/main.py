@@ -7,9 +7,8 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 
+from ..core.compilation import told_when_compiling
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
 
@@ -61,7 +60,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
 
     physics = None
     try:
-        with _saying_when_compiling():
+        with told_when_compiling(_say_that_it_compiles):
             if bodies:
                 for body_name, values in bodies.items():
                     overrides = given_parameters(values)
@@ -136,24 +135,8 @@ def _asked_for(values, port: str) -> int | None:
     return None if values[port] == PARAMETERS[port].default else values[port]
 
 
-@contextmanager
-def _saying_when_compiling() -> Iterator[None]:
-    """Says once that kernels are being compiled; cached ones compile nothing and nothing is said."""
-    from numba.core import event
-
-    class Listener(event.Listener):
-        said = False
-
-        def on_start(self, _) -> None:
-            if not self.said:
-                self.said = True
-                print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
-
-        def on_end(self, _) -> None:
-            pass
-
-    with event.install_listener("numba:compile", Listener()):
-        yield
+def _say_that_it_compiles() -> None:
+    print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
 
 
 def _described(node) -> str:

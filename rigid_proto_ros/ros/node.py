@@ -28,6 +28,7 @@ from .flight import Flight
 from .node_name import NODE_NAME
 from .parameter_server import converted, declare_parameters, descriptor, ros_parameter
 from .physics_thread import PhysicsThread
+from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
 from .warm_up import warm_up
 
@@ -81,6 +82,7 @@ class RigidBodyNode(Node):
         self.create_service(Trigger, "~/clear_wrench", _answering(self._on_clear_wrench))
         self.create_service(SetBool, "~/pause", _answering(self._on_pause))
         self.create_service(Trigger, "~/string/release", _answering(self._on_string_release))
+        offer_simulation_interfaces(self)
         self._diagnostics = Diagnostics(self, self._diagnostic_values)
         tell_start(self.observer, scenario)
         self.flight.simulation.announce()

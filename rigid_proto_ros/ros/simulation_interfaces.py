@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""The standard simulator services (simulation_interfaces), where that package is installed.
+
+Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps. There is one body and
+no world, so nothing is spawned, loaded or deleted.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..core.errors import InputError
+from .flight import Flight
+
+SERVICES = (
+    ("GetSimulatorFeatures", "get_simulator_features"),
+    ("ResetSimulation", "reset_simulation"),
+    ("GetSimulationState", "get_simulation_state"),
+    ("SetSimulationState", "set_simulation_state"),
+    ("StepSimulation", "step_simulation"),
+)
+MAX_STEPS = 1_000_000
+"""Publications that one call may step over."""
+
+
+class SimulationInterfaces:
+    """Answers the standard services for one node; call ``offer`` once."""
+
+    def __init__(self, node, messages: Any) -> None:
+        self._node = node
+        self._messages = messages
+
+    @property
+    def _flight(self) -> Flight:
+        return self._node.flight
+
+    def offer(self, services: Any) -> None:
+        """Create the services, private to the node."""
+        for service_type, name in SERVICES:
+            self._node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
+
+    def get_simulator_features(self, request, response):
+        """What is really supported, and nothing else."""
+        features = self._messages.SimulatorFeatures
+        response.features.features = [
+            features.SIMULATION_RESET,
+            features.SIMULATION_RESET_TIME,
+            features.SIMULATION_RESET_STATE,
+            features.SIMULATION_STATE_GETTING,
+            features.SIMULATION_STATE_SETTING,
+            features.SIMULATION_STATE_PAUSE,
+            features.STEP_SIMULATION_SINGLE,
+            features.STEP_SIMULATION_MULTIPLE,
+        ]
+        response.features.spawn_formats = []
+        response.features.custom_info = (
+            "One rigid body, set by parameters. A step is one publication period. Time and state are reset together."
+        )
+        return response
+
+    def reset_simulation(self, request, response):
+        """Time and state together: SCOPE_ALL, or both scopes; nothing was spawned."""
+        both = request.SCOPE_TIME | request.SCOPE_STATE
+        if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_ALL) and request.scope & both != both:
+            return self._unsupported(response, f"scope {request.scope}: time and state are reset together")
+        self._node.call(self._flight.reset)
+        return self._done(response)
+
+    def get_simulation_state(self, request, response):
+        """Playing or paused."""
+        states = self._messages.SimulationState
+        response.state.state = states.PAUSED if self._flight.timekeeping.paused else states.PLAYING
+        return self._done(response)
+
+    def set_simulation_state(self, request, response):
+        """Play, pause, or stop, which is to pause and reset."""
+        states = self._messages.SimulationState
+        wanted, flight = request.state.state, self._flight
+        if wanted == states.STOPPED:
+            self._node.call(lambda: (flight.pause(True), flight.reset()))
+        elif wanted in (states.PLAYING, states.PAUSED):
+            paused = wanted == states.PAUSED
+            if flight.timekeeping.paused == paused:
+                response.result.result = response.ALREADY_IN_TARGET_STATE
+                return response
+            self._node.call(lambda: flight.pause(paused))
+        else:
+            return self._unsupported(
+                response, f"state {wanted}: 0 stopped, 1 playing or 2 paused; end the node by a signal"
+            )
+        return self._done(response)
+
+    def step_simulation(self, request, response):
+        """Step over publications, while paused."""
+        flight, results = self._flight, self._messages.Result
+        if not flight.timekeeping.paused:
+            response.result.result = results.RESULT_INCORRECT_STATE
+            response.result.error_message = "the simulation is running; pause it first"
+        elif not 1 <= request.steps <= MAX_STEPS:
+            response.result.result = results.RESULT_OPERATION_FAILED
+            response.result.error_message = f"{request.steps} steps: 1 to {MAX_STEPS}"
+        else:
+            try:
+                for _ in range(request.steps):
+                    self._node.call(flight.step)
+            except InputError as error:
+                response.result.result = results.RESULT_OPERATION_FAILED
+                response.result.error_message = str(error)
+                return response
+            return self._done(response)
+        return response
+
+    def _done(self, response):
+        response.result.result = self._messages.Result.RESULT_OK
+        return response
+
+    def _unsupported(self, response, message: str):
+        response.result.result = self._messages.Result.RESULT_FEATURE_UNSUPPORTED
+        response.result.error_message = message
+        return response
+
+
+def offer_simulation_interfaces(node) -> bool:
+    """Offer the standard services on the node; False where simulation_interfaces isn't installed."""
+    try:
+        from simulation_interfaces import msg, srv
+    except ImportError:
+        return False
+    SimulationInterfaces(node, msg).offer(srv)
+    return True
