@@ -158,6 +158,13 @@ class NodeClient:
         self.states.clear()
         return found
 
+    def forget(self) -> None:
+        """Drop every state that has arrived, those still in the middleware's queue too."""
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.0)
+        self.states.clear()
+
     def fly_until(self, time_ns: int) -> dict[str, dict[int, list[float]]]:
         """Collect states until both topics have reached ``time_ns``."""
 

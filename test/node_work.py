@@ -16,9 +16,9 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from rigid_proto_ros import cdr
-from rigid_proto_ros.ros import main as node_main
 from rigid_proto_ros.ros.node import RigidBodyNode
 from rigid_proto_ros.ros.physics_thread import PhysicsThread
+from rigid_proto_ros.ros.warm_up import warm_up
 
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 12.0], "publish_rate": 500.0}
 STATES = ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom", "/rigid_body/imu")
@@ -32,7 +32,7 @@ def main(scenario: str) -> None:
     parameters = dict(SPIN) if scenario != "at_rest" else {"publish_rate": 500.0}
     overrides = [rclpy.parameter.Parameter(name, value=value) for name, value in parameters.items()]
     node = RigidBodyNode(parameter_overrides=overrides)
-    node_main._warm_up(node)
+    node.states.pack_all(warm_up(node.flight.scenario.setup))
     count_publications(counts)
     messages = count_messages(counts)
     thread = PhysicsThread([node.flight])

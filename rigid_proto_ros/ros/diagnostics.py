@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tensor", "integrator", "schedule")
@@ -20,7 +21,8 @@ class Diagnostics:
         self._values = values
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._troubles_before = 0.0
-        self._timer = node.create_timer(1.0, self._report)
+        # By the steady clock: reports must go on while /clock stands still.
+        self._timer = node.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _report(self) -> None:
         values = self._values()
