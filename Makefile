@@ -38,7 +38,7 @@ build: setup ## colcon build into build/, install/ and log/; then: source instal
 	$(PY) -m colcon build --packages-select rigid_proto_ros
 
 bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU and versions
-	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -v references); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
+	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -vE 'references|soak|clients'); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
 
 .venv-bench/.pins: $(READY) benchmarks/requirements.txt
 	.venv/bin/python -m venv .venv-bench
