@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A client that knows nothing of ROS: Cyclone DDS, an independent vendor's middleware, in a process of its own.
 
-Reads one line of JSON: {node, commands: [[topic, stamp_ns, frame_id, force, torque], ...], until_ns}. Sends the commands when
+Reads one line of JSON: {node, commands: [[topic, stamp_ns, frame_id, force, torque] or [string topic, stamp_ns, frame_id,
+point], ...], until_ns}. Sends the commands when
 all topics have a reader, waits until states stamped ``until_ns`` have come, and prints poses and twists by stamp as JSON.
 """
 
@@ -68,6 +69,12 @@ class WrenchStamped(IdlStruct, typename="geometry_msgs::msg::dds_::WrenchStamped
 
 
 @dataclass
+class PointStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PointStamped_"):
+    header: Header
+    point: Point
+
+
+@dataclass
 class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
     position: Point
     orientation: Quaternion
@@ -106,7 +113,14 @@ def main(node: str, commands: list, until_ns: int) -> dict:
     def topic(name, data_type):
         return Topic(participant, f"rt/{node}/{name}", data_type)
 
-    writers = {name: DataWriter(participant, topic(name, WrenchStamped), qos=RELIABLE) for name in ("wrench", "poke")}
+    topics = {
+        "wrench": WrenchStamped,
+        "poke": WrenchStamped,
+        "string/target": PointStamped,
+        "string/attach": PointStamped,
+    }
+    wanted = {command[0] for command in commands}
+    writers = {name: DataWriter(participant, topic(name, topics[name]), qos=RELIABLE) for name in wanted}
     pose = DataReader(participant, topic("pose", PoseStamped), qos=RELIABLE)
     twist = DataReader(participant, topic("twist", TwistStamped), qos=RELIABLE)
     found = {"pose": {}, "twist": {}}
@@ -125,9 +139,13 @@ def main(node: str, commands: list, until_ns: int) -> dict:
         ready = found["pose"] and found["twist"] and all(w.get_matched_subscriptions() for w in writers.values())
         if ready and not sent:
             sent = True
-            for name, ns, frame, force, torque in commands:
+            for name, ns, frame, *values in commands:
                 header = Header(Time(*divmod(ns, 1_000_000_000)), frame)
-                writers[name].write(WrenchStamped(header, Wrench(Vector3(*force), Vector3(*torque))))
+                if topics[name] is PointStamped:
+                    writers[name].write(PointStamped(header, Point(*values[0])))
+                else:
+                    force, torque = values
+                    writers[name].write(WrenchStamped(header, Wrench(Vector3(*force), Vector3(*torque))))
             print("sent", flush=True)
     return found
 

@@ -12,7 +12,7 @@ from rigid_proto_ros.bundled import example_path, scene_path
 from rigid_proto_ros.core.commands import WrenchCommand
 from rigid_proto_ros.core.frames import parse_frame
 from rigid_proto_ros.offline import OfflineRun, read_scene
-from rigid_proto_ros.poke_script import read_script
+from rigid_proto_ros.poke_script import read_script, string_attach, string_target
 from rigid_proto_ros.rerun_view.reader import read_session
 
 SECOND = 10**9
@@ -40,6 +40,9 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
         ["wrench", 13 * SECOND, "world@left", [0.01, 0.0, 0.0], [0.0, 1e-5, 0.0]],
         ["poke", 13 * SECOND + 7, "body@point/0.0,0.05,0.0;impulse", [0.0, 0.0, 1e-3], [0.0, 0.0, 0.0]],
         ["poke", 11 * SECOND + 5, "world@ray/5.0,0.0,0.0/-1.0,0.0,0.0", [-0.02, 0.0, 0.0], [0.0, 0.0, 0.0]],
+        ["string/attach", 12 * SECOND, "rigid_body/mesh", [0.0, 0.0, 0.07]],
+        ["string/target", 12 * SECOND + 1, "world", [0.02, 0.01, 0.1]],
+        ["string/target", 12 * SECOND + 200_000_000, "world", [0.03, 0.0, 0.12]],
     ]
     arguments = ["--ros-args", "--params-file", scene, "-p", "publish_rate:=50", "-p", "real_time_factor:=3"]
     with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
@@ -50,7 +53,13 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
     found = {topic: {int(ns): row for ns, row in rows.items()} for topic, rows in found.items()}
     scenario = read_scene(str(scene), {"publish_rate": 50.0})
     offline = OfflineRun(scenario)
-    for topic, ns, frame, force, torque in commands:
+    for topic, ns, frame, *values in commands:
+        if topic.startswith("string"):
+            read_string = {"string/attach": string_attach, "string/target": string_target}[topic]
+            names = ("world", "rigid_body") if topic == "string/attach" else ("world",)
+            offline.simulation.submit(read_string(ns, frame, values[0], *names), ns)
+            continue
+        force, torque = values
         read = parse_frame(frame, scenario.setup.contacts)
         offline.simulation.submit(
             WrenchCommand(topic == "wrench", read, tuple(force), tuple(torque), ns, frame, b""), ns
