@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import yaml
@@ -36,7 +36,8 @@ _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
 
 @dataclass(frozen=True)
 class ScriptCommand:
-    """One command of an expanded script. t_ns: when it acts, from the script's start.
+    """One command of an expanded script. t_ns: when it acts, from the script's start. entry: which entry of the script it
+    comes from, counted from 1.
 
     kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and point
     (3,), or the name of a contact to attach to. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
@@ -50,6 +51,7 @@ class ScriptCommand:
     changes: dict | None = None
     point: tuple = (0.0, 0.0, 0.0)
     contact: str = ""
+    entry: int = field(default=0, compare=False)
 
     @property
     def topic(self) -> str:
@@ -101,6 +103,11 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
         mark = getattr(error, "problem_mark", None)
         where = f"{name}, line {mark.line + 1}" if mark else name
         raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
+    return expand_script(entries, name, wrench_timeout)
+
+
+def expand_script(entries, name: str = "script", wrench_timeout: float = 1.5) -> list[ScriptCommand]:
+    """The commands of a script as YAML gives it, in order of time; as ``read_script``."""
     whole: dict = {}
     if isinstance(entries, dict) and "script" in entries:
         whole = {key: value for key, value in entries.items() if key != "script"}
@@ -116,7 +123,8 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
         for k, offset_ns in enumerate(_offsets_ns(whole, name)):
             for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}"):
                 jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
-                commands += _expand(entry, max(0, t_ns + offset_ns + jitter_ns), where, wrench_timeout)
+                expanded = _expand(entry, max(0, t_ns + offset_ns + jitter_ns), where, wrench_timeout)
+                commands += [replace(command, entry=number) for command in expanded]
             if len(commands) > MAX_ENTRIES:
                 raise InputError(where, f"over {MAX_ENTRIES} commands", f"at most {MAX_ENTRIES}")
     return sorted(commands, key=lambda command: command.t_ns)
