@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numba import boolean, float64, int64, njit, types
@@ -18,7 +19,7 @@ from .integrators.free_body import FREE_BODY, free_body_steps
 from .integrators.integrator import Integrator
 from .integrators.series_steps import series_steps
 from .integrators.taylor_adaptive import taylor_adaptive_steps
-from .quantities import CONTEXT, NO_CONDITIONS, STATE
+from .quantities import CONTEXT, STATE
 
 
 @dataclass
@@ -86,7 +87,9 @@ _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1]
 
 
 @njit(cache=True, error_model="numpy")
-def _one(i, settings, ballast, constants, loads, times, commands, stepping, kernels, body, looks_ns, stops, context, states):
+def _one(
+    i, settings, ballast, constants, loads, times, commands, stepping, kernels, body, looks_ns, stops, context, states
+):
     """Body and flight of variation i; as ``fly`` returns."""
     own = settings[i if settings.shape[0] > 1 else 0]
     if not make_body_row(own, ballast[i if ballast.shape[0] > 1 else 0], constants, body):
@@ -95,7 +98,18 @@ def _one(i, settings, ballast, constants, loads, times, commands, stepping, kern
     load = loads[i if loads.shape[0] > 1 else 0]
     own_times = times[i if times.shape[0] > 1 else 0]
     return fly(
-        own, own_times, body, constants[GYROSCOPIC], stepping, kernels, commands[c], load, looks_ns, stops, context, states
+        own,
+        own_times,
+        body,
+        constants[GYROSCOPIC],
+        stepping,
+        kernels,
+        commands[c],
+        load,
+        looks_ns,
+        stops,
+        context,
+        states,
     )
 
 
@@ -105,13 +119,15 @@ def _fly_block(first, last, variants, references, has_references, looks_ns, watc
     body, context = np.zeros(BODY), np.zeros(CONTEXT)
     states = np.zeros((looks_ns.shape[0], STATE))
     others = np.zeros((looks_ns.shape[0] if has_references else 1, STATE))
+    # One place that flies, whichever it is: a second one would be compiled a second time.
+    sides, kept, ends = (references, variants), (others, states), (np.zeros((0, 3)), stops)
     for i in range(first, last):
         status[i] = 0
-        if has_references:
-            reached, _ = _one(i, *references, body, looks_ns, NO_CONDITIONS, context, others)
+        reached = 0
+        for side in range(0 if has_references else 1, 2):
+            reached, stop[i] = _one(i, *sides[side], body, looks_ns, ends[side], context, kept[side])
             if reached == 0:
-                continue
-        reached, stop[i] = _one(i, *variants, body, looks_ns, stops, context, states)
+                break
         if reached == 0:
             continue
         status[i] = 1
@@ -128,7 +144,6 @@ def _compiled():
     return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_block)
 
 
-
 @njit(cache=True)
 def _no_steps(y, p, h, n):
     return 0
@@ -142,7 +157,7 @@ def _no_adaptive_steps(y, p, control, following, span_ns, look):
 @cache
 def _kernels(integrator: Integrator) -> tuple:
     """The compiled kernels that an integrator may call, in the order of batch_flight's methods."""
-    kernels = [_no_steps, _no_steps, _no_steps, _no_adaptive_steps, _no_adaptive_steps]
+    kernels: list[Any] = [_no_steps, _no_steps, _no_steps, _no_adaptive_steps, _no_adaptive_steps]
     if integrator.name == AUTO_INTEGRATOR.name:
         kernels = [steady_steps, free_body_steps, _no_steps, taylor_adaptive_steps, series_steps]
     elif integrator.name == FREE_BODY.name:
@@ -170,4 +185,3 @@ def fly_variants(
     other = own if references is None else references.arrays
     _compiled()(0, rows, own, other, references is not None, looks_ns, watched, stops, measures, filled)
     return results
-

@@ -263,10 +263,10 @@ def _reach(method, kernels, y, p, control, following, rest_ns):
 
 @njit(cache=True, error_model="numpy")
 def _is_good(row):
+    good = True
     for k in range(13):
-        if not abs(row[k]) <= MAX_SPEED:
-            return False
-    return True
+        good = good and abs(row[k]) <= MAX_SPEED
+    return good
 
 
 @njit(cache=True, error_model="numpy")

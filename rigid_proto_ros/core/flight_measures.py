@@ -73,7 +73,7 @@ def measure_flight(measures, states, others, looks_ns, watched, reached, context
         elif kind == SAMPLE:
             if measure[A] < reached:
                 out[j] = quantity(code, states[int(measure[A])], context)
-        elif kind == LARGEST or kind == SMALLEST:
+        elif kind in (LARGEST, SMALLEST):
             out[j] = _extreme(measure, states, watched, reached, context)
         elif kind == FIRST:
             condition = np.array([measure[CODE], measure[A], measure[B]])

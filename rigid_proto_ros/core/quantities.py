@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
 from .rotation import rotate
@@ -134,7 +133,9 @@ def quantity(code, row, context):
     if code == ENERGY:
         return _kinetic(row, context) + _potential(row, context)
     if code == DRIFT:
-        return abs(_kinetic(row, context) + _potential(row, context) - context[START_ENERGY]) / abs(context[START_ENERGY])
+        return abs(_kinetic(row, context) + _potential(row, context) - context[START_ENERGY]) / abs(
+            context[START_ENERGY]
+        )
     lx, ly, lz = _momentum(row, context)
     if code == MOMENTUM:
         return _length(lx, ly, lz)
@@ -173,6 +174,3 @@ def which_is_met(conditions, row, context):
         if met(conditions[k], row, context):
             return k
     return -1
-
-
-NO_CONDITIONS = np.zeros((0, 3))

@@ -56,6 +56,14 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     return Chunk(_table(study, rows, columns, flown), flown.simulated)
 
 
+def is_carried(study: Study, rows: np.ndarray) -> bool:
+    """Whether the compiled batch carries any of these rows (n,)."""
+    columns = study.columns(rows)
+    keys = [key for key, _ in _groups(study, columns, len(rows))]
+    sides = (False, True) if study.reference is not None else (False,)
+    return any(all(_group(_ByFingerprint(study), key, side) for side in sides) for key in keys)
+
+
 def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tuple[tuple, np.ndarray]]:
     """Values of what is structural, and the rows that have them."""
     structural = [c for v, c in zip(study.vary, columns, strict=True) if is_structural(v)]
@@ -175,14 +183,3 @@ def _vertices(study: Study, columns: list[np.ndarray], column: np.ndarray) -> np
         except InputError:
             numbers[i] = -1
     return numbers
-
-
-def column_names(study: Study) -> list[str]:
-    """The table's columns, known before anything runs."""
-    return list(_table(study, np.arange(0), _no_rows(study), _Rows(new_results(0, len(study.measures.table)))))
-
-
-def _no_rows(study: Study) -> list[np.ndarray]:
-    return [column[:0] for column in study.columns(np.zeros(1, np.int64))]
-
-

@@ -17,7 +17,11 @@ def number(value, field: str, lower: float = -1e100, upper: float = 1e100, above
             value = float(value)
         except ValueError:
             pass
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (lower <= value <= upper and value > above):
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, float))
+        or not (lower <= value <= upper and value > above)
+    ):
         low = f"above {above:g}" if above > -math.inf else f"from {lower:g}"
         raise InputError(field, value, f"a finite number {low} to {upper:g}")
     return float(value)

@@ -51,9 +51,9 @@ class Points:
         first = self.values[0]
         if _is_number(first) and all(map(_is_number, self.values)):
             return np.array(self.values, dtype=float)[indices]
-        if isinstance(first, list) and all(isinstance(v, list) and len(v) == len(first) for v in self.values):
-            if all(_is_number(x) for v in self.values for x in v):
-                return np.array(self.values, dtype=float)[indices]
+        alike = isinstance(first, list) and all(isinstance(v, list) and len(v) == len(first) for v in self.values)
+        if alike and all(_is_number(x) for v in self.values for x in v):
+            return np.array(self.values, dtype=float)[indices]
         objects = np.empty(len(self.values), dtype=object)
         objects[:] = [tuple(v) if isinstance(v, list) else v for v in self.values]
         return objects[indices]

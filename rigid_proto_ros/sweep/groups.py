@@ -57,8 +57,7 @@ class Group:
         for vary in study.vary:
             if is_structural(vary):
                 vary.target.put(values, [], plain(structural[vary.target.name]))
-        names = {vary.target.parameter for vary in study.vary}
-        if "density" in names and "mass" not in names:
+        if study.density_decides:
             values["mass"] = 0.0
         self.reference = reference or {}
         values.update(convert_all(self.reference))

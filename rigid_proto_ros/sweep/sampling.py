@@ -59,7 +59,8 @@ class _Sobol:
                 first = int(numbers[part[0]])
                 if self._engine.num_generated > first:
                     self._engine.reset()
-                self._engine.fast_forward(first - self._engine.num_generated)
+                if first > self._engine.num_generated:
+                    self._engine.fast_forward(first - self._engine.num_generated)
                 out[part] = self._engine.random(len(part))
         return out
 

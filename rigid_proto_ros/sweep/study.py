@@ -33,7 +33,8 @@ from .targets import Target, read_target
 MANY_ROWS = 10_000_000
 """More rows than this are likelier a slip than a wish."""
 MOST_ROWS = 1 << 53
-_KEYS = "scene script duration seed sampler samples set vary reference watch measure stop".split()
+_MOTION_KEYS = ("scene", "script", "duration", "set", "vary", "reference")
+_KEYS = (*_MOTION_KEYS, "seed", "sampler", "samples", "watch", "measure", "stop")
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,12 @@ class Study:
     def entries(self) -> list:
         """The script's entries."""
         return script_entries(self.script)
+
+    @property
+    def density_decides(self) -> bool:
+        """The density varies and not the mass: the scene's own mass, which would win, doesn't count then."""
+        varied = {v.target.parameter for v in self.vary}
+        return "density" in varied and "mass" not in varied
 
     @property
     def grids(self) -> list[int]:

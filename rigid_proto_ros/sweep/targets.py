@@ -17,9 +17,8 @@ from ..parameters import READ_ONLY, Parameter, parameter_named
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
 _BALLAST = "mass x y z"
-SCRIPT_FIELDS = (
-    "t at force push impulse torque angular_impulse axes duration repeat every jitter seed wrench string set".split()
-)
+_LOAD_FIELDS = ("at", "force", "push", "impulse", "torque", "angular_impulse", "axes", "duration")
+SCRIPT_FIELDS = ("t", *_LOAD_FIELDS, "repeat", "every", "jitter", "seed", "wrench", "string", "set")
 
 
 @dataclass(frozen=True)

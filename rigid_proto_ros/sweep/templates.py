@@ -63,10 +63,8 @@ def settings_of(values: Mapping[str, object]) -> np.ndarray:
     """The row of settings (SETTINGS,) of complete values."""
     row = np.zeros(bb.SETTINGS)
     for name, (at, count) in FAST.items():
-        value = values[name]
-        if name == "scale" and len(value) == 1:
-            value = value * 3
-        row[at : at + count] = value
+        value = np.ravel(np.asarray(values[name], dtype=float))
+        row[at : at + count] = np.repeat(value, 3) if name == "scale" and len(value) == 1 else value
     return row
 
 

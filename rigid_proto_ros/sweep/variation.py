@@ -52,9 +52,8 @@ def apply(study: Study, chosen: list) -> Variation:
     """The variation with these values of what varies."""
     values, script = dict(study.values), copy.deepcopy(study.script)
     entries = script_entries(script)
-    if any(v.target.parameter == "density" for v in study.vary):
-        if not any(v.target.parameter == "mass" for v in study.vary):
-            values["mass"] = 0.0
+    if study.density_decides:
+        values["mass"] = 0.0
     vertices = []
     for vary, value in zip(study.vary, chosen, strict=True):
         if isinstance(vary.form, Draw) and vary.form.shape == VERTEX:
@@ -82,7 +81,10 @@ def plain(value) -> object:
 
 def body_mesh_of(values: Mapping[str, object]) -> BodyMesh | None:
     """The mesh that the values name, with its moments; read once in a process."""
-    return _body_mesh(values["mesh"], values["mesh_repair"], values["mesh_fallback"], values["inertia_model"])
+    mesh = values["mesh"]
+    # Only a body without a mesh asks for its model.
+    model = "solid" if mesh else values["inertia_model"]
+    return _body_mesh(mesh, values["mesh_repair"], values["mesh_fallback"], model)
 
 
 @lru_cache(maxsize=MESHES_KEPT)
