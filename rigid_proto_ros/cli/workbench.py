@@ -57,4 +57,3 @@ def run(args: argparse.Namespace) -> int:
         name = "the page" if ended is page else "rigid_body_node"
         print(f"rigid_proto workbench: {name} ended with status {ended.returncode}", file=sys.stderr)
         return ended.returncode or 1
-

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 import traceback
@@ -11,23 +10,22 @@ import traceback
 from ..core.compilation import told_when_compiling
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
+from .ending import Ending
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run the node; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
     argv = sys.argv if argv is None else argv
-    stop = threading.Event()
     # Signals end the main thread's wait; the middleware must outlive the physics thread, so rclpy's handlers stay out.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     try:
-        return _run(argv, stop)
+        with Ending() as ending:
+            return _run(argv, ending)
     except InputError as error:
         print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 
 
-def _run(argv: list[str], stop: threading.Event) -> int:
+def _run(argv: list[str], ending: Ending) -> int:
     from .arguments import given_arguments
     from .bodies import bodies_of
     from .node_name import remapped_node_name
@@ -56,7 +54,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
 
     def on_crash() -> None:
         crashed.set()
-        stop.set()
+        ending.ask()
 
     physics = None
     try:
@@ -75,7 +73,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
             executor.add_node(node)
 
         def spin() -> None:
-            while not stop.is_set():
+            while not ending.asked:
                 try:
                     executor.spin()
                     break
@@ -84,16 +82,17 @@ def _run(argv: list[str], stop: threading.Event) -> int:
                 except Exception:
                     # One request that fails by a fault of ours must not take the other services with it.
                     traceback.print_exc()
-            stop.set()
+            ending.ask()
 
         executor_thread = threading.Thread(target=spin, name="executor", daemon=True)
         executor_thread.start()
         physics.start()
         for node in nodes:
             node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
-        stop.wait()
+        ending.wait()
     finally:
         if physics is not None:
+            ending.must_be_over_soon()
             physics.stop()
         for node in nodes:
             node.close()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The interactive page: pull the body on a string, poke it, change it while it moves. A ROS client like any other."""
+"""The interactive page: a ROS client like any other, and what it keeps of a flight."""

@@ -99,6 +99,8 @@ class Acting:
             tied = None
         if tied is None:
             return None
+        # A target may be heard before the first state after it.
+        state = State(max(state.time_ns, tied.begin_ns), state.row)
         hand = tied.free_end(state.time_ns)
         return hand + tied.span(setup.body, state), hand
 

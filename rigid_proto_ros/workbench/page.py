@@ -170,9 +170,7 @@ class Page:
             view.show_string(self.acting.string_ends(setup, state))
             view.show_loads(self.acting.arrows(setup, state, size))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
-            view.show_momentum(
-                state.position, _direction(momentum, 0.8 * size), _direction(spin, 0.8 * size)
-            )
+            view.show_momentum(state.position, _direction(momentum, 0.8 * size), _direction(spin, 0.8 * size))
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
 
     def _lead_back(self, position, leash: float) -> None:

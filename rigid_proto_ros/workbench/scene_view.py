@@ -67,7 +67,12 @@ class SceneView:
         self._body_frame = scene.add_frame("/body", show_axes=False)
         self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
         self._grid = scene.add_grid(
-            "/grid", width=GRID_CELLS * 0.5, height=GRID_CELLS * 0.5, cell_size=0.5, section_size=2.5, shadow_opacity=0.0
+            "/grid",
+            width=GRID_CELLS * 0.5,
+            height=GRID_CELLS * 0.5,
+            cell_size=0.5,
+            section_size=2.5,
+            shadow_opacity=0.0,
         )
         self._handles["Grid"] = [self._grid]
         none = np.zeros((1, 2, 3))
@@ -150,7 +155,12 @@ class SceneView:
                 "/body/axes", axes, AXES_COLOURS, wxyz=turned, shaft_radius=0.008, head_radius=0.022, head_length=0.06
             ),
             "Inertia ellipsoid": scene.add_icosphere(
-                "/body/ellipsoid", 1.0, MOMENTUM_COLOUR, scale=tuple((ellipsoid / unit).tolist()), wxyz=turned, **see_through
+                "/body/ellipsoid",
+                1.0,
+                MOMENTUM_COLOUR,
+                scale=tuple((ellipsoid / unit).tolist()),
+                wxyz=turned,
+                **see_through,
             ),
             "Box of equal inertia": scene.add_box(
                 "/body/box", GHOST_COLOUR, tuple((box / unit).tolist()), wxyz=turned, **see_through
