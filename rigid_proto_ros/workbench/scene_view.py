@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import viser
 
 from ..core.inertia_tensor import equimomental_shapes
 from ..core.rotation import quaternion_from_matrix
+from ..core.surface import Surface
 from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
 
@@ -51,12 +53,12 @@ class SceneView:
         self._server = server
         self.unit = 1.0
         self.origin = np.zeros(3)
-        self.body: viser.MeshHandle | None = None
+        self.body: Any = None
         self._shown = dict(SWITCHES)
         self._radius = 0.5
         self._drawn_body: tuple = ()
         self._handles: dict[str, list] = {name: [] for name in SWITCHES}
-        self._surface = None
+        self._surface: Surface | None = None
         scene = self._scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -78,7 +80,7 @@ class SceneView:
         none = np.zeros((1, 2, 3))
         self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
         self._hand = scene.add_icosphere("/string/hand", 0.03, HAND_COLOUR, visible=False)
-        thin = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
+        thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
         self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thin)
         self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
         self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
