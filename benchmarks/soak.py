@@ -18,7 +18,6 @@ from pathlib import Path
 
 from node_processes import Process, client, environment, node
 from result_table import ResultTable
-
 from rigid_proto_ros.rerun_view.viewers import viewer_program
 
 RESULTS = Path(__file__).parent / "results"
