@@ -102,7 +102,7 @@ class SimulationInterfaces:
         else:
             try:
                 for _ in range(request.steps):
-                    self._node.call(flight.step)
+                    self._node.step()
             except InputError as error:
                 response.result.result = results.RESULT_OPERATION_FAILED
                 response.result.error_message = str(error)
