@@ -8,7 +8,6 @@ physics thread takes them itself (command_intake).
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -28,13 +27,10 @@ from .event_publisher import EventPublisher
 from .flight import Flight
 from .node_name import NODE_NAME
 from .parameter_server import converted, declare_parameters, descriptor, ros_parameter
-from .physics_thread import PhysicsThread
+from .physics_thread import PhysicsThread, step_over
 from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
 from .warm_up import warm_up
-
-STEP_PATIENCE_S = 10.0
-"""How long a request to step waits for the end of it."""
 
 
 class RigidBodyNode(Node):
@@ -97,19 +93,6 @@ class RigidBodyNode(Node):
         if self.thread is None:
             return function()
         return self.thread.call(self.flight, function)
-
-    def step(self) -> int:
-        """While paused, advance to the next publication; returns the time reached [ns]. Raises InputError when that takes
-        long; then it goes on by itself.
-        """
-        flight, end = self.flight, time.monotonic() + STEP_PATIENCE_S
-        reached = self.call(flight.step)
-        while not reached:
-            if time.monotonic() > end:
-                accepted = f"a publication period that is flown in {STEP_PATIENCE_S:g} s; it goes on"
-                raise InputError("step", f"{flight.simulation.time_ns / 1e9:.9g} s reached", accepted)
-            reached = self.call(lambda: not flight.stepping)
-        return flight.simulation.time_ns
 
     def close(self) -> None:
         """After the physics thread has ended: whatever the observers hold goes out."""
@@ -286,7 +269,7 @@ class RigidBodyNode(Node):
         flight = self.flight
         if not flight.timekeeping.paused:
             return _answer(response, "step: the simulation is running; pause it first", success=False)
-        return _answer(response, f"simulated time is {self.step() / 1e9:.9g} s")
+        return _answer(response, f"simulated time is {step_over(self.call, flight) / 1e9:.9g} s")
 
     def _on_pause(self, request, response):
         flight = self.flight
