@@ -17,6 +17,7 @@ ROS = ["ros-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
+WORKBENCH = ["viser>=1.1,<1.2"]
 TEST = [
     "pytest>=8",
     "hypothesis>=6.100",
@@ -26,6 +27,7 @@ TEST = [
     "manifold3d>=3.1,<4",
     *MCAP,
     "mcap-ros2-support>=0.5",
+    "playwright>=1.50",
 ]
 
 setup(
@@ -45,7 +47,14 @@ setup(
     ],
     python_requires=">=3.11,<3.14",
     install_requires=["numpy>=1.26", "numba>=0.59", "trimesh>=4.4", "PyYAML>=6.0"],
-    extras_require={"ros": ROS, "rerun": RERUN, "mcap": MCAP, "sweep": SWEEP, "test": TEST},
+    extras_require={
+        "ros": ROS,
+        "rerun": RERUN,
+        "mcap": MCAP,
+        "workbench": WORKBENCH,
+        "sweep": SWEEP,
+        "test": TEST,
+    },
     zip_safe=False,
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Imports point one way: core <- meshes, viewers and sessions <- ros and the command line."""
+"""Imports point one way: core <- meshes, viewers and sessions <- ros <- the page and the command line."""
 
 import ast
 import subprocess
@@ -35,12 +35,14 @@ ALLOWED = {
     "trimesh": (f"{PACKAGE}.mesh_io",),
     "manifold3d": (f"{PACKAGE}.bodies.surfaces",),
     "rerun": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.inspect_view"),
+    "rerun_bindings": (f"{PACKAGE}.rerun_view",),
     "pyarrow": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.sweep.table"),  # comes with rerun, as PIL does
     "scipy": (f"{PACKAGE}.sweep.sampling",),
     "distributed": (f"{PACKAGE}.sweep.cluster",),
     "matplotlib": (f"{PACKAGE}.sweep.plot",),
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
+    "viser": (f"{PACKAGE}.workbench",),
     "mcap": (f"{PACKAGE}.session_mcap",),
     "zstandard": (f"{PACKAGE}.session_mcap",),  # comes with mcap
 }
@@ -100,14 +102,14 @@ def test_each_outside_package_is_imported_in_its_own_modules_alone() -> None:
         if top == PACKAGE or top in sys.stdlib_module_names:
             return True
         if top in ROS or top == "simulation_interfaces" or top.endswith(("_msgs", "_srvs")):
-            return within(module, f"{PACKAGE}.ros.")
+            return within(module, f"{PACKAGE}.ros.", f"{PACKAGE}.workbench.")
         return within(module, *ALLOWED.get(top, ()))
 
     assert not complaints(allowed)
 
 
 def test_nothing_below_ros_and_the_command_line_imports_them() -> None:
-    edges = (f"{PACKAGE}.ros.", f"{PACKAGE}.cli.")
+    edges = (f"{PACKAGE}.ros.", f"{PACKAGE}.workbench.", f"{PACKAGE}.cli.")
 
     def allowed(module: str, name: str) -> bool:
         return within(module, *edges) or not within(name, *edges)
@@ -115,10 +117,14 @@ def test_nothing_below_ros_and_the_command_line_imports_them() -> None:
     assert not complaints(allowed)
 
 
-def test_ros_does_not_import_the_command_line() -> None:
-    assert not complaints(
-        lambda module, name: not (within(module, f"{PACKAGE}.ros.") and within(name, f"{PACKAGE}.cli."))
-    )
+def test_ros_imports_neither_the_page_nor_the_command_line() -> None:
+    beyond = (f"{PACKAGE}.workbench.", f"{PACKAGE}.cli.")
+    assert not complaints(lambda module, name: not (within(module, f"{PACKAGE}.ros.") and within(name, *beyond)))
+
+
+def test_the_page_does_not_import_the_command_line() -> None:
+    page, line = f"{PACKAGE}.workbench.", f"{PACKAGE}.cli."
+    assert not complaints(lambda module, name: not (within(module, page) and within(name, line)))
 
 
 def test_sweeps_are_imported_by_the_command_line_alone() -> None:

@@ -13,12 +13,11 @@ from numba import boolean, float64, int64, njit, types
 from .batch_body import BODY, GYROSCOPIC, make_body_row
 from .batch_flight import AUTO, FIXED_STEPS, KERNELS, ONE_EXACT_STEP, fly
 from .flight_measures import measure_flight
+from .integrators import series_steps, taylor_adaptive
 from .integrators.auto import AUTO as AUTO_INTEGRATOR
 from .integrators.auto import steady_steps
 from .integrators.free_body import FREE_BODY, free_body_steps
 from .integrators.integrator import Integrator
-from .integrators.series_steps import series_steps
-from .integrators.taylor_adaptive import taylor_adaptive_steps
 from .quantities import CONTEXT, STATE
 
 
@@ -150,7 +149,7 @@ def _no_steps(y, p, h, n):
 
 
 @njit(cache=True)
-def _no_adaptive_steps(y, p, control, following, span_ns, look):
+def _no_adaptive_steps(y, p, control, following, workspace, span_ns, look):
     return 0
 
 
@@ -159,7 +158,7 @@ def _kernels(integrator: Integrator) -> tuple:
     """The compiled kernels that an integrator may call, in the order of batch_flight's methods."""
     kernels: list[Any] = [_no_steps, _no_steps, _no_steps, _no_adaptive_steps, _no_adaptive_steps]
     if integrator.name == AUTO_INTEGRATOR.name:
-        kernels = [steady_steps, free_body_steps, _no_steps, taylor_adaptive_steps, series_steps]
+        kernels = [steady_steps, free_body_steps, _no_steps, taylor_adaptive.steps, series_steps.steps]
     elif integrator.name == FREE_BODY.name:
         kernels[1] = free_body_steps
     else:

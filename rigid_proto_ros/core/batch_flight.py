@@ -18,9 +18,12 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from . import batch_body as b
 from . import problem as pr
 from .integrators import control as ctl
+from .integrators.auto import ANY_LOADS, FREE, STEADY, TURNING_LOADS, kind_of_segment
 from .integrators.integrator import MAX_SPEED
-from .loads import MAX_ACCELERATION
-from .motion import VARIABLES, to_row, to_variables
+from .integrators.motion_series import COLUMNS
+from .integrators.taylor import ROWS
+from .loads import FORCE_BODY, FORCE_WORLD, LOADS_SIZE, MAX_ACCELERATION, MOMENT, TORQUE_BODY, TORQUE_WORLD
+from .motion import VARIABLES, to_good_row, to_variables
 from .quantities import STATE, begin, which_is_met
 
 # Integers of a command.
@@ -38,9 +41,6 @@ TORQUE = 8  # (3,) [N m, or N m s]
 NORMAL = 11  # (3,) inward, of the unscaled mesh
 LOAD = 14
 
-# Sums of loads.
-FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY, MOMENT, SUMS = 0, 3, 6, 9, 12, 21
-
 AUTO, ONE_EXACT_STEP, FIXED_STEPS = range(3)
 """How an integrator steps."""
 
@@ -53,8 +53,10 @@ warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
 """A kernel (y, p, h, n), handed over by its address: it is the machine code that a simulation calls, and compiled only if
 it is used."""
-ADAPTIVE_STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64[::1], float64[::1], int64, boolean))
-"""A kernel (y, p, control, following, span_ns, look)."""
+ADAPTIVE_STEPS = types.FunctionType(
+    int64(float64[::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], int64, boolean)
+)
+"""A kernel (y, p, control, following, workspace, span_ns, look)."""
 KERNELS = types.Tuple((STEPS, STEPS, STEPS, ADAPTIVE_STEPS, ADAPTIVE_STEPS))
 """What the methods above call."""
 
@@ -96,7 +98,7 @@ def _within_magnitude(load, body, r):
 
 @njit(cache=True, error_model="numpy")
 def _add(load, body, r, f, sums):
-    """Add a load's share to the sums (SUMS,)."""
+    """Add a load's share to the sums (LOADS_SIZE,)."""
     _arm(load, body, r)
     t = TORQUE
     if load[LOAD_AXES] == WORLD_AXES:
@@ -167,39 +169,22 @@ def _impulse(load, body, row, r, f, R):
 
 
 @njit(cache=True, error_model="numpy")
-def _make_problem(body, settings, gyroscopic, sums, row, p):
-    """As ``problem.make_problem`` without a string."""
-    P, mass = b.AXES, body[b.MASS]
+def _problem_of_body(body, settings, gyroscopic, p):
+    """As ``problem.problem_of_body``."""
     p[:] = 0.0
     for k in range(3):
         p[pr.MOMENTS + k] = body[b.MOMENTS + k]
-        p[pr.TORQUE_WORLD + k] = sums[TORQUE_WORLD + k]
-        T, F, M = TORQUE_BODY, FORCE_BODY, MOMENT
-        c0, c1, c2 = body[P + k], body[P + 3 + k], body[P + 6 + k]
-        p[pr.TORQUE_BODY + k] = c0 * sums[T] + c1 * sums[T + 1] + c2 * sums[T + 2]
-        p[pr.ACCELERATION_BODY + k] = (c0 * sums[F] + c1 * sums[F + 1] + c2 * sums[F + 2]) / mass
-        for j in range(3):
-            p[pr.MOMENT + 3 * k + j] = c0 * sums[M + j] + c1 * sums[M + 3 + j] + c2 * sums[M + 6 + j]
-        p[pr.START_POSITION + k] = row[k]
-        p[pr.REFERENCE_VELOCITY + k] = row[7 + k]
-        p[pr.REFERENCE_ACCELERATION + k] = settings[b.GRAVITY + k] + sums[FORCE_WORLD + k] / mass
-    p[pr.DAMPING_LINEAR] = settings[b.LINEAR_DAMPING] / mass
-    p[pr.DAMPING_ANGULAR] = settings[b.ANGULAR_DAMPING]
-    p[pr.GYROSCOPIC] = gyroscopic
-    world = False
-    for k in range(3):
-        world = world or sums[TORQUE_WORLD + k] != 0.0
+        p[pr.REFERENCE_ACCELERATION + k] = settings[b.GRAVITY + k]
     for k in range(9):
-        world = world or sums[MOMENT + k] != 0.0
-        p[pr.PRINCIPAL_AXES + k] = body[P + k]
-    p[pr.HAS_WORLD_TORQUE] = 1.0 if world else 0.0
-    carried = sums[FORCE_BODY] != 0.0 or sums[FORCE_BODY + 1] != 0.0 or sums[FORCE_BODY + 2] != 0.0
-    p[pr.TRANSLATES] = 1.0 if carried else 0.0
+        p[pr.PRINCIPAL_AXES + k] = body[b.AXES + k]
     for k in range(4):
         p[pr.PRINCIPAL_QUATERNION + k] = body[b.QUATERNION + k]
-    p[pr.MASS] = mass
-    p[pr.LENGTH] = body[b.LENGTH]
+    p[pr.DAMPING_LINEAR] = settings[b.LINEAR_DAMPING] / body[b.MASS]
+    p[pr.DAMPING_ANGULAR] = settings[b.ANGULAR_DAMPING]
+    p[pr.GYROSCOPIC] = gyroscopic
     p[pr.REFERENCE_DAMPING] = p[pr.DAMPING_LINEAR]
+    p[pr.MASS] = body[b.MASS]
+    p[pr.LENGTH] = body[b.LENGTH]
 
 
 @njit(cache=True, error_model="numpy")
@@ -209,25 +194,23 @@ def _any(values, at):
 
 @njit(cache=True, error_model="numpy")
 def _method(stepping, p, y):
-    """As ``integrators.auto`` chooses where no string is tied."""
+    """Which kernel steps a segment with problem p from variables y on."""
     if stepping == ONE_EXACT_STEP:
         return _FREE
     if stepping == FIXED_STEPS:
         return _FIXED
-    spins = _any(y, 4)
-    turned = _any(p, pr.TORQUE_BODY) or p[pr.HAS_WORLD_TORQUE] != 0.0 or (spins and p[pr.DAMPING_ANGULAR] != 0.0)
-    if not turned:
-        if not spins and p[pr.TRANSLATES] == 0.0:
-            return _ASLEEP
-        if not spins or (p[pr.GYROSCOPIC] == 0.0 and p[pr.TRANSLATES] == 0.0):
-            return _STEADY
-        if p[pr.TRANSLATES] == 0.0:
-            return _FREE
-    return _SERIES if p[pr.HAS_WORLD_TORQUE] != 0.0 else _TAYLOR
+    kind = kind_of_segment(p, y)
+    if kind == STEADY:
+        return _STEADY
+    if kind == FREE:
+        return _FREE
+    if kind == TURNING_LOADS:
+        return _TAYLOR
+    return _SERIES if kind == ANY_LOADS else _ASLEEP
 
 
 @njit(cache=True, error_model="numpy")
-def _commit(method, kernels, y, p, control, following, step_ns, span_ns):
+def _commit(method, kernels, y, p, control, following, room, step_ns, span_ns):
     """Commit full steps within ``span_ns``; how far that came [ns], or −1 when one failed."""
     if method == _FIXED:
         wanted = span_ns // step_ns
@@ -236,16 +219,16 @@ def _commit(method, kernels, y, p, control, following, step_ns, span_ns):
         done = kernels[_FIXED](y, p, step_ns * 1e-9, wanted)
         return done * step_ns if done == wanted else -1
     if method == _TAYLOR:
-        advanced = kernels[_TAYLOR](y, p, control, following, span_ns, False)
+        advanced = kernels[_TAYLOR](y, p, control, following, room[0], span_ns, False)
     elif method == _SERIES:
-        advanced = kernels[_SERIES](y, p, control, following, span_ns, False)
+        advanced = kernels[_SERIES](y, p, control, following, room[1], span_ns, False)
     else:
         return 0
     return -1 if control[ctl.FAILED] != 0.0 else int(advanced)
 
 
 @njit(cache=True, error_model="numpy")
-def _reach(method, kernels, y, p, control, following, rest_ns):
+def _reach(method, kernels, y, p, control, following, room, rest_ns):
     """One step of ``rest_ns`` in y, a copy; whether it was good."""
     h = rest_ns * 1e-9
     if method == _ASLEEP:
@@ -257,16 +240,8 @@ def _reach(method, kernels, y, p, control, following, rest_ns):
     if method == _FIXED:
         return kernels[_FIXED](y, p, h, 1) == 1
     if method == _TAYLOR:
-        return kernels[_TAYLOR](y, p, control, following, rest_ns, True) == rest_ns
-    return kernels[_SERIES](y, p, control, following, rest_ns, True) == rest_ns
-
-
-@njit(cache=True, error_model="numpy")
-def _is_good(row):
-    good = True
-    for k in range(13):
-        good = good and abs(row[k]) <= MAX_SPEED
-    return good
+        return kernels[_TAYLOR](y, p, control, following, room[0], rest_ns, True) == rest_ns
+    return kernels[_SERIES](y, p, control, following, room[1], rest_ns, True) == rest_ns
 
 
 @njit(cache=True, error_model="numpy")
@@ -278,7 +253,7 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
     filled here. Returns how many looks it reached, and which stop held or −1; 0 looks: the simulation must say what is wrong.
     """
     count = commands.shape[0]
-    r, f, R, sums = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(SUMS)
+    r, f, R, sums = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(LOADS_SIZE)
     for c in range(count):
         if commands[c, KIND] != CLEAR and not _within_magnitude(loads[c], body, r):
             return 0, -1
@@ -288,6 +263,10 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
     begin(body[b.MASS], body[b.INERTIA : b.INERTIA + 9], settings[b.GRAVITY : b.GRAVITY + 3], row, context)
     p, y, trial = np.zeros(pr.SIZE), np.zeros(VARIABLES), np.zeros(VARIABLES)
     control, following = np.zeros(ctl.SIZE), np.zeros(VARIABLES)
+    degree = times[b.DEGREE]
+    room = (np.zeros((ROWS, degree + 1)), np.zeros((degree + 2, COLUMNS)))
+    common = np.zeros(pr.SIZE)
+    _problem_of_body(body, settings, gyroscopic, common)
     pulses, ends_ns = np.zeros(count, np.int64), np.zeros(count, np.int64)
     running, held, held_end_ns, pending = 0, -1, NEVER, 0
     start_ns, committed_ns, method, fresh = 0, 0, _ASLEEP, True
@@ -302,11 +281,12 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
                 for k in range(running):
                     _add(loads[pulses[k]], body, r, f, sums)
                 start[:] = row
-                _make_problem(body, settings, gyroscopic, sums, row, p)
+                p[:] = common
+                pr.begin_problem(p, sums, row)
                 to_variables(row, p, y)
                 method = _method(stepping, p, y)
                 control[:] = 0.0
-                control[ctl.ACCURACY], control[ctl.DEGREE] = settings[b.ACCURACY], times[b.DEGREE]
+                control[ctl.ACCURACY], control[ctl.DEGREE] = settings[b.ACCURACY], degree
                 committed_ns = start_ns
             event_ns = commands[pending, AT_NS] if pending < count else NEVER
             if held >= 0:
@@ -314,7 +294,9 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
             for k in range(running):
                 event_ns = min(event_ns, ends_ns[k])
             until_ns = min(event_ns, looks_ns[look])
-            advanced = _commit(method, kernels, y, p, control, following, times[b.STEP_NS], until_ns - committed_ns)
+            advanced = _commit(
+                method, kernels, y, p, control, following, room, times[b.STEP_NS], until_ns - committed_ns
+            )
             if advanced < 0:
                 return 0, -1
             committed_ns += advanced
@@ -323,10 +305,9 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
             else:
                 trial[:] = y
                 rest_ns = until_ns - committed_ns
-                if rest_ns > 0 and not _reach(method, kernels, trial, p, control, following, rest_ns):
+                if rest_ns > 0 and not _reach(method, kernels, trial, p, control, following, room, rest_ns):
                     return 0, -1
-                to_row(trial, p, (until_ns - start_ns) * 1e-9, row)
-                if not _is_good(row):
+                if not to_good_row(trial, p, (until_ns - start_ns) * 1e-9, row, MAX_SPEED):
                     return 0, -1
             if event_ns >= looks_ns[look]:
                 break
