@@ -4,12 +4,19 @@
 from __future__ import annotations
 
 import faulthandler
+import os
 import select
 import signal
 import socket
+import sys
+import threading
+from typing import NoReturn
 
-TEARDOWN_S = 18.0
-"""Longer than every wait for a thread, a recording and the middleware at the end, added up."""
+CLOSING_S = 15.0
+"""Longer than every wait for the physics thread and for recordings, added up."""
+
+TEARDOWN_S = 3.0
+"""What the middleware gets to say goodbye in; 0.1 s is usual. Nothing of ours waits for it any more."""
 
 
 class Ending:
@@ -47,7 +54,29 @@ class Ending:
         """Return when the end was asked for."""
         select.select([self._waited], [], [])
 
-    @staticmethod
-    def must_be_over_soon() -> None:
-        """Leave with status 1 and every thread's stack on stderr, should what follows still run after TEARDOWN_S."""
-        faulthandler.dump_traceback_later(TEARDOWN_S, exit=True)
+
+def begin_closing() -> None:
+    """Leave with status 1 and every thread's stack on stderr, should closing what is ours take longer than CLOSING_S."""
+    faulthandler.dump_traceback_later(CLOSING_S, exit=True)
+
+
+def begin_teardown(status: int) -> None:
+    """All that is ours is closed: leave with ``status`` after TEARDOWN_S, whatever the middleware still does then."""
+    faulthandler.dump_traceback_later(TEARDOWN_S + 2.0, exit=True)
+    watch = threading.Timer(TEARDOWN_S, _leave_stuck, (status,))
+    watch.daemon = True
+    watch.start()
+
+
+def leave(status: int) -> NoReturn:
+    """End the process without the interpreter's own teardown: everything is closed, and unloading the middleware and the
+    compiled kernels takes ten times as long as all the closing did, with threads of other libraries still running.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def _leave_stuck(status: int) -> NoReturn:
+    print(f"rigid_body_node: the middleware did not end within {TEARDOWN_S:g} s and is left to itself", file=sys.stderr)
+    leave(status)

@@ -10,19 +10,20 @@ import traceback
 from ..core.compilation import told_when_compiling
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
-from .ending import Ending
+from .ending import Ending, begin_closing, begin_teardown, leave
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the node; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
+    """Run the node; returns 2 when the input was refused (one line on stderr), else ends the process: with 0 after a signal."""
     argv = sys.argv if argv is None else argv
     # Signals end the main thread's wait; the middleware must outlive the physics thread, so rclpy's handlers stay out.
     try:
         with Ending() as ending:
-            return _run(argv, ending)
+            status = _run(argv, ending)
     except InputError as error:
         print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    return leave(status)
 
 
 def _run(argv: list[str], ending: Ending) -> int:
@@ -92,10 +93,12 @@ def _run(argv: list[str], ending: Ending) -> int:
         ending.wait()
     finally:
         if physics is not None:
-            ending.must_be_over_soon()
+            begin_closing()
             physics.stop()
         for node in nodes:
             node.close()
+        if physics is not None:
+            begin_teardown(1 if crashed.is_set() else 0)
         executor.shutdown(timeout_sec=0.5)
         if executor_thread is not None:
             executor_thread.join(timeout=0.5)
