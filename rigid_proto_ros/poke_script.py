@@ -25,6 +25,9 @@ MAX_TIME_S = 1e9
 MAX_ENTRIES = 1_000_000
 """Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
 
+MAX_SCHEDULE_LENGTH = 10_000
+"""Characters of one entry on the schedule topic."""
+
 _FORCES = ("force", "push", "impulse")
 _POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
 _TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}

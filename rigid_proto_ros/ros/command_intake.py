@@ -36,9 +36,6 @@ QUIET_NS = 4_000_000
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
 
-MAX_SCHEDULE_LENGTH = 10_000
-"""Characters of one schedule entry."""
-
 MAX_BRACKETS = 100
 """Lists and mappings opened in one: the YAML reader takes seconds over thousands, and the body would wait for it."""
 
