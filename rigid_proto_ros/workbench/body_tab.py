@@ -71,7 +71,9 @@ class BodyTab:
     def _mesh_folder(self) -> None:
         gui = self._gui
         with gui.add_folder("Mesh"):
-            mesh = gui.add_dropdown("Body", (OWN_FILE, *body_names()), OWN_FILE, hint="Bundled bodies (mesh)")
+            mesh = gui.add_dropdown(
+                "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="Bundled bodies (mesh)"
+            )
             self._file = gui.add_markdown("")
             self.upload_place = gui.add_folder("Upload", expand_by_default=True)
             self._verdict = gui.add_markdown("")
@@ -90,7 +92,9 @@ class BodyTab:
         with gui.add_folder("Size and mass"):
             controls.factor("Size ×", "All three scales together (scale)", 1.0, self._size_factor, self._set_size)
             controls.vector("scale", "Scale x y z", 3)
-            controls.factor("Mass ×", "Times the mass that the body came with (mass)", 2.0, self._mass_factor, self._set_mass)
+            controls.factor(
+                "Mass ×", "Times the mass that the body came with (mass)", 2.0, self._mass_factor, self._set_mass
+            )
             controls.number("mass", "Mass [kg]; 0: by density")
             controls.number("density", "Density [kg/m³]")
 
@@ -123,7 +127,9 @@ class BodyTab:
                 tensor = gui.add_text("Tensor", "", hint="ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes")
                 verdict = gui.add_markdown("")
                 present = gui.add_button("Take the present one")
-                apply = gui.add_button("Fly it", disabled=True, hint="inertia_model explicit, with present mass and COM")
+                apply = gui.add_button(
+                    "Fly it", disabled=True, hint="inertia_model explicit, with present mass and COM"
+                )
 
         def judge() -> list[float] | None:
             numbers = read_numbers(tensor.value, 6)
@@ -184,5 +190,3 @@ def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
 def _ballast_list(scenario: Scenario) -> str:
     weights = {n.removeprefix("ballast."): v for n, v in scenario.values.items() if n.startswith("ballast.") and v[0]}
     return "\n".join(f"- {name}: {v[0]:g} kg at {v[1]:g} {v[2]:g} {v[3]:g}" for name, v in weights.items())
-
-

@@ -108,7 +108,9 @@ class Controls:
 
     def number(self, name: str, label: str) -> viser.GuiInputHandle:
         """A number of any size, as text."""
-        return self._text(label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1))
+        return self._text(
+            label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1)
+        )
 
     def vector(self, name: str, label: str, length: int) -> viser.GuiInputHandle:
         """Numbers of any size, as text with blanks between them."""

@@ -17,6 +17,7 @@ SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1"
 """Simulated seconds per second, as the panel names them."""
 
 GRABBED, COM = "Grabbed point", "Centre of mass"
+PAUSE, GO_ON, STEP, RESET = "Pause", "Go on", "Step", "Reset"
 EARTH = [0.0, 0.0, -9.81]
 
 HELP = """
@@ -32,8 +33,9 @@ class Panel:
         self._page = page
         self._controls = controls
         self._gui = page.server.gui
-        with tabs.add_tab("Play"):
-            self._lesson_folder()
+        self.play_tab = tabs.add_tab("Play")
+        with self.play_tab:
+            self._gui.add_markdown(HELP, order=-2.0)
             self._time_folder()
             self._poke_folder()
             self._string_folder()
@@ -41,12 +43,10 @@ class Panel:
             self._physics()
 
     def show_state(self, paused: bool) -> None:
-        """The pause button says what it would do."""
-        label = "Go on" if paused else "Pause"
-        if self._pause.label != label:
-            self._pause.label = label
-        if self._step.disabled == paused:
-            self._step.disabled = not paused
+        """Whether simulated time stands still."""
+        text = "Simulated time stands still." if paused else ""
+        if self._running.content != text:
+            self._running.content = text
 
     def show_force(self) -> None:
         """The poke's force was changed by something else than its own input."""
@@ -54,28 +54,22 @@ class Panel:
 
     # Play
 
-    def _lesson_folder(self) -> None:
-        self._gui.add_markdown(HELP)
-
     def _time_folder(self) -> None:
         gui, page = self._gui, self._page
         with gui.add_folder("Time"):
-            self._pause = gui.add_button("Pause", hint="Stop simulated time, or let it go on (~/pause)")
-            self._step = gui.add_button("Step", hint="While paused: one publication period (~/step)", disabled=True)
-            reset = gui.add_button("Reset", hint="Time 0 and the initial state (~/reset)")
-            speed = gui.add_dropdown("Speed", tuple(SPEEDS), "1", hint="Simulated seconds per second (real_time_factor)")
+            buttons = gui.add_button_group("Simulation", (PAUSE, GO_ON, STEP, RESET), hint="~/pause, ~/step, ~/reset")
+            self._running = gui.add_markdown("")
+            speed = gui.add_dropdown(
+                "Speed", tuple(SPEEDS), initial_value="1", hint="Simulated seconds per second (real_time_factor)"
+            )
 
-        @self._pause.on_click
+        @buttons.on_click
         async def _(event) -> None:
-            page.pause(self._pause.label == "Pause")
-
-        @self._step.on_click
-        async def _(event) -> None:
-            page.call("step")
-
-        @reset.on_click
-        async def _(event) -> None:
-            page.call("reset")
+            pressed = buttons.value
+            if pressed in (PAUSE, GO_ON):
+                page.pause(pressed == PAUSE)
+            else:
+                page.call(pressed.lower())
 
         def shown(values):
             return next((name for name, factor in SPEEDS.items() if factor == values["real_time_factor"]), speed.value)
@@ -85,9 +79,13 @@ class Panel:
     def _poke_folder(self) -> None:
         gui, tools = self._gui, self._page.tools
         with gui.add_folder("Poke (click)"):
-            click = gui.add_dropdown("Click", (POKE, PUSH), POKE, hint="Shift-click does the other; for pages without shift")
+            click = gui.add_dropdown(
+                "Click", (POKE, PUSH), initial_value=POKE, hint="Shift-click does the other; for pages without shift"
+            )
             self._force = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
-            times = gui.add_slider("Force ×", -2.0, 2.0, 0.05, 0.0, hint="Times the force that suits the body", marks=_TENS)
+            times = gui.add_slider(
+                "Force ×", -2.0, 2.0, 0.05, 0.0, hint="Times the force that suits the body", marks=_TENS
+            )
             self._controls.number("poke_duration", "Duration [s]")
 
         @click.on_update
@@ -109,9 +107,16 @@ class Panel:
     def _string_folder(self) -> None:
         gui, tools, controls = self._gui, self._page.tools, self._controls
         with gui.add_folder("String (drag)"):
-            at = gui.add_dropdown("Pull at", (GRABBED, COM), GRABBED, hint="Where the string is tied when you drag")
+            at = gui.add_dropdown(
+                "Pull at", (GRABBED, COM), initial_value=GRABBED, hint="Where the string is tied when you drag"
+            )
             strength = gui.add_slider(
-                "Strength [rad/s]", 1.0, 40.0, 0.5, tools.frequency, hint="Frequency of the effective mass (string.frequency)"
+                "Strength [rad/s]",
+                1.0,
+                40.0,
+                0.5,
+                tools.frequency,
+                hint="Frequency of the effective mass (string.frequency)",
             )
             scaled = gui.add_checkbox("Scaled by effective mass", True, hint="So that a nut and a ship pull alike")
             controls.number("string.stiffness", "Stiffness [N/m]")
@@ -171,7 +176,9 @@ def show_tab(page: Page, tabs) -> None:
             async def _(event, name=name, switch=switch) -> None:
                 page.view.switch(name, switch.value)
 
-        follow = gui.add_checkbox("Keep the body in view", True, hint="The picture follows; the grid shows the way made")
+        follow = gui.add_checkbox(
+            "Keep the body in view", True, hint="The picture follows; the grid shows the way made"
+        )
         centre = gui.add_button("Centre on the body")
 
         @follow.on_update

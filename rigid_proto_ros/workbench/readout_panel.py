@@ -50,7 +50,7 @@ class ReadoutPanel:
         ]
         data = tuple(np.zeros(1) for _ in series)
         scales = {"x": {"time": False}}
-        return server.gui.add_uplot(data, tuple(series), title=title, scales=scales, height=170, legend={"show": True})
+        return server.gui.add_uplot(data, tuple(series), title=title, scales=scales, height=150, legend={"show": True})
 
     def restart(self) -> None:
         """The flight began anew."""
@@ -98,4 +98,10 @@ class ReadoutPanel:
             first = 1
             for plot, names in zip(self._plots, PLOTS.values(), strict=True):
                 plot.data = (columns[0], *(columns[first + k] for k in range(len(names))))
+                if names == ("angle",):
+                    # Round-off isn't blown up to fill the plot.
+                    plot.scales = {
+                        "x": {"time": False},
+                        "y": {"range": (0.0, max(1.0, 1.1 * float(columns[first].max())))},
+                    }
                 first += len(names)

@@ -46,7 +46,7 @@ class SessionTab:
     def _lesson_folder(self) -> None:
         gui = self._gui
         with gui.add_folder("Lesson", order=-1.0):
-            choice = gui.add_dropdown("Lesson", (NO_LESSON, *self._lessons), NO_LESSON)
+            choice = gui.add_dropdown("Lesson", (NO_LESSON, *self._lessons), initial_value=NO_LESSON)
             self._text = gui.add_markdown("")
             self._script = gui.add_button("Run its script", visible=False)
         self._choice = choice
@@ -70,7 +70,9 @@ class SessionTab:
         if lesson is None:
             self._text.content = ""
         else:
-            self._text.content = "\n".join(f"{k}. {s}" for k, s in enumerate(lesson.sentences, 1)) + f"\n\n{lesson.reason}"
+            self._text.content = (
+                "\n".join(f"{k}. {s}" for k, s in enumerate(lesson.sentences, 1)) + f"\n\n{lesson.reason}"
+            )
 
     def show_lesson_named(self, name: str) -> None:
         """The page was started with the scene of a lesson."""

@@ -97,14 +97,16 @@ async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Call
             deadline = time.monotonic() + STALLED_S
             while received() - first < number:
                 if time.monotonic() > deadline:
-                    raise InputError("node", f"{received() - first} commands confirmed", f"{number}, all that were sent")
+                    raise InputError(
+                        "node", f"{received() - first} commands confirmed", f"{number}, all that were sent"
+                    )
                 await asyncio.sleep(0.02)
 
 
 async def asked(link: RosLink, service: str, data: bool | None = None) -> str:
     """Call a service and wait; returns its message, raises InputError where it fails."""
     answer = asyncio.get_running_loop().create_future()
-    link.call(service, data, lambda *result: answer.done() or answer.set_result(result))
+    link.call(service, data, _giving(answer))
     successful, message = await _within(answer, service)
     if not successful:
         raise InputError(service, message, "success")
@@ -114,12 +116,20 @@ async def asked(link: RosLink, service: str, data: bool | None = None) -> str:
 async def set_parameters(link: RosLink, changes: Mapping[str, object]) -> tuple[bool, str]:
     """Set parameters together and wait; whether the node took them, and its reason where it didn't."""
     answer = asyncio.get_running_loop().create_future()
-    link.set_parameters(dict(changes), lambda *result: answer.done() or answer.set_result(result))
+    link.set_parameters(dict(changes), _giving(answer))
     return await _within(answer, "set_parameters_atomically")
+
+
+def _giving(answer: asyncio.Future) -> Callable[[bool, str], None]:
+    def give(successful: bool, message: str) -> None:
+        if not answer.done():  # it may come after we stopped waiting
+            answer.set_result((successful, message))
+
+    return give
 
 
 async def _within(answer: asyncio.Future, what: str):
     try:
         return await asyncio.wait_for(answer, STALLED_S)
-    except asyncio.TimeoutError:
+    except TimeoutError:
         raise InputError(what, f"no answer within {STALLED_S:g} s", "an answer of the node") from None

@@ -19,8 +19,8 @@ def model_properties(scenario: Scenario, model: str) -> MassProperties:
     values = scenario.values
     ballast = [value for name, value in values.items() if name.startswith("ballast.")]
     if model == "explicit":
-        given = (values[f"explicit_inertia.{name}"] for name in ("mass", "center_of_mass", "tensor"))
-        return explicit_mass_properties(*given, ballast, values["scale"])
+        mass, com, tensor = (values[f"explicit_inertia.{name}"] for name in ("mass", "center_of_mass", "tensor"))
+        return explicit_mass_properties(mass, com, tensor, ballast, values["scale"])
     if scenario.body_mesh is None:
         raise InputError("mesh", "", "a mesh")
     return scenario.body_mesh.moments.mass_properties(
@@ -34,7 +34,7 @@ def comparison(scenario: Scenario) -> str:
     Errors of tensor entries are relative to the true tensor's largest, as those of ``inspect`` are; moments each to itself;
     the COM's distance to the true one is given in per cent of the body's size.
     """
-    flying = scenario.values["inertia_model"]
+    flying = str(scenario.values["inertia_model"])
     other = "bounding_box" if flying == "solid" else flying
     try:
         true = model_properties(scenario, "solid")

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from ..core.errors import MeshError
-from ..mesh_cache import PASSING
 from ..mesh_body import mesh_body
+from ..mesh_cache import PASSING
 from ..mesh_inspection import Inspection, as_json, inspect_mesh
 from ..mesh_io import BYTES_PER_TRIANGLE, MAX_TRIANGLES, OWN_FORMATS, load_mesh
 
