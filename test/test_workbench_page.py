@@ -198,6 +198,7 @@ def test_an_upload_shows_the_verdict_and_a_broken_one_leaves_the_body_as_it_is(p
     field = page.page.locator("input[type=file]").first
     field.set_input_files(str(broken))
     page.until(lambda: "refused: " in page.text and "broken.stl" in page.text, "a verdict on the broken file")
+    time.sleep(0.5)  # the browser's own progress display is done with it
     field.set_input_files(str(open_box))
     page.until(lambda: "open_box.obj" in page.text and "boundary" in page.text, "a verdict on the open box")
     assert ear.values()["mesh"] == "teapot"
@@ -234,7 +235,7 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
 
 
 def test_two_pages_agree(page, ear, bench, browser) -> None:
-    other = Page(browser, bench.address, (700, 500))
+    other = Page(browser, bench.address)
     try:
         page.tab("Physics")
         other.tab("Physics")

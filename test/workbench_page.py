@@ -50,11 +50,13 @@ class Bench:
 class Page:
     """One browser page. The body is at the middle of the canvas while it rests at the world's origin."""
 
-    def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 600)) -> None:
+    def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         self.page.set_default_timeout(PATIENCE_S * 1e3)
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
+        # viser says that WebGL runs in software, and stands before the picture while it does.
+        self.page.locator(".mantine-Notification-closeButton").first.click()
         self.until(lambda: "is flying" in self.text or "is sleeping" in self.text, "a node on the page")
 
     @property
