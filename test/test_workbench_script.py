@@ -3,14 +3,9 @@
 
 from __future__ import annotations
 
-import json
-
-import numpy as np
 import pytest
-import yaml
-from hand_session import HandSession, random_hand_session
+from hand_session import random_hand_session
 
-from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.offline import OfflineRun
 from rigid_proto_ros.poke_script import parse_script
 from rigid_proto_ros.scenario import make_scenario

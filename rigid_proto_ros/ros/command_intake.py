@@ -21,7 +21,14 @@ from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
 from ..core.frames import parse_frame
-from ..poke_script import MAX_SCHEDULE_LENGTH, MESH_FRAME, core_command, parse_script, string_attach, string_target
+from ..poke_script import (
+    MAX_SCHEDULE_LENGTH,
+    MESH_FRAME,
+    core_command,
+    parse_script,
+    string_attach,
+    string_target,
+)
 from ..scenario import check_inertia, nanoseconds
 from . import qos
 from .message_bytes import read_message, read_wrench_stamped, whole_stamp

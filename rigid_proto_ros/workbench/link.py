@@ -16,12 +16,10 @@ import zlib
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
-
 from ..core.errors import InputError
 from ..mesh_io import bundled_names
 from ..parameters import PARAMETERS, convert_all
-from ..poke_script import expand_script
+from ..poke_script import expand_script, script_entries
 from ..scenario import scene_text
 from ..scene_file import read_scene_text
 from .save_as_script import NOT_OF_THE_MOTION, flow
@@ -48,10 +46,7 @@ def encode(scene: str, script: str = "") -> str:
         for name, value in convert_all(read_scene_text(scene).values).items()
         if name not in NOT_OF_THE_MOTION and (name not in PARAMETERS or value != PARAMETERS[name].default)
     }
-    try:
-        entries = yaml.safe_load(script)
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise InputError("script", str(error).splitlines()[0], "a poke script as YAML") from None
+    entries = script_entries(script)
     _check(values, entries)
     text = json.dumps({"scene": values, "script": entries or []}, separators=(",", ":"), allow_nan=False).encode()
     if len(text) > MAX_DECODED:
