@@ -55,7 +55,7 @@ class Process:
 
     def wait_until_flying(self) -> None:
         """Until the node says that it flies."""
-        if not self._flying.wait(60):
+        if not self._flying.wait(300):
             raise RuntimeError("".join(self.errors))
 
     def end(self) -> str:
