@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: help setup run up test lint pictures build bench stress soak clean pins
+.PHONY: help setup run up workbench test lint pictures build bench stress soak clean pins
 SHELL := /bin/bash
 
 PY := .venv/bin/python
 READY := .venv/.pins
 # What the node says to others stays on this machine, unless the user has chosen otherwise.
-run up pictures: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+run up workbench pictures: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 12
@@ -22,6 +22,9 @@ run: setup ## fly a bundled body, or MESH=path/to.obj, for about 10 s; leaves ou
 
 up: setup ## node and viewer; stays until Ctrl-C
 	@.venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)")
+
+workbench: setup ## node and interactive page; stays until Ctrl-C
+	@.venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
 
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
 	$(PY) -m pytest -n 2 --dist loadfile -m "not stress and not bench and not soak" $(ARGS)

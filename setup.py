@@ -16,6 +16,7 @@ VERSION = next(
 ROS = ["ros-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 MCAP = ["mcap>=1.2,<2"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
+WORKBENCH = ["viser>=1.1,<1.2"]
 TEST = [
     "pytest>=8",
     "hypothesis>=6.100",
@@ -25,6 +26,7 @@ TEST = [
     "manifold3d>=3.1,<4",
     *MCAP,
     "mcap-ros2-support>=0.5",
+    "playwright>=1.50",
 ]
 
 setup(
@@ -44,7 +46,7 @@ setup(
     ],
     python_requires=">=3.11,<3.14",
     install_requires=["numpy>=1.26", "numba>=0.59", "trimesh>=4.4", "PyYAML>=6.0"],
-    extras_require={"ros": ROS, "rerun": RERUN, "mcap": MCAP, "test": TEST},
+    extras_require={"ros": ROS, "rerun": RERUN, "mcap": MCAP, "workbench": WORKBENCH, "test": TEST},
     zip_safe=False,
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",

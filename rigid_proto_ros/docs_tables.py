@@ -18,6 +18,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from . import __version__
 from .core.integrators import INTEGRATORS
 from .core.integrators.integrator import (
     ANGULAR_DAMPING,
@@ -136,6 +137,62 @@ def _error(text: str) -> str:
     return "refuses" if math.isnan(value) else f"{value:.0e}"
 
 
+def motions() -> str:
+    """Motion here and elsewhere: each tool's most accurate run of a problem, from the last benchmark's own numbers."""
+    with (ROOT / "benchmarks" / "results" / "work_precision.csv").open(encoding="utf-8", newline="") as file:
+        measured = [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
+    ours = [row for row in measured if row["tool"] == "ours" and row["integrator"] == "auto"]
+    best = {("rigid_proto, auto", row["problem"]): row for row in ours if row["step_or_tolerance"] == "1e-09"}
+    versions = {"rigid_proto, auto": __version__}
+    for row in measured:
+        if row["tool"].startswith("ours"):
+            continue
+        versions[row["tool"]] = row["version"]
+        known = best.get((row["tool"], row["problem"]))
+        if known is None or _attitude_error(row) < _attitude_error(known):
+            best[row["tool"], row["problem"]] = row
+    rows = [
+        (_TOOLS.get(tool, tool), versions[tool], *(_best_run(best.get((tool, problem))) for problem in _MOTIONS))
+        for tool in versions
+    ]
+    newest = max(measured, key=lambda row: row["date"])
+    sentence = f"Measured {newest['date'][:10]} on one {newest['cpu']}, in one process, medians of whole runs."
+    return f"{sentence}\n\n{_table(('tool', 'version', *_MOTIONS.values()), rows)}"
+
+
+_MOTIONS = {
+    "P1": "100 s of repeated flips",
+    "P2": "10 s under a thruster and gravity",
+    "P4rod": "10 s of a rod at 1000 rad/s",
+}
+"""Problems of benchmarks/WORK_PRECISION.md that are shown."""
+
+_TOOLS = {
+    "mujoco": "MuJoCo",
+    "drake": "Drake",
+    "pinocchio": "Pinocchio, RKMK4",
+    "bullet": "Bullet",
+    "scipy": "SciPy, DOP853",
+    "diffrax": "diffrax",
+}
+
+
+def _best_run(row: dict[str, str] | None) -> str:
+    if row is None:
+        return "not run"
+    error = _attitude_error(row)
+    if error > 0.1:
+        return "lost"
+    milliseconds = 1e3 * float(row["median_s"])
+    time = f"{milliseconds:.0f}" if milliseconds >= 10.0 else f"{milliseconds:.2g}"
+    return f"{error:.0e} rad in {time} ms"
+
+
+def _attitude_error(row: dict[str, str]) -> float:
+    error = float(row["attitude_error_rad"] or "nan")
+    return math.inf if math.isnan(error) else error
+
+
 TABLES = {
     "topics": topics,
     "services": services,
@@ -143,6 +200,7 @@ TABLES = {
     "integrators": integrators,
     "modules": modules,
     "masses": masses,
+    "motions": motions,
 }
 
 

@@ -178,6 +178,7 @@ _DECLARED = (
     Parameter("viewer", "string", "none", "Show the motion live in Rerun: in the browser, or in the native viewer.", choices=("none", "web", "native"), changes=READ_ONLY),
     _port("rerun_port", 9876, "Port on which the live view is served, on this machine only."),
     _port("web_port", 9090, "Port of the browser's viewer page, on this machine only."),
+    _port("workbench_port", 8080, "Port of the interactive page, on this machine only."),
 )  # fmt: skip
 
 PARAMETERS: dict[str, Parameter] = {parameter.name: parameter for parameter in _DECLARED}

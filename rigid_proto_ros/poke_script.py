@@ -101,6 +101,13 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
         mark = getattr(error, "problem_mark", None)
         where = f"{name}, line {mark.line + 1}" if mark else name
         raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
+    return expand_script(entries, name, wrench_timeout)
+
+
+def expand_script(
+    entries, name: str = "script", wrench_timeout: float = 1.5, max_commands: int = MAX_ENTRIES
+) -> list[ScriptCommand]:
+    """As ``parse_script``, from what its YAML says: a list of entries, or a mapping that holds one as ``script``."""
     whole: dict = {}
     if isinstance(entries, dict) and "script" in entries:
         whole = {key: value for key, value in entries.items() if key != "script"}
@@ -113,28 +120,29 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
     commands: list[ScriptCommand] = []
     for number, entry in enumerate(entries, 1):
         where = f"{name}, entry {number}"
-        for k, offset_ns in enumerate(_offsets_ns(whole, name)):
-            for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}"):
+        for k, offset_ns in enumerate(_offsets_ns(whole, name, max_commands)):
+            for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}", max_commands):
                 jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
-                commands += _expand(entry, max(0, t_ns + offset_ns + jitter_ns), where, wrench_timeout)
-            if len(commands) > MAX_ENTRIES:
-                raise InputError(where, f"over {MAX_ENTRIES} commands", f"at most {MAX_ENTRIES}")
+                at_ns = max(0, t_ns + offset_ns + jitter_ns)
+                commands += _expand(entry, at_ns, where, wrench_timeout, max_commands)
+            if len(commands) > max_commands:
+                raise InputError(where, f"over {max_commands} commands", f"at most {max_commands}")
     return sorted(commands, key=lambda command: command.t_ns)
 
 
-def _times_ns(entry, where: str, seed: str) -> list[int]:
+def _times_ns(entry, where: str, seed: str, max_commands: int) -> list[int]:
     """When an entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up to ±``jitter``."""
     if not isinstance(entry, dict):
         raise InputError(where, entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
     if "t" not in entry:
         raise InputError(f"{where}, t", None, "the time in seconds")
     t_ns = nanoseconds(_number(entry["t"], f"{where}, t", 0.0, MAX_TIME_S))
-    offsets = _offsets_ns(entry, where)
+    offsets = _offsets_ns(entry, where, max_commands)
     return [max(0, t_ns + offset + _jitter_ns(entry, where, f"{seed}/{k}")) for k, offset in enumerate(offsets)]
 
 
-def _offsets_ns(timing: dict, where: str) -> list[int]:
-    repeat = _number(timing.get("repeat", 1), f"{where}, repeat", 1, MAX_ENTRIES)
+def _offsets_ns(timing: dict, where: str, max_commands: int) -> list[int]:
+    repeat = _number(timing.get("repeat", 1), f"{where}, repeat", 1, max_commands)
     if repeat != int(repeat):
         raise InputError(f"{where}, repeat", repeat, "a whole number of times")
     if repeat > 1 and "every" not in timing:
@@ -152,10 +160,12 @@ def _jitter_ns(timing: dict, where: str, seed: str) -> int:
     return nanoseconds(random.Random(f"{int(own)}/{seed}").uniform(-jitter, jitter))
 
 
-def _expand(entry: dict, t_ns: int, where: str, wrench_timeout: float) -> list[ScriptCommand]:
+def _expand(
+    entry: dict, t_ns: int, where: str, wrench_timeout: float, max_commands: int = MAX_ENTRIES
+) -> list[ScriptCommand]:
     if "wrench" in entry:
         _check_keys(entry, _TIMING_KEYS | {"wrench"}, where)
-        return _expand_wrench(entry["wrench"], t_ns, f"{where}, wrench", wrench_timeout)
+        return _expand_wrench(entry["wrench"], t_ns, f"{where}, wrench", wrench_timeout, max_commands)
     if "string" in entry:
         _check_keys(entry, _TIMING_KEYS | {"string"}, where)
         return _expand_string(entry["string"], t_ns, f"{where}, string")
@@ -185,7 +195,7 @@ def _poke(entry: dict, t_ns: int, where: str) -> ScriptCommand:
     return ScriptCommand(t_ns, "poke", _checked_frame(frame + option, where), force, torque)
 
 
-def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float) -> list[ScriptCommand]:
+def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float, max_commands: int) -> list[ScriptCommand]:
     if not isinstance(entry, dict):
         raise InputError(where, entry, "{at, force or push, torque, axes, duration}")
     _check_keys(entry, _WRENCH_KEYS, where)
@@ -197,8 +207,8 @@ def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float) -> list[
     repeats = [first]
     if wrench_timeout > 0.0:
         every_ns = max(1, nanoseconds(wrench_timeout / 2.0))
-        if duration_ns // every_ns > MAX_ENTRIES:
-            raise InputError(f"{where}, duration", duration_ns * 1e-9, f"at most {MAX_ENTRIES} repeats")
+        if duration_ns // every_ns > max_commands:
+            raise InputError(f"{where}, duration", duration_ns * 1e-9, f"at most {max_commands} repeats")
         times = range(t_ns + every_ns, t_ns + duration_ns, every_ns)
         repeats += [ScriptCommand(t, "wrench", first.frame_id, force, torque) for t in times]
     # The last message holds no axes to misread: no wrench at all.

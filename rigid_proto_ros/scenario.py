@@ -90,9 +90,14 @@ class Scenario:
     @property
     def text(self) -> str:
         """The scenario as a parameter file that starts the same simulation."""
-        lines = [f"    {name}: {_yaml(value)}" for name, value in sorted(self.values.items())]
-        mesh = [f"# mesh_sha256: {self.body_mesh.mesh.sha256}"] if self.body_mesh else []
-        return "\n".join([*mesh, "rigid_body:", "  ros__parameters:", *lines, ""])
+        return scene_text(self.values, self.body_mesh.mesh.sha256 if self.body_mesh else "")
+
+
+def scene_text(values: Mapping[str, object], mesh_sha256: str = "") -> str:
+    """Parameter values as a parameter file, the hash of the mesh's file in a comment."""
+    lines = [f"    {name}: {yaml_value(value)}" for name, value in sorted(values.items())]
+    mesh = [f"# mesh_sha256: {mesh_sha256}"] if mesh_sha256 else []
+    return "\n".join([*mesh, "rigid_body:", "  ros__parameters:", *lines, ""])
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
@@ -212,17 +217,19 @@ def publication_ns(k: int, publish_rate: float) -> int:
     return (2 * k * 1_000_000_000 * denominator + numerator) // (2 * numerator)
 
 
-def _yaml(value: object) -> str:
+def yaml_value(value: object) -> str:
+    """A parameter's value as it stands in a YAML file, with all its digits."""
     # JSON is YAML; repr keeps all digits, and a double keeps its point so that it is read back as one.
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return _double(value)
+        return yaml_double(value)
     if isinstance(value, list):
-        return "[" + ", ".join(_double(v) for v in value) + "]"
+        return "[" + ", ".join(yaml_double(v) for v in value) + "]"
     return json.dumps(value)
 
 
-def _double(value: float) -> str:
+def yaml_double(value: float) -> str:
+    """A double as YAML 1.1 and rcl read it back as one."""
     text = repr(value)
     return text if any(c in text for c in ".n") else text.replace("e", ".0e")

@@ -38,7 +38,8 @@ def command(name: str, *arguments: object) -> list[str]:
 def from_source(environment: dict[str, str]) -> dict[str, str]:
     """The environment with this source tree first on the path."""
     rest = filter(None, [environment.get("PYTHONPATH", "")])
-    return {**environment, "PYTHONPATH": os.pathsep.join([str(SOURCE), *rest])}
+    path = os.pathsep.join([str(SOURCE), *rest])
+    return {**environment, "PYTHONPATH": path, "PYTHONFAULTHANDLER": "1"}
 
 
 def run(name: str, *arguments: object, environment: dict[str, str], cwd: Path | None = None, timeout: float = READY_S):
@@ -109,9 +110,10 @@ class RosProcess:
             try:
                 self.process.wait(within_s)
             except subprocess.TimeoutExpired:
-                self.process.kill()
+                # Python's fault handler writes every thread's stack to the log before the process dies of it.
+                self.process.send_signal(signal.SIGABRT)
                 self.process.wait()
-                raise
+                raise AssertionError(f"still there {within_s} s after signal {number}: {self.errors}") from None
         return self.process.returncode
 
 

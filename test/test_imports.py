@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Imports point one way: core <- meshes, viewers and sessions <- ros and the command line."""
+"""Imports point one way: core <- meshes, viewers and sessions <- ros <- the page and the command line."""
 
 import ast
 import subprocess
@@ -37,6 +37,7 @@ ALLOWED = {
     "pyarrow": (f"{PACKAGE}.rerun_view",),  # comes with rerun, as PIL does
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
+    "viser": (f"{PACKAGE}.workbench",),
     "mcap": (f"{PACKAGE}.session_mcap",),
     "zstandard": (f"{PACKAGE}.session_mcap",),  # comes with mcap
 }
@@ -96,14 +97,14 @@ def test_each_outside_package_is_imported_in_its_own_modules_alone() -> None:
         if top == PACKAGE or top in sys.stdlib_module_names:
             return True
         if top in ROS or top == "simulation_interfaces" or top.endswith(("_msgs", "_srvs")):
-            return within(module, f"{PACKAGE}.ros.")
+            return within(module, f"{PACKAGE}.ros.", f"{PACKAGE}.workbench.")
         return within(module, *ALLOWED.get(top, ()))
 
     assert not complaints(allowed)
 
 
 def test_nothing_below_ros_and_the_command_line_imports_them() -> None:
-    edges = (f"{PACKAGE}.ros.", f"{PACKAGE}.cli.")
+    edges = (f"{PACKAGE}.ros.", f"{PACKAGE}.workbench.", f"{PACKAGE}.cli.")
 
     def allowed(module: str, name: str) -> bool:
         return within(module, *edges) or not within(name, *edges)
@@ -111,10 +112,14 @@ def test_nothing_below_ros_and_the_command_line_imports_them() -> None:
     assert not complaints(allowed)
 
 
-def test_ros_does_not_import_the_command_line() -> None:
-    assert not complaints(
-        lambda module, name: not (within(module, f"{PACKAGE}.ros.") and within(name, f"{PACKAGE}.cli."))
-    )
+def test_ros_imports_neither_the_page_nor_the_command_line() -> None:
+    beyond = (f"{PACKAGE}.workbench.", f"{PACKAGE}.cli.")
+    assert not complaints(lambda module, name: not (within(module, f"{PACKAGE}.ros.") and within(name, *beyond)))
+
+
+def test_the_page_does_not_import_the_command_line() -> None:
+    page, line = f"{PACKAGE}.workbench.", f"{PACKAGE}.cli."
+    assert not complaints(lambda module, name: not (within(module, page) and within(name, line)))
 
 
 def test_the_generator_of_bodies_is_imported_by_nobody() -> None:

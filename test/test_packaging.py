@@ -116,6 +116,33 @@ def test_package_xml_and_the_package_agree_on_version_and_name() -> None:
     assert package.findtext("export/build_type") == "ament_python"
 
 
+def test_every_source_file_names_its_licence() -> None:
+    files = [
+        path
+        for folder in ("rigid_proto_ros", "test", "benchmarks", "launch")
+        for path in (SOURCE / folder).rglob("*.py")
+    ]
+    assert len(files) > 100
+    lacking = [path for path in files if "# SPDX-License-Identifier: MIT" not in path.read_text("utf-8")[:200]]
+    assert not lacking
+
+
+ROSDEP_KEYS = {"python3-numba", "python3-numpy", "python3-pytest", "python3-trimesh-pip", "python3-yaml"}
+"""Those of rosdistro's rosdep/python.yaml that this package asks for; ROS packages are keys by their names."""
+
+ROS_PACKAGES = {
+    *("diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs"),
+    *("launch", "launch_ros", "rclpy"),
+}
+"""Released into Jazzy under these names."""
+
+
+def test_every_dependency_is_a_rosdep_key() -> None:
+    tree = ElementTree.parse(SOURCE / "package.xml")
+    asked = {element.text for element in tree.iter() if element.tag.endswith("depend")}
+    assert asked == ROSDEP_KEYS | ROS_PACKAGES
+
+
 def test_every_ros_package_that_the_code_imports_is_declared() -> None:
     declared = {node.text for node in ElementTree.parse(SOURCE / "package.xml").iter("exec_depend")}
     text = "\n".join(path.read_text(encoding="utf-8") for path in (SOURCE / "rigid_proto_ros").rglob("*.py"))

@@ -22,6 +22,7 @@ COMMANDS = {
     "snapshot": "a picture of a recorded session, without a display",
     "demo": "node, scripted pokes and recording in one go, ending by itself",
     "up": "node and live view, until Ctrl-C",
+    "workbench": "node and interactive page, until Ctrl-C",
 }
 
 

@@ -12,7 +12,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-_MODULES = {"rigid_body_node": "rigid_proto_ros.ros.main", "poke_client": "rigid_proto_ros.ros.poke_client"}
+_MODULES = {
+    "rigid_body_node": "rigid_proto_ros.ros.main",
+    "poke_client": "rigid_proto_ros.ros.poke_client",
+    "workbench": "rigid_proto_ros.workbench.main",
+}
 GRACE_S = 5.0
 """A process that doesn't end within this time of SIGINT is killed."""
 

@@ -15,6 +15,7 @@ from enum import IntEnum
 from .errors import CommandRefused
 from .frames import Frame
 from .loads import Load
+from .setup import Setup
 
 FARTHEST = 1e100
 """Metres: a place beyond it has no squared distance in a double."""
@@ -168,9 +169,9 @@ Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | Releas
 
 @dataclass
 class Pending:
-    """A command waiting for its time, with its load where that was settled already, and for which body and surface."""
+    """A command waiting for its time, with its load where that was settled already, and under which setup."""
 
     time_ns: int
     command: Command
     load: Load | None = None
-    settled_for: tuple = ()
+    settled_for: Setup | None = None

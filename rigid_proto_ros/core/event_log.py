@@ -10,9 +10,12 @@ from __future__ import annotations
 import hashlib
 import json
 
+MOST_NOTED = 1000
+"""Events that may wait to be chained."""
+
 
 class EventLog:
-    """Counts and chains the events of one run."""
+    """Counts and chains the events of one run. Those that nobody reads as they happen are chained when somebody asks."""
 
     def __init__(self) -> None:
         self.reset()
@@ -21,15 +24,34 @@ class EventLog:
         """Start a new chain."""
         self.count = 0
         self._hash = hashlib.sha256()
+        self._noted: list[tuple[int, str, dict]] = []
 
     @property
     def sha256(self) -> str:
         """Hash of the chain so far, in hex."""
+        self._chain_noted()
         return self._hash.hexdigest()
 
     def append(self, time_ns: int, kind: str, content: dict) -> str:
         """Add an event and return its line."""
+        self._chain_noted()
+        line = self._chain(time_ns, kind, content)
+        self.count += 1
+        return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
+
+    def note(self, time_ns: int, kind: str, content: dict) -> None:
+        """Add an event whose line nobody wants."""
+        self._noted.append((time_ns, kind, content))
+        self.count += 1
+        if len(self._noted) >= MOST_NOTED:
+            self._chain_noted()
+
+    def _chain(self, time_ns: int, kind: str, content: dict) -> str:
         line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
         self._hash.update((line + "\n").encode())
-        self.count += 1
-        return f'{line[:-1]}, "sha256": "{self.sha256}"}}'
+        return line
+
+    def _chain_noted(self) -> None:
+        noted, self._noted = self._noted, []
+        for event in noted:
+            self._chain(*event)

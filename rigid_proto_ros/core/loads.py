@@ -9,7 +9,7 @@ points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial v
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,16 @@ from .surface import Surface
 
 MAX_ACCELERATION = 1e15
 """m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it would leave no digits."""
+
+
+# Where the sums of loads stand in one row of LOADS_SIZE doubles.
+FORCE_WORLD = 0  # (3,) [N]
+FORCE_BODY = 3  # (3,) [N]
+TORQUE_WORLD = 6  # (3,) [N m]
+TORQUE_BODY = 9  # (3,) [N m]
+MOMENT = 12  # (9,) M row by row [N m]
+LOADS_SIZE = 21
+_NO_MOMENT = (0.0,) * 9
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,20 @@ class Load:
             return self.force[0] * body.normal(self.mesh_normal)
         return np.asarray(self.force, dtype=float)
 
+    def share(self, body: Body) -> np.ndarray:
+        """What the load adds to the sums (LOADS_SIZE,): forces and torques by axes, and the moment r Fᵀ of a world force."""
+        fx, fy, fz = self.force
+        tx, ty, tz = self.torque
+        rx, ry, rz = (0.0, 0.0, 0.0) if self.mesh_point is None else self.arm(body).tolist()
+        if self.axes == "world":
+            moment = (rx * fx, rx * fy, rx * fz, ry * fx, ry * fy, ry * fz, rz * fx, rz * fy, rz * fz)
+            return np.array((fx, fy, fz, 0.0, 0.0, 0.0, tx, ty, tz, 0.0, 0.0, 0.0, *moment))
+        if self.axes == "normal":
+            fx, fy, fz = self.own_force(body).tolist()
+        if self.mesh_point is not None:
+            tx, ty, tz = tx + (ry * fz - rz * fy), ty + (rz * fx - rx * fz), tz + (rx * fy - ry * fx)
+        return np.array((0.0, 0.0, 0.0, fx, fy, fz, 0.0, 0.0, 0.0, tx, ty, tz, *_NO_MOMENT))
+
     def check_magnitude(self, body: Body) -> None:
         """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION.
 
@@ -83,30 +107,22 @@ class Load:
             )
 
 
-@dataclass
 class LoadSum:
-    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F world)."""
+    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F world).
 
-    force_world: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    force_body: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    torque_world: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    torque_body: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    moment: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+    All are parts of ``values`` (LOADS_SIZE,), in the order of Load.share.
+    """
+
+    def __init__(self, values: np.ndarray | None = None) -> None:
+        self.values = np.zeros(LOADS_SIZE) if values is None else values
+        self.force_world = self.values[FORCE_WORLD : FORCE_WORLD + 3]
+        self.force_body = self.values[FORCE_BODY : FORCE_BODY + 3]
+        self.torque_world = self.values[TORQUE_WORLD : TORQUE_WORLD + 3]
+        self.torque_body = self.values[TORQUE_BODY : TORQUE_BODY + 3]
+        self.moment = self.values[MOMENT:].reshape(3, 3)
 
     def add(self, load: Load, body: Body) -> None:
-        arm = load.arm(body)
-        if load.axes == "world":
-            force = np.asarray(load.force)
-            self.force_world += force
-            self.torque_world += load.torque
-            if load.mesh_point is not None:
-                self.moment += arm[:, None] * force
-        else:
-            force = load.own_force(body)
-            self.force_body += force
-            self.torque_body += load.torque
-            if load.mesh_point is not None:
-                self.torque_body += cross(arm, force)
+        self.values += load.share(body)
 
 
 def apply_impulse(load: Load, body: Body, state: State) -> State:

@@ -77,6 +77,16 @@ def to_row(y, p, elapsed, row):
     row[3], row[4], row[5], row[6] = multiply(y[0], y[1], y[2], y[3], -p[Q], -p[Q + 1], -p[Q + 2], p[Q + 3])
 
 
+@njit(cache=True, error_model="numpy")
+def to_good_row(y, p, elapsed, row, limit):
+    """``to_row``; returns whether no number of the row is beyond ``limit`` or no number at all."""
+    to_row(y, p, elapsed, row)
+    good = True
+    for k in range(13):
+        good = good and abs(row[k]) <= limit
+    return good
+
+
 def new_variables(row: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Variables (15,) of a state row at a segment's start."""
     y = np.empty(VARIABLES)

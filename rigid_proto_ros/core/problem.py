@@ -18,7 +18,9 @@ it is the even motion of the string's free end.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
+from . import loads as of_loads
 from .body import Body
 from .loads import LoadSum
 from .state import State
@@ -55,6 +57,52 @@ HAND_VELOCITY = 68  # (3,) of the free end [m/s, world]
 SIZE = 71
 
 
+def problem_of_body(
+    body: Body, gravity, linear_damping: float, angular_damping: float, gyroscopic: bool, length: float = 1.0
+) -> np.ndarray:
+    """What is the same in every segment of this body (SIZE,): all but loads, string and start."""
+    p = np.zeros(SIZE)
+    p[MOMENTS : MOMENTS + 3] = body.principal_moments
+    p[DAMPING_LINEAR] = linear_damping / body.mass
+    p[DAMPING_ANGULAR] = angular_damping
+    p[GYROSCOPIC] = float(gyroscopic)
+    p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3] = gravity
+    p[REFERENCE_DAMPING] = p[DAMPING_LINEAR]
+    p[PRINCIPAL_AXES : PRINCIPAL_AXES + 9] = body.principal_axes.ravel()
+    p[PRINCIPAL_QUATERNION : PRINCIPAL_QUATERNION + 4] = body.principal_quaternion
+    p[MASS] = body.mass
+    p[LENGTH] = length
+    return p
+
+
+def problem_of_segment(
+    common: np.ndarray, body: Body, loads: np.ndarray, state: State, string: Tied | None = None
+) -> np.ndarray:
+    """The segment's problem (SIZE,): the body's own part under summed loads (LOADS_SIZE,), and a string if tied, from a
+    state on.
+    """
+    p = common.copy()
+    _begin(p, loads, state.row)
+    if string is not None:
+        hand = string.hand_velocity(state.time_ns)
+        acceleration = p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3].copy()
+        p[REFERENCE_VELOCITY : REFERENCE_VELOCITY + 3] = hand
+        p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3] = 0.0
+        p[REFERENCE_DAMPING] = 0.0
+        p[START_VELOCITY_ADDED : START_VELOCITY_ADDED + 3] = state.linear_velocity - hand
+        p[ACCELERATION_ADDED : ACCELERATION_ADDED + 3] = acceleration - p[DAMPING_LINEAR] * hand
+        p[TRANSLATES] = 1.0
+        p[HAS_STRING] = 1.0
+        p[STIFFNESS] = string.stiffness
+        p[STRING_DAMPING] = string.damping
+        p[REST_LENGTH] = string.rest_length
+        p[BILATERAL] = float(string.bilateral or string.rest_length == 0.0)
+        p[ATTACH : ATTACH + 3] = _to_principal(body.principal_axes, string.arm(body))
+        p[STRING_START : STRING_START + 3] = state.position - string.free_end(state.time_ns)
+        p[HAND_VELOCITY : HAND_VELOCITY + 3] = hand
+    return p
+
+
 def make_problem(
     body: Body,
     loads: LoadSum,
@@ -67,43 +115,35 @@ def make_problem(
     length: float = 1.0,
 ) -> np.ndarray:
     """The segment's problem (SIZE,) for a body under summed loads, and a string if tied, from a state on."""
-    P = body.principal_axes
-    p = np.zeros(SIZE)
-    p[MOMENTS : MOMENTS + 3] = body.principal_moments
-    p[TORQUE_BODY : TORQUE_BODY + 3] = _to_principal(P, loads.torque_body)
-    p[TORQUE_WORLD : TORQUE_WORLD + 3] = loads.torque_world
-    moment = np.stack([_to_principal(P, loads.moment[:, k]) for k in range(3)], axis=1)
-    p[MOMENT : MOMENT + 9] = moment.ravel()
-    p[ACCELERATION_BODY : ACCELERATION_BODY + 3] = _to_principal(P, loads.force_body) / body.mass
-    p[DAMPING_LINEAR] = linear_damping / body.mass
-    p[DAMPING_ANGULAR] = angular_damping
-    p[GYROSCOPIC] = float(gyroscopic)
-    p[HAS_WORLD_TORQUE] = float(loads.torque_world.any() or loads.moment.any())
-    p[TRANSLATES] = float(bool(loads.force_body.any()) or string is not None)
-    p[START_POSITION : START_POSITION + 3] = state.position
-    p[PRINCIPAL_AXES : PRINCIPAL_AXES + 9] = P.ravel()
-    p[PRINCIPAL_QUATERNION : PRINCIPAL_QUATERNION + 4] = body.principal_quaternion
-    p[MASS] = body.mass
-    p[LENGTH] = length
-    acceleration = np.asarray(gravity) + loads.force_world / body.mass
-    if string is None:
-        p[REFERENCE_VELOCITY : REFERENCE_VELOCITY + 3] = state.linear_velocity
-        p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3] = acceleration
-        p[REFERENCE_DAMPING] = p[DAMPING_LINEAR]
-    else:
-        hand = string.hand_velocity(state.time_ns)
-        p[REFERENCE_VELOCITY : REFERENCE_VELOCITY + 3] = hand
-        p[START_VELOCITY_ADDED : START_VELOCITY_ADDED + 3] = state.linear_velocity - hand
-        p[ACCELERATION_ADDED : ACCELERATION_ADDED + 3] = acceleration - p[DAMPING_LINEAR] * hand
-        p[HAS_STRING] = 1.0
-        p[STIFFNESS] = string.stiffness
-        p[STRING_DAMPING] = string.damping
-        p[REST_LENGTH] = string.rest_length
-        p[BILATERAL] = float(string.bilateral or string.rest_length == 0.0)
-        p[ATTACH : ATTACH + 3] = _to_principal(P, string.arm(body))
-        p[STRING_START : STRING_START + 3] = state.position - string.free_end(state.time_ns)
-        p[HAND_VELOCITY : HAND_VELOCITY + 3] = hand
-    return p
+    common = problem_of_body(body, gravity, linear_damping, angular_damping, gyroscopic, length)
+    return problem_of_segment(common, body, loads.values, state, string)
+
+
+@njit(cache=True, error_model="numpy")
+def _begin(p, loads, row):
+    """Complete the body's part p with loads and the start, as far as they go without a string."""
+    P, mass = PRINCIPAL_AXES, p[MASS]
+    turns, pushes = False, False
+    for k in range(3):
+        torque, force = 0.0, 0.0
+        for j in range(3):
+            torque += p[P + 3 * j + k] * loads[of_loads.TORQUE_BODY + j]
+            force += p[P + 3 * j + k] * loads[of_loads.FORCE_BODY + j]
+            moment = 0.0
+            for i in range(3):
+                moment += p[P + 3 * i + k] * loads[of_loads.MOMENT + 3 * i + j]
+            p[MOMENT + 3 * k + j] = moment
+            turns = turns or loads[of_loads.MOMENT + 3 * k + j] != 0.0
+        p[TORQUE_BODY + k] = torque
+        p[ACCELERATION_BODY + k] = force / mass
+        p[TORQUE_WORLD + k] = loads[of_loads.TORQUE_WORLD + k]
+        turns = turns or loads[of_loads.TORQUE_WORLD + k] != 0.0
+        pushes = pushes or loads[of_loads.FORCE_BODY + k] != 0.0
+        p[START_POSITION + k] = row[k]
+        p[REFERENCE_VELOCITY + k] = row[7 + k]
+        p[REFERENCE_ACCELERATION + k] += loads[of_loads.FORCE_WORLD + k] / mass
+    p[HAS_WORLD_TORQUE] = 1.0 if turns else 0.0
+    p[TRANSLATES] = 1.0 if pushes else 0.0
 
 
 def _to_principal(P, vector) -> np.ndarray:

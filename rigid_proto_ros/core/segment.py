@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from .integrators.integrator import MAX_SPEED, Integrator
-from .motion import HAND_WORK, HEAT, new_variables, to_row
+from .motion import HAND_WORK, HEAT, new_variables, to_good_row
+from .problem import HAS_STRING
 from .state import State
 
 
@@ -36,10 +37,12 @@ class Segment:
         self, start: State, problem: np.ndarray, integrator: Integrator, step_ns: int, accuracy: float = 1e-9
     ) -> None:
         self.start = start
+        self.start_ns = start.time_ns
         self.committed_ns = start.time_ns
         self.hand_work = 0.0
         self.heat = 0.0
         self._problem = problem
+        self._has_string = bool(problem[HAS_STRING])
         self._variables = new_variables(start.row, problem)
         self._scratch = np.empty_like(self._variables)
         self.stepper = integrator.stepper(integrator, problem, self._variables, step_ns, accuracy)
@@ -59,34 +62,35 @@ class Segment:
         advanced_ns, good = self.stepper.advance(self._variables, self._problem, until_ns - self.committed_ns)
         self.committed_ns += advanced_ns
         if not good:
-            raise IntegrationFailed(self._state_of(self._variables, self.committed_ns))
+            raise IntegrationFailed(self._last_good())
 
     def look(self, until_ns: int) -> State:
         """State at ``until_ns``, less than one step after the last committed one; commits nothing."""
-        rest_ns = until_ns - self.committed_ns
-        if until_ns == self.start.time_ns:
+        if until_ns == self.start_ns:
             return self.start
         variables = self._variables
+        rest_ns = until_ns - self.committed_ns
         if rest_ns > 0:
-            variables = self._scratch
-            variables[:] = self._variables
+            committed, variables = variables, self._scratch
+            variables[:] = committed
             if not self.stepper.look(variables, self._problem, rest_ns):
-                raise IntegrationFailed(self._state_of(self._variables, self.committed_ns))
-        state = self._state_of(variables, until_ns)
-        if not np.abs(state.row).max() <= MAX_SPEED:
-            raise IntegrationFailed(self._state_of(self._variables, self.committed_ns))
-        self.hand_work, self.heat = float(variables[HAND_WORK]), float(variables[HEAT])
-        return state
+                raise IntegrationFailed(self._last_good())
+        row = np.empty(13)
+        if not to_good_row(variables, self._problem, (until_ns - self.start_ns) * 1e-9, row, MAX_SPEED):
+            raise IntegrationFailed(self._last_good())
+        if self._has_string:
+            self.hand_work, self.heat = float(variables[HAND_WORK]), float(variables[HEAT])
+        return State(until_ns, row)
 
-    def cut(self, at_ns: int) -> State:
-        """End the segment: the same step as looking at ``at_ns``."""
+    def cut(self, at_ns: int) -> None:
+        """End the segment by the step that looking at ``at_ns`` takes."""
         if at_ns > self.committed_ns:
             self.stepper.cut()
-        return self.look(at_ns)
 
-    def _state_of(self, variables: np.ndarray, time_ns: int) -> State:
-        if time_ns == self.start.time_ns:
+    def _last_good(self) -> State:
+        """The state at the last committed step."""
+        if self.committed_ns == self.start_ns:
             return self.start
         row = np.empty(13)
-        to_row(variables, self._problem, (time_ns - self.start.time_ns) * 1e-9, row)
-        return State(time_ns, row)
+        to_good_row(self._variables, self._problem, (self.committed_ns - self.start_ns) * 1e-9, row, MAX_SPEED)
+        return State(self.committed_ns, row)

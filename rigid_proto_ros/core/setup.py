@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from .body import Body
 from .integrators.integrator import Integrator
+from .problem import problem_of_body
 from .string import StringSettings
 from .surface import Surface
 
@@ -47,3 +49,10 @@ class Setup:
             return 1.0
         diagonal = self.surface.extent * self.body.scale
         return 0.5 * float((diagonal * diagonal).sum()) ** 0.5
+
+    @cached_property
+    def problem(self) -> np.ndarray:
+        """What all segments under this setup have in common (core/problem.py)."""
+        return problem_of_body(
+            self.body, self.gravity, self.linear_damping, self.angular_damping, self.gyroscopic, self.length
+        )

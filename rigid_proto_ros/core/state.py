@@ -11,9 +11,9 @@ import numpy as np
 from .rotation import matrix_from_quaternion
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class State:
-    """State at one instant of simulated time.
+    """State at one instant of simulated time; a new one is made for every instant, and none is changed.
 
     time_ns: simulated time [ns]. row (13,) float64: COM position x [m, world], attitude q xyzw (body to world), COM
     velocity v [m/s, world], angular velocity ω [rad/s, body axes].

@@ -85,14 +85,18 @@ class StringControl:
         self.tied = tied
 
 
-def _attach(command: TieString, setup: Setup, state: State) -> tuple[float, float, float]:
-    """The knot in mesh coordinates, on the surface where there is one."""
+def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
+    """Where a command ties the string (3,) in mesh coordinates, before it is taken onto the surface."""
     point = np.asarray(command.point, dtype=float)
     if command.axes == "world":
         R, away = state.rotation, point - state.position
         point = R[0] * away[0] + R[1] * away[1] + R[2] * away[2]
-    if command.axes != "mesh":
-        point = setup.body.mesh_point(point)
+    return point if command.axes == "mesh" else body.mesh_point(point)
+
+
+def _attach(command: TieString, setup: Setup, state: State) -> tuple[float, float, float]:
+    """The knot in mesh coordinates, on the surface where there is one."""
+    point = mesh_point(command, setup.body, state)
     if setup.surface is not None:
         point = setup.surface.nearest_point(point)
     return tuple(float(x) for x in point)

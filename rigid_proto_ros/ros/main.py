@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 import traceback
@@ -11,23 +10,23 @@ import traceback
 from ..core.compilation import told_when_compiling
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
+from .ending import Ending, begin_closing, begin_teardown, leave
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the node; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
+    """Run the node; returns 2 when the input was refused (one line on stderr), else ends the process: with 0 after a signal."""
     argv = sys.argv if argv is None else argv
-    stop = threading.Event()
     # Signals end the main thread's wait; the middleware must outlive the physics thread, so rclpy's handlers stay out.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     try:
-        return _run(argv, stop)
+        with Ending() as ending:
+            status = _run(argv, ending)
     except InputError as error:
         print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    return leave(status)
 
 
-def _run(argv: list[str], stop: threading.Event) -> int:
+def _run(argv: list[str], ending: Ending) -> int:
     from .arguments import given_arguments
     from .bodies import bodies_of
     from .node_name import remapped_node_name
@@ -56,7 +55,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
 
     def on_crash() -> None:
         crashed.set()
-        stop.set()
+        ending.ask()
 
     physics = None
     try:
@@ -75,7 +74,7 @@ def _run(argv: list[str], stop: threading.Event) -> int:
             executor.add_node(node)
 
         def spin() -> None:
-            while not stop.is_set():
+            while not ending.asked:
                 try:
                     executor.spin()
                     break
@@ -84,19 +83,22 @@ def _run(argv: list[str], stop: threading.Event) -> int:
                 except Exception:
                     # One request that fails by a fault of ours must not take the other services with it.
                     traceback.print_exc()
-            stop.set()
+            ending.ask()
 
         executor_thread = threading.Thread(target=spin, name="executor", daemon=True)
         executor_thread.start()
         physics.start()
         for node in nodes:
             node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
-        stop.wait()
+        ending.wait()
     finally:
         if physics is not None:
+            begin_closing()
             physics.stop()
         for node in nodes:
             node.close()
+        if physics is not None:
+            begin_teardown(1 if crashed.is_set() else 0)
         executor.shutdown(timeout_sec=0.5)
         if executor_thread is not None:
             executor_thread.join(timeout=0.5)

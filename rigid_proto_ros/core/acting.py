@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""The loads that act on the body now: one held wrench, any number of pulses, and when each ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .body import Body
+from .loads import LOADS_SIZE, Load
+
+NEVER = 1 << 63
+"""Later than any simulated time [ns]."""
+
+
+@dataclass(slots=True, eq=False)
+class Acting:
+    """A load that acts from begin_ns until end_ns; what it adds to the sums holds for the body it was computed for."""
+
+    load: Load
+    begin_ns: int
+    end_ns: int
+    load_id: int
+    body: Body | None = None
+    share: np.ndarray | None = None
+
+
+class ActingLoads:
+    """held: the wrench of the last held command, if it still acts; it comes first in every sum, then the pulses in their order.
+
+    next_end_ns: when the first of them ends.
+    """
+
+    def __init__(self) -> None:
+        self.held: Acting | None = None
+        self.pulses: list[Acting] = []
+        self.next_end_ns = NEVER
+
+    def __iter__(self) -> Iterator[Acting]:
+        if self.held is not None:
+            yield self.held
+        yield from self.pulses
+
+    def __bool__(self) -> bool:
+        return self.held is not None or bool(self.pulses)
+
+    def hold(self, acting: Acting) -> None:
+        """Take a held wrench; the one before must have been ended."""
+        self.held = acting
+        self._find_next_end()
+
+    def add(self, acting: Acting) -> None:
+        """Take a pulse."""
+        self.pulses.append(acting)
+        self._find_next_end()
+
+    def hold_until(self, end_ns: int) -> None:
+        """Give the held wrench another end."""
+        if self.held is not None:
+            self.held.end_ns = end_ns
+            self._find_next_end()
+
+    def end_held(self) -> list[Acting]:
+        """End the held wrench; returns what ended."""
+        ended = [] if self.held is None else [self.held]
+        self.held = None
+        self._find_next_end()
+        return ended
+
+    def end_due(self, now_ns: int) -> list[Acting]:
+        """End what ends at ``now_ns`` or should have before; returns it."""
+        if now_ns < self.next_end_ns:
+            return []
+        held = self.held
+        ended = self.end_held() if held is not None and held.end_ns <= now_ns else []
+        ended += [pulse for pulse in self.pulses if pulse.end_ns <= now_ns]
+        self.pulses = [pulse for pulse in self.pulses if pulse.end_ns > now_ns]
+        self._find_next_end()
+        return ended
+
+    def end_all(self) -> list[Acting]:
+        """End everything; returns it."""
+        ended, self.held, self.pulses = list(self), None, []
+        self._find_next_end()
+        return ended
+
+    def sum(self, body: Body) -> np.ndarray:
+        """All of them summed afresh in their order (LOADS_SIZE,), as core/loads.py lays them out."""
+        total = np.zeros(LOADS_SIZE)
+        for acting in self:
+            if acting.body is not body:
+                acting.body, acting.share = body, acting.load.share(body)
+            total += acting.share
+        return total
+
+    def _find_next_end(self) -> None:
+        self.next_end_ns = min((acting.end_ns for acting in self), default=NEVER)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""What can be read off a running simulation: energies, momentum, what an accelerometer shows, what the motion has cost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .accelerations import specific_force
+from .acting import ActingLoads
+from .loads import LoadSum
+from .segment import Segment
+from .setup import Setup
+from .state import State
+from .string import Tied
+from .string_control import StringControl
+
+
+class Readings:
+    """The readings of a Simulation at the time it was last advanced to; none of them changes it."""
+
+    setup: Setup
+    state: State
+    acting: ActingLoads
+    _pending: list
+    _string: StringControl
+    _segment: Segment
+    # Of the segments before the present one.
+    _finished_steps: int
+    _finished_evaluations: int
+    _finished_work: float
+    _finished_heat: float
+
+    @property
+    def steps(self) -> int:
+        """Steps committed since start or reset; looking takes none."""
+        return self._finished_steps + self._segment.steps
+
+    @property
+    def force_evaluations(self) -> int:
+        """Evaluations of the equations of motion in those steps."""
+        return self._finished_evaluations + self._segment.evaluations
+
+    @property
+    def choice(self) -> str:
+        """Which method carries the body now, and why."""
+        return self._segment.stepper.choice
+
+    @property
+    def floor_binds(self) -> bool:
+        """Rounding, not the accuracy asked for, limits some step of the present segment."""
+        return self._segment.stepper.floor_binds
+
+    @property
+    def too_coarse(self) -> str:
+        """Why the fixed step says nothing here, |ω|h or ω_s h being beyond the integrator's limit; empty when it does."""
+        setup = self.setup
+        limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
+        spin = float((self.state.angular_velocity_body**2).sum()) ** 0.5 * h
+        swing = self.string.frequency * h if self.string else 0.0
+        if spin > limit:
+            return f"{setup.integrator.name}: |w| step = {spin:.3g}, good up to {limit:g}"
+        if swing > limit and not setup.integrator.stiff:
+            return f"{setup.integrator.name}: string frequency times step = {swing:.3g}, good up to {limit:g}"
+        return ""
+
+    @property
+    def string(self) -> Tied | None:
+        """The string as it is tied, or None."""
+        return self._string.tied
+
+    @property
+    def hand_work(self) -> float:
+        """What the hand at the string's free end has worked since start or reset [J]."""
+        return self._finished_work + self._segment.hand_work
+
+    @property
+    def string_heat(self) -> float:
+        """What the string's damper has turned to heat since start or reset [J]."""
+        return self._finished_heat + self._segment.heat
+
+    @property
+    def potential_energy(self) -> float:
+        """−m g·x, and the string's [J]."""
+        setup = self.setup
+        energy = -setup.body.mass * float((setup.gravity * self.state.position).sum())
+        return energy + (self.string.potential_energy(setup.body, self.state) if self.string else 0.0)
+
+    @property
+    def kinetic_energy(self) -> float:
+        """½ m|v|² + ½ ωᵀIω [J]."""
+        return self.state.kinetic_energy(self.setup.body.mass, self.setup.body.inertia)
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """R I ω about the COM (3,) [N m s, world]."""
+        return self.state.angular_momentum(self.setup.body.inertia)
+
+    @property
+    def angular_momentum_drift(self) -> float:
+        """|L − L₀|/|L₀| since the present segment began; 0 while something turns the body, or without spin."""
+        loads = self._load_sum()
+        turned = self.string is not None or loads.torque_world.any() or loads.torque_body.any() or loads.moment.any()
+        if turned or self.setup.angular_damping or not self.setup.gyroscopic:
+            return 0.0
+        start = self._segment.start.angular_momentum(self.setup.body.inertia)
+        moved, size = self.angular_momentum - start, float((start * start).sum()) ** 0.5
+        return float((moved * moved).sum()) ** 0.5 / size if size > 0.0 else 0.0
+
+    @property
+    def has_pending(self) -> bool:
+        """Commands wait for their time."""
+        return bool(self._pending)
+
+    @property
+    def at_rest(self) -> bool:
+        """Nothing moves, acts or is about to."""
+        still = not (self.state.row[7:].any() or self.setup.gravity.any())
+        return still and not self.acting and self.string is None and not self.has_pending
+
+    def specific_force(self, point) -> np.ndarray:
+        """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]."""
+        return specific_force(self.setup, self._load_sum(), self.string, self.state, point)
+
+    def _load_sum(self) -> LoadSum:
+        return LoadSum(self.acting.sum(self.setup.body))

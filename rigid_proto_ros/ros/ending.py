@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""The end of a process that waits for a signal: asked for from outside or by one of its threads, and never a hang."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import select
+import signal
+import socket
+import sys
+import threading
+from typing import NoReturn
+
+CLOSING_S = 15.0
+"""Longer than every wait for the physics thread and for recordings, added up."""
+
+TEARDOWN_S = 3.0
+"""What the middleware gets to say goodbye in; 0.1 s is usual. Nothing of ours waits for it any more."""
+
+
+class Ending:
+    """Waited for by the main thread; asked for by SIGINT, SIGTERM or ``ask`` of any thread.
+
+    The wait is one on a file descriptor that the interpreter's own signal handler writes to: it ends whichever thread the
+    system hands the signal to, and, unlike an Event set in a Python handler, takes no lock that the interrupted code could
+    be holding.
+    """
+
+    def __init__(self) -> None:
+        self._waited, self._asked = socket.socketpair()
+        self._asked.setblocking(False)
+
+    def __enter__(self) -> Ending:
+        self._wakeup_before = signal.set_wakeup_fd(self._asked.fileno(), warn_on_full_buffer=False)
+        self._handlers_before = {n: signal.signal(n, lambda *_: None) for n in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._handlers_before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(self._wakeup_before)
+
+    def ask(self) -> None:
+        """End the wait, from any thread."""
+        self._asked.send(b"\0")
+
+    @property
+    def asked(self) -> bool:
+        """Whether the end was asked for."""
+        return bool(select.select([self._waited], [], [], 0.0)[0])
+
+    def wait(self) -> None:
+        """Return when the end was asked for."""
+        select.select([self._waited], [], [])
+
+
+def begin_closing() -> None:
+    """Leave with status 1 and every thread's stack on stderr, should closing what is ours take longer than CLOSING_S."""
+    faulthandler.dump_traceback_later(CLOSING_S, exit=True)
+
+
+def begin_teardown(status: int) -> None:
+    """All that is ours is closed: leave with ``status`` after TEARDOWN_S, whatever the middleware still does then."""
+    faulthandler.dump_traceback_later(TEARDOWN_S + 2.0, exit=True)
+    watch = threading.Timer(TEARDOWN_S, _leave_stuck, (status,))
+    watch.daemon = True
+    watch.start()
+
+
+def leave(status: int) -> NoReturn:
+    """End the process without the interpreter's own teardown: everything is closed, and unloading the middleware and the
+    compiled kernels takes ten times as long as all the closing did, with threads of other libraries still running.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def _leave_stuck(status: int) -> NoReturn:
+    print(f"rigid_body_node: the middleware did not end within {TEARDOWN_S:g} s and is left to itself", file=sys.stderr)
+    leave(status)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""What acts on the body, followed from the node's event lines: the string, and the forces to be drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.frames import parse_frame
+from ..core.loads import Load, settle
+from ..core.setup import Setup
+from ..core.state import State
+from ..core.string import Tied
+from ..core.string_control import StringControl
+from ..poke_script import string_attach, string_target
+from ..scenario import Scenario, nanoseconds
+
+SHOWN_AT_LEAST_NS = 400_000_000
+"""[ns of simulated time] A poke is over before a page has drawn it twice; its arrow stays this long."""
+
+SHORTEST, LONGEST = 0.3, 1.0
+"""Arrow lengths in body sizes: that of a vanishing and of an infinite force."""
+
+
+@dataclass(frozen=True)
+class _Acting:
+    held: bool
+    load: Load
+    until_ns: int
+
+
+class Acting:
+    """Follows one run. Stiffness and arrows come from the state that the page knew then, near to the node's own."""
+
+    def __init__(self) -> None:
+        self._control: StringControl | None = None
+        self._acting: list[_Acting] = []
+
+    def begin(self, setup: Setup, state: State) -> None:
+        """A reset, or the first look at a node: the string as its parameters say, no loads."""
+        self._control = StringControl(setup, state)
+        self._acting = []
+
+    @property
+    def string(self) -> Tied | None:
+        """The string as it is."""
+        return None if self._control is None else self._control.tied
+
+    def changed(self, old: Scenario, new: Scenario, state: State) -> None:
+        """Parameters changed."""
+        if self._control is not None:
+            self._control.change(old.setup, new.setup, state)
+
+    def event(self, line: dict, scenario: Scenario, state: State) -> None:
+        """A line of the event log, when ``state`` was the last one known."""
+        if self._control is None:
+            return
+        try:
+            self._follow(line["kind"], line["content"], line["time_ns"], scenario, state)
+        except InputError:
+            pass  # refused there as well: a line that the page can't read draws nothing
+
+    def _follow(self, kind: str, content: dict, time_ns: int, scenario: Scenario, state: State) -> None:
+        at = State(time_ns, state.row)
+        if kind == "string_attach":
+            self._control.tie_at(string_attach(0, content["axes"], content["point"]), scenario.setup, at)
+        elif kind == "string_target":
+            self._control.move(string_target(0, "world", content["point"]), scenario.setup, at)
+        elif kind == "string_release":
+            self._control.release()
+        elif kind == "clear_wrench":
+            self._acting = []
+        elif kind in ("poke", "wrench"):
+            self._load(kind == "wrench", content, time_ns, scenario, at)
+
+    def _load(self, held: bool, content: dict, time_ns: int, scenario: Scenario, state: State) -> None:
+        setup = scenario.setup
+        names = (scenario.values["world_frame"], scenario.values["body_frame"] or "body")
+        frame = parse_frame(content["frame_id"], frozenset(setup.contacts), *names)
+        load = settle(frame, content["force"], content["torque"], setup.body, setup.surface, setup.contacts, state)
+        if held:
+            self._acting = [acting for acting in self._acting if not acting.held]
+            lasting_ns = setup.wrench_timeout_ns or 1 << 62
+        elif frame.duration_s is None:
+            lasting_ns = 0 if frame.impulse else setup.poke_duration_ns
+        else:
+            lasting_ns = nanoseconds(frame.duration_s)
+        if not load.is_zero:
+            until_ns = time_ns + (lasting_ns if held else max(lasting_ns, SHOWN_AT_LEAST_NS))
+            self._acting.append(_Acting(held, load, until_ns))
+
+    def string_ends(self, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray] | None:
+        """Knot and free end (3,) in the world, or None."""
+        tied = self.string
+        if tied is not None and tied.release_ns is not None and state.time_ns >= tied.release_ns:
+            self._control.release()
+            tied = None
+        if tied is None:
+            return None
+        # A target may be heard before the first state after it.
+        state = State(max(state.time_ns, tied.begin_ns), state.row)
+        hand = tied.free_end(state.time_ns)
+        return hand + tied.span(setup.body, state), hand
+
+    def arrows(self, setup: Setup, state: State, size: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Point of attack and drawn vector (3,) [m, world] of each force; ``size`` is the body's.
+
+        An arrow ends at the point where the force attacks. Its length grows with the force, without end but bounded: it is
+        half-way at what moves the body by its own size within a second from rest.
+        """
+        self._acting = [acting for acting in self._acting if acting.until_ns > state.time_ns]
+        arrows = []
+        middling = setup.body.mass * 2.0 * size
+        for acting in self._acting:
+            load = acting.load
+            force = state.rotation @ load.force_body(setup.body, state)
+            strength = float(np.linalg.norm(force))
+            if strength > 0.0:
+                length = size * (SHORTEST + (LONGEST - SHORTEST) * strength / (strength + middling))
+                point = state.position + state.rotation @ load.arm(setup.body)
+                vector = force * (length / strength)
+                arrows.append((point - vector, vector))
+        return arrows

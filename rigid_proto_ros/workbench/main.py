@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""The page's process: ``python -m rigid_proto_ros.workbench.main --node NAME --port PORT``, until SIGINT or SIGTERM."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import signal
+import sys
+import threading
+import webbrowser
+
+from ..core.errors import InputError
+from ..rerun_view.ports import LOOPBACK
+from ..rerun_view.viewers import has_display
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Serve the page; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
+    parser = argparse.ArgumentParser(prog="workbench page")
+    parser.add_argument("--node", default="/rigid_body")
+    parser.add_argument("--port", type=int, required=True)
+    parser.add_argument("--host", default=LOOPBACK)
+    parser.add_argument("--open", action="store_true")
+    args = parser.parse_args(argv)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        return serve(args.node, args.host, args.port, stop, args.open)
+    except InputError as error:
+        print(f"rigid_proto workbench: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def serve(node: str, host: str, port: int, stop: threading.Event, in_browser: bool) -> int:
+    """Run the page until ``stop`` is set; open it in a browser where there is a display."""
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
+    from .page import Page
+    from .server import make_server, stop_server
+
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    server = make_server(host, port)
+    page = Page(server, node)
+    running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
+    address = f"http://{host}:{port}"
+    print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
+    if in_browser and has_display():
+        webbrowser.open(address)
+    try:
+        stop.wait()
+    finally:
+        running.cancel()
+        stop_server(server)
+        page.link.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

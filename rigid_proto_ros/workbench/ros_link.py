@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: MIT
+"""The page's side of ROS: what it publishes and calls, and what it hears while a page is open.
+
+Services and latched topics come on the executor's thread and are handed to ``deliver``. States and event lines aren't
+given to the executor: the page takes them itself, all that have come since the last look, as the node takes its commands.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped, WrenchStamped
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.callback_groups import CallbackGroup
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from .. import cdr
+from ..core.errors import InputError
+from ..parameters import parameter_named
+from ..ros import qos
+from ..ros.parameter_server import ros_parameter
+
+_TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
+
+
+class _TakenByHand(CallbackGroup):
+    """A callback group whose entities no executor may serve."""
+
+    def can_execute(self, entity) -> bool:
+        return False
+
+    def beginning_execution(self, entity) -> bool:
+        return False
+
+    def ending_execution(self, entity) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class Heard:
+    """states: (time_ns, pose and twist) pairs in order, each (13,): position, attitude xyzw, velocity of the COM, angular
+    velocity, all in world axes. events: lines of the event log in order.
+    """
+
+    states: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+
+
+class RosLink:
+    """A client of the node ``target``. deliver(function, *arguments) runs a function on the page's thread.
+
+    on_scene(text) and on_diagnostics(values) are called through it while the link is open.
+    """
+
+    def __init__(
+        self,
+        target: str,
+        deliver: Callable[..., object],
+        on_scene: Callable[[str], None],
+        on_diagnostics: Callable[[dict[str, str]], None],
+    ) -> None:
+        self.target = target if target.startswith("/") else f"/{target}"
+        self._deliver = deliver
+        self._on_scene = on_scene
+        self._on_diagnostics = on_diagnostics
+        self.node = Node("workbench", start_parameter_services=False, enable_rosout=False)
+        publisher = self.node.create_publisher
+        self._publishers = {
+            "wrench": publisher(WrenchStamped, f"{self.target}/wrench", qos.COMMAND),
+            "poke": publisher(WrenchStamped, f"{self.target}/poke", qos.COMMAND),
+            "string/target": publisher(PointStamped, f"{self.target}/string/target", qos.COMMAND),
+            "string/attach": publisher(PointStamped, f"{self.target}/string/attach", qos.COMMAND),
+            "schedule": publisher(String, f"{self.target}/schedule", qos.COMMAND),
+        }
+        self._services = {name: self.node.create_client(Trigger, f"{self.target}/{name}") for name in _TRIGGERS}
+        self._services["pause"] = self.node.create_client(SetBool, f"{self.target}/pause")
+        self._set = self.node.create_client(SetParametersAtomically, f"{self.target}/set_parameters_atomically")
+        self._by_hand = _TakenByHand()
+        self._taken: dict[str, object] = {}
+        self._served: list = []
+        self._poses: dict[int, PoseStamped] = {}
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            pass
+
+    def close(self) -> None:
+        """Leave ROS."""
+        self._executor.shutdown(timeout_sec=0.5)
+        self._thread.join(timeout=0.5)
+        self.node.destroy_node()
+        rclpy.try_shutdown()
+
+    # Hearing
+
+    def listen(self) -> None:
+        """Subscribe to all that the page shows."""
+        self._executor.create_task(self._subscribe)
+
+    def stop_listening(self) -> None:
+        """Drop every subscription: the node has then as many subscribers as before a page opened."""
+        self._executor.create_task(self._unsubscribe)
+
+    def _subscribe(self) -> None:
+        if self._taken:
+            return
+
+        def subscribe(message_type, name, callback, profile, group=None):
+            return self.node.create_subscription(message_type, name, callback, profile, callback_group=group)
+
+        def by_hand(message_type, topic, profile):
+            return subscribe(message_type, f"{self.target}/{topic}", lambda _: None, profile, self._by_hand)
+
+        self._served = [
+            subscribe(String, f"{self.target}/scene", self._scene, qos.LATCHED),
+            subscribe(DiagnosticArray, "/diagnostics", self._diagnostics, 10),
+        ]
+        self._taken = {
+            "events": by_hand(String, "events", qos.EVENT),
+            "pose": by_hand(PoseStamped, "pose", qos.STATE),
+            "twist": by_hand(TwistStamped, "twist", qos.STATE),
+        }
+
+    def _unsubscribe(self) -> None:
+        subscriptions = [*self._served, *self._taken.values()]
+        self._served, self._taken = [], {}
+        self._poses.clear()
+        for subscription in subscriptions:
+            self.node.destroy_subscription(subscription)
+
+    def _scene(self, message: String) -> None:
+        self._deliver(self._on_scene, message.data)
+
+    def _diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == f"{self.target}: simulation":
+                values = {v.key: v.value for v in status.values}
+                self._deliver(self._on_diagnostics, {**values, "message": status.message})
+
+    def take(self) -> Heard:
+        """All states and event lines since the last call."""
+        taken = self._taken
+        if not taken:
+            return Heard()
+        events = [message.data for message in _drain(taken["events"], String)]
+        for pose in _drain(taken["pose"], PoseStamped):
+            self._poses[_stamp_ns(pose)] = pose
+        states = []
+        for twist in _drain(taken["twist"], TwistStamped):
+            time_ns = _stamp_ns(twist)
+            pose = self._poses.get(time_ns)
+            if pose is not None:
+                states.append((time_ns, _row(pose, twist)))
+        while len(self._poses) > 2 * qos.STATE.depth:
+            del self._poses[next(iter(self._poses))]
+        return Heard(states, events)
+
+    # Saying
+
+    def wrench(self, topic: str, frame_id: str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0)) -> None:
+        """Publish on ``poke`` or ``wrench``: it acts as soon as the node takes it."""
+        self._publishers[topic].publish(cdr.wrench_stamped(0, frame_id, force, torque))
+
+    def point(self, topic: str, frame_id: str, point) -> None:
+        """Publish on ``string/target`` or ``string/attach``."""
+        self._publishers[topic].publish(cdr.stamped_doubles(0, frame_id, tuple(float(x) for x in point)))
+
+    def schedule(self, entry: str) -> None:
+        """Publish one entry of a script."""
+        self._publishers["schedule"].publish(cdr.string(entry))
+
+    def call(self, service: str, data: bool | None = None, done: Callable[[bool, str], None] | None = None) -> None:
+        """Call one of the node's services; done(success, message) comes on the page's thread."""
+        client = self._services[service]
+        if not client.service_is_ready():
+            self._answer(done, False, f"{client.srv_name} doesn't answer: is the node running?")
+            return
+        request = Trigger.Request() if data is None else SetBool.Request(data=data)
+        client.call_async(request).add_done_callback(
+            lambda future: self._answer(done, future.result().success, future.result().message)
+        )
+
+    def set_parameters(self, changes: dict[str, object], done: Callable[[bool, str], None] | None = None) -> None:
+        """Set parameters all at once, or none; done(success, reason) comes on the page's thread."""
+        try:
+            parameters = [ros_parameter(parameter_named(n), parameter_named(n).convert(v)) for n, v in changes.items()]
+        except InputError as error:
+            self._answer(done, False, str(error))
+            return
+        if not self._set.service_is_ready():
+            self._answer(done, False, f"{self._set.srv_name} doesn't answer: is the node running?")
+            return
+        request = SetParametersAtomically.Request(parameters=[p.to_parameter_msg() for p in parameters])
+        self._set.call_async(request).add_done_callback(
+            lambda future: self._answer(done, future.result().result.successful, future.result().result.reason)
+        )
+
+    def _answer(self, done: Callable[[bool, str], None] | None, success: bool, message: str) -> None:
+        if done is not None:
+            self._deliver(done, success, message)
+
+
+def _drain(subscription, message_type) -> list:
+    messages = []
+    with subscription.handle:
+        while True:
+            taken = subscription.handle.take_message(message_type, False)
+            if taken is None:
+                return messages
+            messages.append(taken[0])
+
+
+def _stamp_ns(message) -> int:
+    stamp = message.header.stamp
+    return stamp.sec * 1_000_000_000 + stamp.nanosec
+
+
+def _row(pose: PoseStamped, twist: TwistStamped) -> np.ndarray:
+    p, q = pose.pose.position, pose.pose.orientation
+    v, w = twist.twist.linear, twist.twist.angular
+    return np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z])

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: MIT
+"""The 3D picture: the body, what shows its inertia, the string, forces, the ghost.
+
+The picture shows the world point ``origin`` at its middle and ``unit`` metres as one, so that a nut and a satellite fill
+the page alike and single precision is enough anywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import viser
+
+from ..core.inertia_tensor import equimomental_shapes
+from ..core.rotation import quaternion_from_matrix
+from ..core.surface import Surface
+from ..rerun_view.surface_normals import shaded_surface
+from ..scenario import Scenario
+
+BODY_COLOUR, GHOST_COLOUR = (214, 205, 190), (120, 180, 255)
+STRING_COLOUR, HAND_COLOUR = (250, 180, 60), (250, 130, 40)
+LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (235, 85, 85), (190, 120, 245), (60, 190, 190)
+AXES_COLOURS = np.array([(235, 85, 85), (90, 200, 110), (85, 150, 250)])
+
+SWITCHES = {
+    "COM": True,
+    "Principal axes": False,
+    "Inertia ellipsoid": False,
+    "Box of equal inertia": False,
+    "Bounding box": False,
+    "String": True,
+    "Forces": True,
+    "Angular momentum L": True,
+    "Angular velocity ω": False,
+    "Ghost": True,
+    "Grid": True,
+}
+"""What can be shown beside the body, and whether it is at first."""
+
+GRID_CELLS = 40
+CAMERA = (1.3, -2.2, 1.1)
+"""Where a page looks from at first, in the picture's units."""
+
+
+class SceneView:
+    """The picture that all pages show; its methods run on the page's thread."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._scene = server.scene
+        self._server = server
+        self.unit = 1.0
+        self.origin = np.zeros(3)
+        self.body: Any = None
+        self._shown = dict(SWITCHES)
+        self._radius = 0.5
+        self._drawn_body: tuple = ()
+        self._handles: dict[str, list] = {name: [] for name in SWITCHES}
+        self._surface: Surface | None = None
+        scene = self._scene
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        scene.configure_default_lights(cast_shadow=False)
+        server.initial_camera.position = CAMERA
+        server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        server.initial_camera.fov = math.radians(40.0)
+        self._body_frame = scene.add_frame("/body", show_axes=False)
+        self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
+        self._grid = scene.add_grid(
+            "/grid",
+            width=GRID_CELLS * 0.5,
+            height=GRID_CELLS * 0.5,
+            cell_size=0.5,
+            section_size=2.5,
+            shadow_opacity=0.0,
+        )
+        self._handles["Grid"] = [self._grid]
+        none = np.zeros((1, 2, 3))
+        self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
+        self._hand = scene.add_icosphere("/string/hand", 0.03, HAND_COLOUR, visible=False)
+        thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
+        self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thin)
+        self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
+        self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
+
+    @property
+    def hand(self):
+        """The ball at the string's free end."""
+        return self._hand
+
+    @property
+    def radius(self) -> float:
+        """Half the body's size [m]."""
+        return self._radius
+
+    def switch(self, name: str, shown: bool) -> None:
+        """Show or hide one of SWITCHES."""
+        self._shown[name] = shown
+        for handle in self._handles[name]:
+            handle.visible = shown
+
+    # The body
+
+    def set_body(self, scenario: Scenario) -> bool:
+        """Draw the body anew where it changed; returns whether ``body`` is another node of the picture now."""
+        body = scenario.setup.body
+        surface = scenario.setup.surface
+        replaced = self.body is None or surface is not self._surface
+        box, ellipsoid = equimomental_shapes(body.mass, body.principal_moments)
+        corners = _box_corners(surface, body.scale) if surface else np.array([-ellipsoid, ellipsoid])
+        size = float(np.linalg.norm(corners[1] - corners[0]))
+        self._radius = 0.5 * size
+        if replaced or not 0.1 <= size / self.unit <= 4.0:
+            self.unit = nice_length(size)
+        unit = self.unit
+        if replaced:
+            self._surface = surface
+            self._make_body(surface)
+        if surface is not None:
+            offset = (surface_reference(surface) * body.scale - body.center_of_mass) / unit
+            scale = tuple((body.scale / unit).tolist())
+        else:
+            offset, scale = np.zeros(3), tuple((ellipsoid / unit).tolist())
+        turned = (1.0, 0.0, 0.0, 0.0) if surface is not None else _wxyz(body.principal_quaternion)
+        for mesh in (self.body, self._ghost):
+            mesh.scale, mesh.position, mesh.wxyz = scale, offset, turned
+        drawn = (body.inertia.tobytes(), body.center_of_mass.tobytes(), *scale)
+        if replaced or drawn != self._drawn_body:
+            self._drawn_body = drawn
+            self._draw_inertia(scenario, box, ellipsoid, corners)
+        return replaced
+
+    def _make_body(self, surface) -> None:
+        """The nodes of body and ghost: mesh coordinates about the middle of the box, to be scaled by the node itself."""
+        if surface is None:
+            drawn = self._scene.add_icosphere("/body/mesh", 1.0, BODY_COLOUR, subdivisions=4)
+            ghost = self._scene.add_icosphere("/ghost/mesh", 1.0, GHOST_COLOUR, opacity=0.35)
+        else:
+            vertices, triangles, _ = shaded_surface(surface.vertices - surface_reference(surface), surface.triangles)
+            drawn = self._scene.add_mesh_simple("/body/mesh", vertices, triangles, color=BODY_COLOUR, side="double")
+            ghost = self._scene.add_mesh_simple(
+                "/ghost/mesh", vertices, triangles, color=GHOST_COLOUR, opacity=0.35, side="double"
+            )
+        self.body, self._ghost = drawn, ghost
+
+    def _draw_inertia(self, scenario: Scenario, box, ellipsoid, corners) -> None:
+        body, unit, scene = scenario.setup.body, self.unit, self._scene
+        turned = _wxyz(quaternion_from_matrix(body.principal_axes))
+        axes = np.zeros((3, 2, 3))
+        axes[:, 1] = np.diag(1.25 * self._radius / unit * np.sqrt(body.principal_moments / body.principal_moments[2]))
+        see_through = {"opacity": 0.3, "cast_shadow": False, "receive_shadow": False}
+        made = {
+            "COM": scene.add_icosphere("/body/com", 0.035, (30, 30, 30), opacity=0.8),
+            "Principal axes": scene.add_arrows(
+                "/body/axes", axes, AXES_COLOURS, wxyz=turned, shaft_radius=0.008, head_radius=0.022, head_length=0.06
+            ),
+            "Inertia ellipsoid": scene.add_icosphere(
+                "/body/ellipsoid",
+                1.0,
+                MOMENTUM_COLOUR,
+                scale=tuple((ellipsoid / unit).tolist()),
+                wxyz=turned,
+                **see_through,
+            ),
+            "Box of equal inertia": scene.add_box(
+                "/body/box", GHOST_COLOUR, tuple((box / unit).tolist()), wxyz=turned, **see_through
+            ),
+        }
+        if scenario.setup.surface is not None:
+            middle = (0.5 * (corners[0] + corners[1]) - body.center_of_mass) / unit
+            sides = tuple(((corners[1] - corners[0]) / unit).tolist())
+            made["Bounding box"] = scene.add_box("/body/bounds", (90, 90, 90), sides, position=middle, wireframe=True)
+        else:
+            self._handles["Bounding box"] = []
+        for name, handle in made.items():
+            handle.visible = self._shown[name]
+            self._handles[name] = [handle]
+
+    # Every frame
+
+    def place(self, row: np.ndarray) -> None:
+        """Move the body to a state's pose (13,)."""
+        self._body_frame.position = self._drawn(row[0:3])
+        self._body_frame.wxyz = _wxyz(row[3:7])
+
+    def place_grid(self) -> None:
+        """The grid stands still in the world while the picture follows the body: by whole sections, it has no end."""
+        section = 2.5
+        shift = -(self.origin / self.unit)
+        self._grid.position = (shift[0] % section, shift[1] % section, shift[2] - 1.2 if abs(shift[2]) < 3.0 else -1.2)
+
+    def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None) -> None:
+        """From the knot to the hand, both in the world; None for no string."""
+        shown = ends is not None and self._shown["String"]
+        if shown:
+            points = np.array([[self._drawn(ends[0]), self._drawn(ends[1])]])
+            self._string.points = points
+            self._hand.position = points[0, 1]
+        _set_visible(self._string, shown)
+        _set_visible(self._hand, shown)
+
+    def show_loads(self, arrows: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Forces: point of attack and drawn vector, both in the world [m]."""
+        self._show_arrows(self._loads, arrows, "Forces")
+
+    def show_momentum(self, position, momentum, omega) -> None:
+        """L and ω at the COM, drawn vectors [m]."""
+        self._show_arrows(self._momentum, [(position, momentum)], "Angular momentum L")
+        self._show_arrows(self._omega, [(position, omega)], "Angular velocity ω")
+
+    def _show_arrows(self, handle, arrows, switch: str) -> None:
+        arrows = [(p, v) for p, v in arrows if float(np.abs(v).max()) > 0.02 * self.unit]
+        shown = bool(arrows) and self._shown[switch]
+        if shown:
+            handle.points = np.array([[self._drawn(p), self._drawn(p + v)] for p, v in arrows])
+        _set_visible(handle, shown)
+
+    def show_ghost(self, row: np.ndarray | None) -> None:
+        """The ghost at a state's pose, or nowhere."""
+        shown = row is not None and self._shown["Ghost"]
+        if shown:
+            self._ghost_frame.position = self._drawn(row[0:3])
+            self._ghost_frame.wxyz = _wxyz(row[3:7])
+        _set_visible(self._ghost_frame, shown)
+
+    def _drawn(self, world_point) -> np.ndarray:
+        return (np.asarray(world_point) - self.origin) / self.unit
+
+
+def nice_length(length: float) -> float:
+    """1, 2 or 5 times a power of ten, near a length [m]."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return min((power, 2.0 * power, 5.0 * power, 10.0 * power), key=lambda nice: abs(math.log(nice / length)))
+
+
+def surface_reference(surface) -> np.ndarray:
+    """Middle of the bounding box (3,) in mesh coordinates: drawn vertices are relative to it."""
+    return 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
+
+
+def _box_corners(surface, scale) -> np.ndarray:
+    corners = np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)]) * scale
+    return np.sort(corners, axis=0)
+
+
+def _wxyz(q_xyzw) -> tuple[float, float, float, float]:
+    x, y, z, w = (float(c) for c in q_xyzw)
+    return w, x, y, z
+
+
+def _set_visible(handle, visible: bool) -> None:
+    if handle.visible != visible:
+        handle.visible = visible
