@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What several test files share: real meshes, and a ROS domain of this run's own."""
 
+import importlib.util
 import os
 import socket
 from collections.abc import Iterator
@@ -8,6 +9,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+NEEDED = {"rerun": ["test_demo.py", "test_rerun_*.py", "test_snapshot.py"]}
+"""Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""
+
+MISSING = {package: files for package, files in NEEDED.items() if importlib.util.find_spec(package) is None}
+collect_ignore_glob = [file for files in MISSING.values() for file in files]
+
+
+def pytest_report_header() -> list[str]:
+    """What isn't run, and why."""
+    return [f"not run, for want of {package}: {', '.join(files)}" for package, files in MISSING.items()]
 
 
 @pytest.fixture(scope="session")
