@@ -83,7 +83,7 @@ def debugging(flight: Any) -> Any:
                 command_view(),
                 rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
             ),
-            row_shares=[5, 3, 2],
+            row_shares=[9, 9, 4],
         ),
         rrb.Grid(
             plot(e.ENERGY, "Energy [J]"),
