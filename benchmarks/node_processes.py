@@ -84,7 +84,11 @@ def node(*parameters: str, settle_s: float = 1.0) -> Process:
     """Our node on the T-handle with ``name:=value`` parameters, running."""
     arguments = [word for parameter in parameters for word in ("-p", parameter)]
     process = Process("-m", "rigid_proto_ros.ros.main", "--ros-args", "-p", "mesh:=t_handle", *arguments)
-    process.wait_until_flying()
+    try:
+        process.wait_until_flying()
+    except RuntimeError:
+        process.end()
+        raise
     time.sleep(settle_s)
     return process
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from node_processes import Process, client, environment, node
 from result_table import ResultTable
+from rigid_proto_ros.rerun_view.viewers import viewer_program
 
 RESULTS = Path(__file__).parent / "results"
 MEMORY_GROWTH_MB = 30.0
@@ -74,9 +75,9 @@ def _guest(flying: Process) -> Process | subprocess.Popen:
     if random.random() < 0.85:
         return client("subscribe", random.choice(["pose", "twist"]))
     address = next((word for line in flying.errors for word in line.split() if word.startswith("rerun+http")), "")
-    viewer = Path(sys.executable).with_name("rerun")
     return subprocess.Popen(
-        [str(viewer), address, "--headless"],
+        # The program itself: the script of that name would be killed and leave it alive.
+        [str(viewer_program()), address, "--headless"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env=environment(),

@@ -118,5 +118,7 @@ def _judged(mesh: Mesh) -> tuple[Verdict, dict[str, Moments]]:
 
 
 def _keep(mesh: Mesh, verdict: Verdict, moments: dict[str, Moments]) -> None:
+    if mesh_cache.is_passing(mesh.path):
+        return
     known = {name: value.as_dict() for name, value in moments.items()}
     mesh_cache.store_json(_key(mesh), {"verdict": dataclasses.asdict(verdict), "moments": known})

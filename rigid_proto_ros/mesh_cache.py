@@ -20,6 +20,14 @@ import numpy as np
 SIZE_LIMIT = 4_000_000_000
 """Bytes that the folder may hold; the entries longest unused go first."""
 
+PASSING = "rigid_proto_upload_"
+"""Folders named so hold files that are gone tomorrow: nothing of them is kept."""
+
+
+def is_passing(path: str | Path) -> bool:
+    """Whether a file lies in such a folder."""
+    return Path(path).parent.name.startswith(PASSING)
+
 
 def folder() -> Path | None:
     """The cache folder, or None when it is turned off or there is no home."""

@@ -215,12 +215,13 @@ def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES) -> Mesh:
         raise MeshError("mesh", str(path), f"a readable file ({error.strerror})") from None
     sha256 = hashlib.sha256(data).hexdigest()
     key = f"{sha256}-{path.suffix.lower().lstrip('.')}"
-    kept = mesh_cache.load_arrays(key) if len(data) >= CACHED_SIZE else None
+    cached = len(data) >= CACHED_SIZE and not mesh_cache.is_passing(path)
+    kept = mesh_cache.load_arrays(key) if cached else None
     if kept is not None and len(kept["triangles"]) <= max_triangles:
         vertices, triangles, polygon_starts = kept["vertices"], kept["triangles"], kept.get("polygon_starts")
     else:
         vertices, triangles, polygon_starts = _read(data, path, max_triangles)
-        if len(data) >= CACHED_SIZE:
+        if cached:
             polygons = {} if polygon_starts is None else {"polygon_starts": polygon_starts}
             mesh_cache.store_arrays(key, vertices=vertices, triangles=triangles, **polygons)
     if len(triangles) == 0:

@@ -25,6 +25,9 @@ MAX_TIME_S = 1e9
 MAX_ENTRIES = 1_000_000
 """Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
 
+MAX_SCHEDULE_LENGTH = 10_000
+"""Characters of one entry on the schedule topic."""
+
 _FORCES = ("force", "push", "impulse")
 _POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
 _TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}
@@ -95,13 +98,17 @@ def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCom
 
 def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -> list[ScriptCommand]:
     """As ``read_script``, from text."""
+    return expand_script(script_entries(text, name), name, wrench_timeout)
+
+
+def script_entries(text: str, name: str = "script"):
+    """What a script's YAML says, nothing of it checked yet; raises InputError for what is no YAML."""
     try:
-        entries = yaml.safe_load(text)
+        return yaml.safe_load(text)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{name}, line {mark.line + 1}" if mark else name
         raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
-    return expand_script(entries, name, wrench_timeout)
 
 
 def expand_script(

@@ -23,8 +23,8 @@ from .core.commands import WrenchCommand
 from .core.errors import InputError
 from .core.loads import Load
 from .core.observer import BodySnapshot, Observer
+from .mailbox import BLOCK_ROWS, Block, Mailbox, Mark
 from .mesh_io import resolve_mesh
-from .rerun_view.mailbox import BLOCK_ROWS, Block, Mailbox, Mark
 from .scene_file import read_scene_text
 from .session_mesh import file_sha256, scene_sha256
 
@@ -60,6 +60,7 @@ class McapObserver(Observer):
 
         values = values or {}
         self.error = ""
+        self._path = path
         self._on_error = on_error or _logger.error
         self._simulated_log = simulated_log
         self._run_begins_ns = self._latest_log_ns = 0
@@ -88,7 +89,7 @@ class McapObserver(Observer):
         except OSError as error:
             accepted = f"a file in an existing folder with space left ({error.strerror})"
             raise InputError("record", str(path), accepted) from None
-        self._mailbox = Mailbox()
+        self._mailbox = Mailbox(lambda: self._stopped("the disk takes nothing any more"))
         self._thread = threading.Thread(target=self._write_until_closed, name="mcap", daemon=True)
         self._thread.start()
 
@@ -145,7 +146,7 @@ class McapObserver(Observer):
         self._mailbox.close()
         self._thread.join(CLOSE_TIMEOUT_S)
         if self._thread.is_alive():
-            self._lost("the disk did not take the last states")
+            self._stopped("the disk did not take the last states")
 
     # The writing thread
 
@@ -245,10 +246,12 @@ class McapObserver(Observer):
 
     def _lost(self, reason: str) -> None:
         file, self._file = self._file, None
-        if file is None:
-            return
-        file.abandon()
-        self.error = f"recording stopped: {file.path}: {reason}"
+        if file is not None:
+            file.abandon()
+            self._stopped(reason)
+
+    def _stopped(self, reason: str) -> None:
+        self.error = f"recording stopped: {self._path}: {reason}"
         self._on_error(self.error)
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-
 NEEDED = {"rerun": ["test_demo.py", "test_rerun_*.py", "test_snapshot.py"]}
 """Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""
 

@@ -34,6 +34,7 @@ ALLOWED = {
     "trimesh": (f"{PACKAGE}.mesh_io",),
     "manifold3d": (f"{PACKAGE}.bodies.surfaces",),
     "rerun": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.inspect_view"),
+    "rerun_bindings": (f"{PACKAGE}.rerun_view",),
     "pyarrow": (f"{PACKAGE}.rerun_view",),  # comes with rerun, as PIL does
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs

@@ -26,6 +26,12 @@ class Acting:
     body: Body | None = None
     share: np.ndarray | None = None
 
+    def share_of(self, body: Body) -> np.ndarray:
+        """What the load adds to the sums (LOADS_SIZE,), computed once for each body."""
+        if self.body is not body or self.share is None:
+            self.body, self.share = body, self.load.share(body)
+        return self.share
+
 
 class ActingLoads:
     """held: the wrench of the last held command, if it still acts; it comes first in every sum, then the pulses in their order.
@@ -49,12 +55,12 @@ class ActingLoads:
     def hold(self, acting: Acting) -> None:
         """Take a held wrench; the one before must have been ended."""
         self.held = acting
-        self._find_next_end()
+        self.next_end_ns = min(self.next_end_ns, acting.end_ns)
 
     def add(self, acting: Acting) -> None:
         """Take a pulse."""
         self.pulses.append(acting)
-        self._find_next_end()
+        self.next_end_ns = min(self.next_end_ns, acting.end_ns)
 
     def hold_until(self, end_ns: int) -> None:
         """Give the held wrench another end."""
@@ -64,8 +70,9 @@ class ActingLoads:
 
     def end_held(self) -> list[Acting]:
         """End the held wrench; returns what ended."""
-        ended = [] if self.held is None else [self.held]
-        self.held = None
+        if self.held is None:
+            return []
+        ended, self.held = [self.held], None
         self._find_next_end()
         return ended
 
@@ -82,18 +89,18 @@ class ActingLoads:
 
     def end_all(self) -> list[Acting]:
         """End everything; returns it."""
-        ended, self.held, self.pulses = list(self), None, []
-        self._find_next_end()
+        ended = list(self)
+        self.held, self.pulses, self.next_end_ns = None, [], NEVER
         return ended
 
     def sum(self, body: Body) -> np.ndarray:
         """All of them summed afresh in their order (LOADS_SIZE,), as core/loads.py lays them out."""
         total = np.zeros(LOADS_SIZE)
         for acting in self:
-            if acting.body is not body:
-                acting.body, acting.share = body, acting.load.share(body)
-            total += acting.share
+            total += acting.share_of(body)
         return total
 
     def _find_next_end(self) -> None:
-        self.next_end_ns = min((acting.end_ns for acting in self), default=NEVER)
+        self.next_end_ns = NEVER if self.held is None else self.held.end_ns
+        for pulse in self.pulses:
+            self.next_end_ns = min(self.next_end_ns, pulse.end_ns)

@@ -33,6 +33,15 @@ class Body:
         """I₁ [kg m²] as a plain float."""
         return float(self.principal_moments[0])
 
+    @cached_property
+    def _placement(self) -> list[tuple[float, float]]:
+        return list(zip(self.scale.tolist(), self.center_of_mass.tolist(), strict=True))
+
+    def arm(self, mesh_point: tuple[float, float, float]) -> tuple[float, float, float]:
+        """``point`` of plain floats."""
+        (a, x), (b, y), (c, z) = self._placement
+        return mesh_point[0] * a - x, mesh_point[1] * b - y, mesh_point[2] * c - z
+
     def point(self, mesh_point) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""
         return np.asarray(mesh_point) * self.scale - self.center_of_mass

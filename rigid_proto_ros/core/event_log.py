@@ -10,6 +10,8 @@ from __future__ import annotations
 import hashlib
 import json
 
+from .commands import Command
+
 MOST_NOTED = 1000
 """Events that may wait to be chained."""
 
@@ -24,7 +26,7 @@ class EventLog:
         """Start a new chain."""
         self.count = 0
         self._hash = hashlib.sha256()
-        self._noted: list[tuple[int, str, dict]] = []
+        self._noted: list[tuple[int, Command]] = []
 
     @property
     def sha256(self) -> str:
@@ -39,9 +41,9 @@ class EventLog:
         self.count += 1
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, time_ns: int, kind: str, content: dict) -> None:
-        """Add an event whose line nobody wants."""
-        self._noted.append((time_ns, kind, content))
+    def note(self, time_ns: int, command: Command) -> None:
+        """Add a command as an event whose line nobody wants now."""
+        self._noted.append((time_ns, command))
         self.count += 1
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
@@ -53,5 +55,5 @@ class EventLog:
 
     def _chain_noted(self) -> None:
         noted, self._noted = self._noted, []
-        for event in noted:
-            self._chain(*event)
+        for time_ns, command in noted:
+            self._chain(time_ns, command.kind, command.content)

@@ -78,7 +78,7 @@ class Load:
         """What the load adds to the sums (LOADS_SIZE,): forces and torques by axes, and the moment r Fᵀ of a world force."""
         fx, fy, fz = self.force
         tx, ty, tz = self.torque
-        rx, ry, rz = (0.0, 0.0, 0.0) if self.mesh_point is None else self.arm(body).tolist()
+        rx, ry, rz = (0.0, 0.0, 0.0) if self.mesh_point is None else body.arm(self.mesh_point)
         if self.axes == "world":
             moment = (rx * fx, rx * fy, rx * fz, ry * fx, ry * fy, ry * fz, rz * fx, rz * fy, rz * fz)
             return np.array((fx, fy, fz, 0.0, 0.0, 0.0, tx, ty, tz, 0.0, 0.0, 0.0, *moment))
@@ -95,7 +95,7 @@ class Load:
         """
         force, torque = _norm_bound(self.force), _norm_bound(self.torque)
         if self.mesh_point is not None:
-            torque += _norm_bound(self.arm(body).tolist()) * force
+            torque += _norm_bound(body.arm(self.mesh_point)) * force
         linear, angular = force / body.mass, torque / body.smallest_moment
         # Negated, so that an overflow to NaN is refused too.
         if not (linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION):

@@ -59,6 +59,8 @@ class Segment:
 
     def advance(self, until_ns: int) -> None:
         """Commit every full step that ends at or before ``until_ns``; raises IntegrationFailed."""
+        if until_ns == self.committed_ns:
+            return
         advanced_ns, good = self.stepper.advance(self._variables, self._problem, until_ns - self.committed_ns)
         self.committed_ns += advanced_ns
         if not good:

@@ -91,10 +91,7 @@ class Simulation(Readings):
 
     def log(self, kind: str, content: dict) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever brings it about."""
-        if self._narrator.hears_events:
-            self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
-        else:
-            self.events.note(self.time_ns, kind, content)
+        self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
 
     # The way of a command
 
@@ -209,7 +206,10 @@ class Simulation(Readings):
             self._string.move(command, self.setup, self.state)
         elif isinstance(command, ReleaseString):
             self._string.release()
-        self.log(command.kind, command.content)
+        if self._narrator.hears_events:
+            self.log(command.kind, command.content)
+        else:
+            self.events.note(self.time_ns, command)
 
     def _load_of(self, pending: Pending) -> Load:
         """The load settled at submission, or settled anew when it was a ray or the mesh has changed since."""
@@ -247,18 +247,16 @@ class Simulation(Readings):
             self._tell_ended(self.acting.end_held())
             if load.is_zero:
                 return
-            self.acting.hold(Acting(load, now_ns, NEVER, load_id))
-            self._set_held_end()
+            self.acting.hold(Acting(load, now_ns, self._end_of_held(now_ns), load_id))
         else:
             duration_s = command.frame.duration_s
             duration_ns = self.setup.poke_duration_ns if duration_s is None else round(duration_s * 1e9)
             self.acting.add(Acting(load, now_ns, now_ns + duration_ns, load_id))
         self._narrator.load_began(self, load_id, command.kind, load)
 
-    def _set_held_end(self) -> None:
-        held, timeout_ns = self.acting.held, self.setup.wrench_timeout_ns
-        if held is not None:
-            self.acting.hold_until(max(held.begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER)
+    def _end_of_held(self, begin_ns: int) -> int:
+        timeout_ns = self.setup.wrench_timeout_ns
+        return max(begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
 
     def _tell_ended(self, ended: list[Acting]) -> bool:
         for acting in ended:
@@ -279,7 +277,8 @@ class Simulation(Readings):
             row[0:3] += shift
             row[7:10] += cross(self.state.angular_velocity, shift)
             self.state = replace(self.state, row=row)
-        self._set_held_end()
+        if self.acting.held is not None:
+            self.acting.hold_until(self._end_of_held(self.acting.held.begin_ns))
         self._string.change(old, new, self.state)
         if new.surface is not old.surface and new.surface is not None:
             self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))

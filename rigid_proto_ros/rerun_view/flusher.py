@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Any
 
 from ..core.errors import InputError
-from .mailbox import BLOCK_ROWS, Block, Mailbox, Mark
-from .streams import FileStream, LiveServer, LiveStream
+from ..mailbox import BLOCK_ROWS, Block, Mailbox, Mark
+from .streams import FileStream, LiveServer, LiveStream, end_without_waiting, forget_closed_recordings
 from .writer import SceneWriter
 
 FLUSH_PERIOD_S = 0.5
@@ -31,7 +31,7 @@ class Flusher:
     """
 
     def __init__(self, name: str, initial_view: str, on_error: Callable[[str], None]) -> None:
-        self.mailbox = Mailbox()
+        self.mailbox = Mailbox(lambda: self._lost("recording stopped: the disk takes nothing any more"))
         self.ghosts = Mailbox()
         self.file: FileStream | None = None
         self.server: LiveServer | None = None
@@ -84,6 +84,7 @@ class Flusher:
         self.ghosts.close()
         self._thread.join(TIMEOUT_S)
         if self._thread.is_alive():
+            end_without_waiting()
             self._lost("recording stopped: the disk did not take the last states")
 
     def _wait_for(self, kind: str) -> None:
@@ -111,7 +112,8 @@ class Flusher:
         if self.server is not None:
             for stream in self._writer.streams:
                 self.server.end_run(stream)
-            self.server.close()
+            if not self.server.close():
+                end_without_waiting()
 
     def _flush(self) -> None:
         """Send the full blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
@@ -129,6 +131,8 @@ class Flusher:
                 stream.flush()
             except OSError as error:
                 self._give_up_file(error)
+            if stream.missed and not stream.behind:
+                self._writer.catch_up(stream)
         while self._passed:
             self._passed.pop().set()
 
@@ -158,12 +162,14 @@ class Flusher:
         if mark.kind == "reset":
             self._flush_ghost(upto_reset=True)
             self._next_run()
+            self._forget_closed_recordings()
         elif mark.kind == "record":
             file, finished = mark.content
             self._finish_file()
             if file is not None:
                 self._writer.attach(file)
             finished.set()
+            self._forget_closed_recordings()
         elif mark.kind == "pass":
             self._passed.append(mark.content[1])
         elif mark.kind == "live":
@@ -196,6 +202,10 @@ class Flusher:
                 if self.file is stream:
                     self.file = file
                 writer.attach(file)
+
+    def _forget_closed_recordings(self) -> None:
+        if not any(stream.behind for stream in self._writer.streams):
+            forget_closed_recordings()
 
     def _finish_file(self) -> None:
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:

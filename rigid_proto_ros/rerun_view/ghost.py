@@ -7,10 +7,10 @@ import numpy as np
 import rerun as rr
 
 from ..core.observer import BodySnapshot
+from ..mailbox import Block
 from . import entities as e
 from .columns import Send, one_time, scalar_columns, time_columns
 from .inertia_shapes import PrincipalFrame
-from .mailbox import Block
 
 
 def attitude_angle(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import rerun.blueprint as rrb
@@ -17,22 +18,46 @@ HERPOLHODE_SECONDS = 20.0
 BACKGROUND = (24, 27, 34)
 
 
-def layout(size: float, initial_view: str, ghost: bool) -> Any:
-    """The blueprint for a body of this size [m]: three tabs, ``initial_view`` in front; ``ghost`` if there is one."""
-    tabs = {"lesson": lesson(size, ghost), "debugging": debugging(size), "plain": flight_view(size, "Plain", PLAIN)}
-    return rrb.Blueprint(
+@dataclass(frozen=True)
+class Layout:
+    """A blueprint, and those of its views whose camera stands as far away as the body is large."""
+
+    blueprint: Any
+    flights: tuple[Any, ...]
+
+
+def layout(size: float, initial_view: str, ghost: bool) -> Layout:
+    """For a body of this size [m]: three tabs, ``initial_view`` in front; ``ghost`` if there is one."""
+    flights = (
+        flight_view(size, "Flight", LESSON),
+        flight_view(size, "All shapes", DEBUGGING),
+        flight_view(size, "Plain", PLAIN),
+    )
+    tabs = {"lesson": lesson(flights[0], ghost), "debugging": debugging(flights[1]), "plain": flights[2]}
+    blueprint = rrb.Blueprint(
         rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
         rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
     )
+    return Layout(blueprint, flights)
 
 
-def lesson(size: float, ghost: bool) -> Any:
+def camera(size: float) -> Any:
+    """Looks at the body, of this size [m], from where it can be seen whole."""
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=[0.95 * size, -0.75 * size, 0.5 * size],
+        look_target=[0.0, 0.0, 0.0],
+        eye_up=[0.0, 0.0, 1.0],
+    )
+
+
+def lesson(flight: Any, ghost: bool) -> Any:
     """How the tensor governs the motion: the flight, Poinsot's construction, what is conserved and what isn't."""
     return rrb.Horizontal(
-        rrb.Vertical(flight_view(size, "Flight", LESSON), command_view(), row_shares=[5, 1]),
+        rrb.Vertical(flight, command_view(), row_shares=[5, 1]),
         rrb.Vertical(
             poinsot_view(),
             # Beside a ghost, how far the two have come apart matters more than the energy, which both keep.
@@ -47,11 +72,11 @@ def lesson(size: float, ghost: bool) -> Any:
     )
 
 
-def debugging(size: float) -> Any:
+def debugging(flight: Any) -> Any:
     """Everything that is logged: every plot, the state line, the event lines as they are."""
     return rrb.Horizontal(
         rrb.Vertical(
-            flight_view(size, "All shapes", DEBUGGING),
+            flight,
             rrb.StateTimelineView(origin=e.STATUS, name="State"),
             rrb.Tabs(
                 rrb.TextLogView(origin=e.EVENTS, name="Events"),
@@ -89,12 +114,7 @@ def flight_view(size: float, name: str, hidden: tuple[str, ...]) -> Any:
         name=name,
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=[0.95 * size, -0.75 * size, 0.5 * size],
-            look_target=[0.0, 0.0, 0.0],
-            eye_up=[0.0, 0.0, 1.0],
-        ),
+        eye_controls=camera(size),
         overrides={"/" + e.TRAIL: [] if e.TRAIL in hidden else [_last_seconds(TRAIL_SECONDS)]},
     )
 

@@ -9,11 +9,11 @@ import numpy as np
 import rerun as rr
 
 from ..core.observer import ShownLoad
+from ..mailbox import Block
 from . import entities as e
 from .arrows import IMPULSE_SHOWN_NS, Arrow, ArrowSamples, ArrowScale, arrows_of
 from .columns import Send, time_columns
 from .derived import carried_along, rotation_matrices
-from .mailbox import Block
 
 PARTS = ("force", "torque")
 

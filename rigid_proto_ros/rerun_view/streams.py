@@ -10,18 +10,28 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
+import threading
+import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
+import rerun_bindings
 
 from ..core.errors import InputError
 from .ports import LOOPBACK
+from .sent_layout import SentLayout
 
 APPLICATION_ID = "rigid_proto_ros"
 FLUSH_TIMEOUT_S = 5.0
 """A disk that takes longer than this to take half a second of data counts as lost."""
+
+TAKEN_S = 0.05
+"""A live stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
+
+LEAVE_S = 2.0
+"""How long the end of a run waits for live streams; a viewer that doesn't read holds nobody up."""
 
 
 class RecordingLostError(OSError):
@@ -34,10 +44,19 @@ class Stream:
     may_skip = False
     """Whether states may be left out when the machine doesn't keep up."""
 
-    framed: tuple[float, bool] | None = None
-    """Size of the view and presence of a ghost that the layout was last sent for."""
+    behind = False
+    """Whether what was sent hasn't been taken yet, so that nothing more should be."""
 
-    def __init__(self, recording_id: str, sink: Any, name: str) -> None:
+    missed = False
+    """Whether something was left out while it was behind: kept by who sends."""
+
+    mesh_number: int | None = None
+    """Which of the run's meshes it knows, and ``knows_ghost`` whether it knows how the ghost looks: as before."""
+
+    knows_ghost = False
+
+    def __init__(self, recording_id: str, sink: Any, name: str, sent_layout: SentLayout | None = None) -> None:
+        self.layout = sent_layout or SentLayout(APPLICATION_ID)
         self.recording = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
         self.recording.send_recording_name(name)
@@ -57,17 +76,13 @@ class Stream:
         """Log values that hold at all times."""
         rr.log(entity, *values, static=True, recording=self.recording)
 
-    def is_framed_for(self, size: float, ghost: bool) -> bool:
-        """Whether the layout sent last still fits: each that is sent costs two threads that the SDK never gives back."""
-        return self.framed is not None and self.framed[1] == ghost and 0.5 <= size / self.framed[0] <= 2.0
-
-    def send_blueprint(self, blueprint: Any) -> None:
-        """Make this the layout that a viewer opens with."""
-        rr.send_blueprint(blueprint, recording=self.recording)
+    def send_layout(self, size: float, initial_view: str, ghost: bool) -> None:
+        """Make a viewer open with the layout for a body of this size [m]."""
+        self.layout.fit(self.recording, size, initial_view, ghost)
 
     def flush(self) -> None:
-        """Hand everything on to where it goes."""
-        self.recording.flush(timeout_sec=0.0)
+        """Hand on what was sent, and see whether it arrives."""
+        raise NotImplementedError
 
     def close(self) -> None:
         """Finish and let go of the sink."""
@@ -105,10 +120,11 @@ class FileStream(Stream):
         try:
             self.flush()
         finally:
-            super().close()
+            self.abandon()
 
     def abandon(self) -> None:
         """Let go of a file that can't be written."""
+        self.layout.close()
         super().close()
 
 
@@ -118,7 +134,18 @@ class LiveStream(Stream):
     may_skip = True
 
     def flush(self) -> None:
-        """Nothing to do: the stream sends by itself, and a viewer that doesn't take it must hold nobody up."""
+        """Ask whether the server has taken everything. It waits for its slowest viewer, and so would all that is sent."""
+        try:
+            self.recording.flush(timeout_sec=TAKEN_S)
+            self.behind = False
+        except RuntimeError:
+            self.behind = True
+
+    def leave(self) -> threading.Thread:
+        """Close on a thread of its own: the library waits without limit for a viewer that doesn't read."""
+        leaving = threading.Thread(target=self.close, name="rerun leaving", daemon=True)
+        leaving.start()
+        return leaving
 
 
 class LiveServer:
@@ -127,6 +154,7 @@ class LiveServer:
     def __init__(self, port: int, memory_limit: str) -> None:
         self._sink = rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=memory_limit)
         self._host: LiveStream | None = None
+        self._leaving: list[threading.Thread] = []
         self.address = f"rerun+http://{LOOPBACK}:{port}/proxy"
 
     def open_run(self, recording_id: str, name: str) -> LiveStream:
@@ -134,20 +162,44 @@ class LiveServer:
         if self._host is None:
             self._host = LiveStream(recording_id, self._sink, name)
             return self._host
-        stream = LiveStream(recording_id, rr.GrpcSink(self.address), name)
         # Viewers keep the layout from run to run.
-        stream.framed = self._host.framed
-        return stream
+        return LiveStream(recording_id, rr.GrpcSink(self.address), name, self._host.layout)
 
     def end_run(self, stream: LiveStream) -> None:
         """Finish a run that no more data follows; the server stays."""
         if stream is not self._host:
-            stream.close()
+            self._leaving = [thread for thread in self._leaving if thread.is_alive()]
+            self._leaving.append(stream.leave())
 
-    def close(self) -> None:
-        """Shut the server down."""
+    def close(self) -> bool:
+        """Shut the server down; returns whether that is done, or whether some viewer doesn't read what was sent."""
+        deadline = time.monotonic() + LEAVE_S
         if self._host is not None:
-            self._host.close()
+            self._host.layout.close()
+            self._leaving.append(self._host.leave())
+        for thread in self._leaving:
+            thread.join(max(0.0, deadline - time.monotonic()))
+        return not any(thread.is_alive() for thread in self._leaving)
+
+
+def forget_closed_recordings() -> None:
+    """Give back threads and memory of recordings that are closed; the library itself keeps them until the end.
+
+    Waits for all others to take what they were sent.
+    """
+    users_own = rr.get_global_data_recording()
+    try:
+        rerun_bindings.flush_and_cleanup_orphaned_recordings()
+    except RuntimeError:
+        # Some other recording of this process can't be flushed; another time.
+        pass
+    if users_own is not None:
+        rr.set_global_data_recording(users_own)
+
+
+def end_without_waiting() -> None:
+    """What the library does at the end of the process is to wait, without limit, for every recording to be taken."""
+    rr.unregister_shutdown()
 
 
 def _versions() -> list[tuple[str, str]]:

@@ -7,10 +7,10 @@ import numpy as np
 import rerun as rr
 
 from ..core.observer import ShownString
+from ..mailbox import Block
 from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
-from .mailbox import Block
 
 RATE = 100
 """[1/s, simulated] of the picture; tension is plotted at it too."""

@@ -11,15 +11,14 @@ import numpy as np
 import rerun as rr
 
 from ..core.observer import BodySnapshot
+from ..mailbox import Block, Mark
 from . import entities as e
 from .arrows import ArrowScale, arrow_length
 from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .lanes import Lanes
-from .layout import layout
 from .load_arrows import LoadArrows
-from .mailbox import Block, Mark
 from .plots import Plots
 from .poinsot_picture import PoinsotPicture
 from .statics import TRAIL_RADIUS, Scene, drawn_mesh, hide_mesh, send_body, send_mesh, send_scene, send_styles
@@ -33,6 +32,9 @@ PICTURE_RATE = 250
 
 MIDDLING_SPIN = 5.0
 """[rad/s] whose arrow is of middling length."""
+
+REPEATED_ROWS = 16384
+"""After as many states viewers are told again what holds since long: a seventh of what the live server keeps."""
 
 MOTION_ARROWS = 0.7
 """Length of the arrows of ω and L against those of loads."""
@@ -52,6 +54,7 @@ class SceneWriter:
         self._body: BodySnapshot | None = None
         self._ghost_body: BodySnapshot | None = None
         self._scene_in_force = ""
+        self._rows_since_repeat = 0
         self.restart()
 
     # What holds for a whole run
@@ -81,18 +84,37 @@ class SceneWriter:
     def attach(self, stream: Stream) -> None:
         """Send a stream what holds at all times, and the body as it is now; then it gets whatever follows."""
         self.streams.append(stream)
-        if self._scene is not None:
-            send_scene(stream, self._scene, self._mesh_number)
+        self.catch_up(stream)
+
+    def catch_up(self, stream: Stream) -> None:
+        """Tell a stream that knows nothing yet, or that has missed something, how things are now."""
+        stream.missed = False
+        self._send_scene(stream, self._last_time_ns, time.time_ns())
         if self._body is None:
             return
-        now, wall = self._last_time_ns, time.time_ns()
         self._send_styles(stream)
+        if self._ghost_body is not None:
+            self._send_ghost_mesh(stream)
+        self._repeat(stream)
+
+    def _repeat(self, stream: Stream) -> None:
+        """What is only said when it changes."""
+        now, wall = self._last_time_ns, time.time_ns()
         send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
-            self._send_ghost_mesh(stream)
             self._ghost.change(now, wall, self._ghost_body, stream.send)
         self._lanes.repeat(now, wall, stream.send)
+
+    def _repeat_for_viewers(self, rows: int) -> None:
+        """The live server drops the oldest, so what was said long ago is lost on viewers that come late."""
+        self._rows_since_repeat += rows
+        if self._rows_since_repeat < REPEATED_ROWS or self._body is None:
+            return
+        self._rows_since_repeat = 0
+        for stream in self._listening():
+            if stream.may_skip:
+                self._repeat(stream)
 
     # What happens in it
 
@@ -120,6 +142,7 @@ class SceneWriter:
                 on_mark(mark)
         self._show_loads(block, shown, block.count)
         self._send_upto(block, sent, block.count)
+        self._repeat_for_viewers(block.count)
 
     def write_ghost(self, block: Block, begin: int, end: int) -> None:
         """Send states begin..end of the ghost, after the body's of the same times."""
@@ -186,23 +209,34 @@ class SceneWriter:
 
     def _started(self, mark: Mark) -> None:
         self._scene = Scene(*mark.content)
-        for stream in self.streams:
-            send_scene(stream, self._scene, self._mesh_number)
+        for stream in self._listening():
+            stream.mesh_number = None
+            self._send_scene(stream, 0, self._began_wall_ns)
         self._tell_body()
 
     def _mesh_changed(self, mark: Mark) -> None:
         self._scene = (self._scene or Scene("", None, None, "")).with_mesh(*mark.content)
-        before, self._mesh_number = self._mesh_number, self._mesh_number + 1
-        for stream in self.streams:
-            hide_mesh(stream, mark.time_ns, mark.wall_ns, before)
-            hide_mesh(stream, 0, self._began_wall_ns, self._mesh_number)
-            send_mesh(stream, self._scene, self._mesh_number)
+        self._mesh_number += 1
+        for stream in self._listening():
+            self._send_scene(stream, mark.time_ns, mark.wall_ns)
+
+    def _send_scene(self, stream: Stream, time_ns: int, wall_ns: int) -> None:
+        """The scene with its mesh, or another mesh from ``time_ns`` on, unless the stream knows it."""
+        known, stream.mesh_number = stream.mesh_number, self._mesh_number
+        if self._scene is None or known == self._mesh_number:
+            return
+        if known is None:
+            send_scene(stream, self._scene, self._mesh_number)
+            return
+        hide_mesh(stream, time_ns, wall_ns, known)
+        hide_mesh(stream, 0, self._began_wall_ns, self._mesh_number)
+        send_mesh(stream, self._scene, self._mesh_number)
 
     def _body_changed(self, mark: Mark) -> None:
         before = self._size if self._body is not None else None
         (self._body,) = mark.content
         self._tell_body()
-        for stream in self.streams:
+        for stream in self._listening():
             if self._size != before:
                 self._send_styles(stream)
             send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene, self._mesh_number)
@@ -224,7 +258,7 @@ class SceneWriter:
     def _ghost_began(self, mark: Mark) -> None:
         first = self._ghost_body is None
         (self._ghost_body,) = mark.content
-        for stream in self.streams if first else ():
+        for stream in self._listening() if first else ():
             self._send_ghost_mesh(stream)
             if self._body is not None:
                 self._send_styles(stream)
@@ -232,13 +266,11 @@ class SceneWriter:
 
     def _send_styles(self, stream: Stream) -> None:
         send_styles(stream, self._size)
-        ghost = self._ghost_body is not None
-        if not stream.is_framed_for(self._view_size, ghost):
-            stream.send_blueprint(layout(self._view_size, self._initial_view, ghost))
-            stream.framed = (self._view_size, ghost)
+        stream.send_layout(self._view_size, self._initial_view, self._ghost_body is not None)
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
-        if self._scene is not None and self._scene.surface is not None:
+        if self._scene is not None and self._scene.surface is not None and not stream.knows_ghost:
+            stream.knows_ghost = True
             stream.log_static(e.GHOST_MESH, drawn_mesh(self._scene.surface, (*e.GHOST_COLOUR, e.GHOST_ALPHA)))
 
     # Rows
@@ -306,14 +338,20 @@ class SceneWriter:
             self._send_rows(e.TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
 
     def _row_streams(self) -> list[Stream]:
-        return [s for s in self.streams if not (self._skip_live and s.may_skip)]
+        return [s for s in self._listening() if not (self._skip_live and s.may_skip)]
+
+    def _listening(self) -> list[Stream]:
+        """The streams that take what they are sent; the others must be told later how things are then."""
+        for stream in self.streams:
+            stream.missed = stream.missed or stream.behind
+        return [stream for stream in self.streams if not stream.behind]
 
     def _send_rows(self, entity: str, times: list[Any], columns: Any) -> None:
         for stream in self._row_streams():
             stream.send(entity, times, columns)
 
     def _send(self, entity: str, times: list[Any], columns: Any) -> None:
-        for stream in self.streams:
+        for stream in self._listening():
             stream.send(entity, times, columns)
 
 

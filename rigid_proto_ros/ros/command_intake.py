@@ -21,7 +21,14 @@ from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
 from ..core.frames import parse_frame
-from ..poke_script import MESH_FRAME, core_command, parse_script, string_attach, string_target
+from ..poke_script import (
+    MAX_SCHEDULE_LENGTH,
+    MESH_FRAME,
+    core_command,
+    parse_script,
+    string_attach,
+    string_target,
+)
 from ..scenario import check_inertia, nanoseconds
 from . import qos
 from .message_bytes import read_message, read_wrench_stamped, whole_stamp
@@ -39,9 +46,6 @@ PUBLISHERS_NS = 250_000_000
 
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
-
-MAX_SCHEDULE_LENGTH = 10_000
-"""Characters of one schedule entry."""
 
 MAX_BRACKETS = 100
 """Lists and mappings opened in one: the YAML reader takes seconds over thousands, and the body would wait for it."""

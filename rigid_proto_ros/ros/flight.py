@@ -16,6 +16,7 @@ from ..core.simulation import Simulation
 from ..core.state import State
 from ..ghost import Ghost, ghost_of
 from ..scenario import Scenario, publication_ns
+from .portions import Portions
 
 DRAIN_NS = 10_000_000
 """Commands are taken at least this often [ns of wall time]."""
@@ -75,6 +76,8 @@ class Flight:
         self._listeners = True
         self._is_viewed = is_viewed
         self._ghost: Ghost | None = None
+        self._portions = Portions()
+        self._stepping = False
         self._lively = False
         self._publication = 0
         self._present_ns = 0
@@ -109,22 +112,32 @@ class Flight:
         """Stop or resume simulated time."""
         if paused != self.timekeeping.paused:
             self.timekeeping.paused = paused
+            self._stepping = False
             self.simulation.log("pause", {"data": paused})
             self.simulation.tell_status(paused)
             self._anchor()
 
     def catch_up(self) -> None:
-        """Advance to this tick's present: what a command means by now. Without commands nobody needs it."""
+        """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
+        Without commands nobody needs it.
+        """
         if not self.timekeeping.paused and self._present_ns > self.simulation.time_ns:
-            self.simulation.advance(self._present_ns)
+            self._caught_up = self._portions.advance(self.simulation, self._present_ns)
             self._check_failure()
 
-    def step(self) -> int:
-        """While paused, advance to the next publication; returns its time [ns]."""
+    def step(self) -> bool:
+        """While paused, begin to advance to the next publication; whether it is made already, else ``stepping`` says."""
         self.simulation.log("step", {})
         self._find_next_publication()
-        self._publish_next()
-        return self.simulation.time_ns
+        self._stepping = True
+        self._portions.begin_tick()
+        self._step_on()
+        return not self._stepping
+
+    @property
+    def stepping(self) -> bool:
+        """A step is on its way."""
+        return self._stepping
 
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
@@ -133,6 +146,7 @@ class Flight:
         if self._ghost is not None:
             self._ghost.reset(self.scenario)
         self._publication = 0
+        self._stepping = False
         self._anchor()
 
     # In the thread's loop
@@ -144,7 +158,8 @@ class Flight:
         self._anchor()
 
     def tick(self) -> None:
-        """Do what is due."""
+        """Do what is due, for no longer than portions.WORK_NS."""
+        self._portions.begin_tick()
         if self.timekeeping.paused:
             self._tick_paused()
         else:
@@ -152,6 +167,7 @@ class Flight:
 
     def meet_request(self) -> None:
         """Bring simulated time up to now for a request, unless a publication comes first."""
+        self._portions.begin_tick()
         if not self.timekeeping.paused:
             self._present_ns = self._simulated_present_ns()
             if self._present_ns < self._publication_ns():
@@ -164,12 +180,14 @@ class Flight:
             self._next_look_ns = wall_ns + DRAIN_NS
             self._listeners = self._anybody_listens()
         present_ns = self._simulated_present_ns()
-        if not self._listeners:
+        if not self._listeners and self._caught_up:
             self._pass_over(present_ns)
         due_ns = self._publication_ns()
         while due_ns <= present_ns:
             if not self._publish_next():
-                return
+                # Stopped for good, or out of time: then now is as far as it came, and the rest is for the next tick.
+                present_ns = self.simulation.time_ns
+                break
             due_ns = self._publication_ns()
             if due_ns <= present_ns and self._factor > 0.0 and not self._followed_clock:
                 self.timekeeping.overruns += 1
@@ -188,19 +206,27 @@ class Flight:
             while self._publication_ns() <= present_ns:
                 self._publication += 1
 
+    def _step_on(self) -> None:
+        if self._publish_next() or self.simulation.failure:
+            self._stepping = False
+
     def _tick_paused(self) -> None:
+        if self._stepping:
+            self._step_on()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
         self._take_commands(now_ns)
-        if now_ns >= self._paused_publication_ns:
+        if now_ns >= self._paused_publication_ns and not self._stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._listeners = self._anybody_listens()
             self._publish(self.simulation.state)
 
     def _publish_next(self) -> bool:
-        state = self.simulation.advance(self._publication_ns())
-        if self._check_failure():
+        """Advance to the next publication and make it; False when the tick's time is over before, or the motion stopped."""
+        self._caught_up = self._portions.advance(self.simulation, self._publication_ns())
+        if self._check_failure() or not self._caught_up:
             return False
+        state = self.simulation.state
         self._publication += 1
         self.observer.state(state.time_ns, state.row)
         self.simulation.tell_status()
@@ -240,6 +266,7 @@ class Flight:
         self._anchor_simulated_ns = self.simulation.time_ns
         self._paused_publication_ns = 0
         self._next_look_ns = 0
+        self._caught_up = True
 
     def _simulated_present_ns(self) -> int:
         """Simulated time that the wall clock asks for; time lost beyond MAX_LAG_NS is given up and counted."""
@@ -266,6 +293,8 @@ class Flight:
     def next_wake_ns(self) -> int:
         """When ``tick`` is due next [ns of wall time]."""
         latest_ns = self._last_drain_ns + DRAIN_NS
+        if self._stepping or not self._caught_up:
+            return 0
         if self._followed_clock:
             return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
         if self.timekeeping.paused:

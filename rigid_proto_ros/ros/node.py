@@ -27,7 +27,7 @@ from .event_publisher import EventPublisher
 from .flight import Flight
 from .node_name import NODE_NAME
 from .parameter_server import converted, declare_parameters, descriptor, ros_parameter
-from .physics_thread import PhysicsThread
+from .physics_thread import PhysicsThread, step_over
 from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
 from .warm_up import warm_up
@@ -269,8 +269,7 @@ class RigidBodyNode(Node):
         flight = self.flight
         if not flight.timekeeping.paused:
             return _answer(response, "step: the simulation is running; pause it first", success=False)
-        reached_ns = self.call(flight.step)
-        return _answer(response, f"simulated time is {reached_ns / 1e9:.9g} s")
+        return _answer(response, f"simulated time is {step_over(self.call, flight) / 1e9:.9g} s")
 
     def _on_pause(self, request, response):
         flight = self.flight

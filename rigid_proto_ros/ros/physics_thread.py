@@ -18,6 +18,9 @@ from .flight import Flight
 SHORT_NS = 3_000_000
 """Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
 
+STEP_PATIENCE_S = 10.0
+"""How long a request to step waits for the end of it."""
+
 
 class PhysicsThread:
     """flights: the bodies that it carries. on_crash() is called should the thread end by a fault of the program."""
@@ -95,3 +98,18 @@ class PhysicsThread:
                     future.set_result(function())
                 except BaseException as error:  # the caller's to handle
                     future.set_exception(error)
+
+
+def step_over(call: Callable, flight: Flight) -> int:
+    """While paused, advance to the next publication, by ``call`` to the thread; returns the time reached [ns].
+
+    Raises InputError when that takes longer than STEP_PATIENCE_S; the step goes on by itself then.
+    """
+    end = time.monotonic() + STEP_PATIENCE_S
+    reached = call(flight.step)
+    while not reached:
+        if time.monotonic() > end:
+            accepted = f"a publication period that is flown in {STEP_PATIENCE_S:g} s; it goes on"
+            raise InputError("step", f"{flight.simulation.time_ns / 1e9:.9g} s reached", accepted)
+        reached = call(lambda: not flight.stepping)
+    return flight.simulation.time_ns

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..core.errors import InputError
 from .flight import Flight
+from .physics_thread import step_over
 
 SERVICES = (
     ("GetSimulatorFeatures", "get_simulator_features"),
@@ -109,7 +110,7 @@ class SimulationInterfaces:
         else:
             try:
                 for _ in range(request.steps):
-                    self._node.call(flight.step)
+                    step_over(self._node.call, flight)
             except InputError as error:
                 response.result.result = results.RESULT_OPERATION_FAILED
                 response.result.error_message = str(error)

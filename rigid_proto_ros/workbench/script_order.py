@@ -16,7 +16,7 @@ from itertools import groupby
 import numpy as np
 
 from ..core.setup import Setup
-from ..poke_script import ScriptCommand, expand_script
+from ..poke_script import MAX_SCHEDULE_LENGTH, ScriptCommand, expand_script
 from ..scenario import yaml_value
 
 RANKS = {
@@ -50,7 +50,13 @@ class Entry:
 
     @property
     def rank(self) -> int:
+        """Its place among the kinds at one instant."""
         return RANKS[self.kind]
+
+    @property
+    def impulsive(self) -> bool:
+        """Whether it acts on the velocities at once."""
+        return "impulse" in self.what or "angular_impulse" in self.what
 
 
 def in_order(entries: list[tuple[int, Entry]]) -> tuple[list[tuple[int, Entry]], list[str]]:
@@ -72,8 +78,9 @@ def _message(entry: Entry, time_ns: int) -> bytes:
 
 
 def _keeps_order(instant: list[Entry], time_ns: int) -> bool:
-    keys = [(entry.rank, _message(entry, time_ns)) for entry in instant]
-    return keys == sorted(keys)
+    """Whether all act in this order, as far as it matters: impulses act at once, and pulses sum up for later."""
+    keys = [(entry.rank, entry.impulsive, _message(entry, time_ns)) for entry in instant]
+    return all([k for k in keys if k[1] == part] == sorted(k for k in keys if k[1] == part) for part in (False, True))
 
 
 def _without_overruled(instant: list[Entry]) -> list[Entry]:
@@ -152,20 +159,18 @@ def _spelled_between(entry: Entry, time_ns: int, after: tuple, before: tuple) ->
     """The change with a message that lies between two places, and its own place; None without room."""
     spelling = _Spelling(entry)
     shortest = len(_message(spelling.padded(0), time_ns)) - 8
-    for low, high in _places(after, before):
+    for low, high in _places(after, before, shortest):
         blanks = low + 256 * high - shortest
         if blanks >= 0:
             return spelling.padded(blanks), (low, high)
     return None
 
 
-def _places(after: tuple[int, int], before: tuple[int, int]) -> Iterator[tuple[int, int]]:
-    """Places from ``after`` on, each with a low byte of its own while these last: lengths stay short."""
-    for low in range(after[0] + 1, before[0]):
-        yield low, 0
-        yield low, 1
-    for high in range(after[1] + 1, 38):
-        yield after[0], high
+def _places(after: tuple[int, int], before: tuple[int, int], shortest: int) -> Iterator[tuple[int, int]]:
+    """Places between two others, those of short messages first, each with a low byte of its own while these last."""
+    yield from ((low, 0) for low in range(max(after[0] + 1, shortest), before[0]))
+    yield from ((low, 1) for low in range(after[0] + 1, before[0]))
+    yield from ((after[0], high) for high in range(after[1] + 1, MAX_SCHEDULE_LENGTH // 256 - 1))
 
 
 class _Spelling:

@@ -16,6 +16,7 @@ Taylor steps are as long as the accuracy allows, read off their coefficients. Th
 from __future__ import annotations
 
 import math
+from types import ModuleType
 
 import numpy as np
 from numba import njit
@@ -41,15 +42,15 @@ from ..problem import (
 )
 from ..rotation import multiply, normalize, rotate
 from . import control as ctl
+from . import series_steps, taylor_adaptive
 from .discrete_gradient import DISCRETE_GRADIENT
 from .equations import stretch
 from .exponential import exponential
 from .free_body import free_body_steps
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
-from .series_steps import series_steps
 from .stepping import AdaptiveSteps, FixedSteps, OneStep, Stepper
-from .taylor_adaptive import degree_for, taylor_adaptive_steps
+from .taylor_adaptive import degree_for
 
 FASTEST_STRING = 1e6
 """rad/s; above it resolving the string's swing would take millions of steps a second."""
@@ -75,38 +76,62 @@ def steady_steps(y, p, h, n):
     return n
 
 
-def _vector(p: np.ndarray, at: int) -> bool:
-    return bool(p[at : at + 3].any())
+ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, ON_STRING = range(7)
+"""Kinds of segments, as the table above has them."""
+
+
+@njit(cache=True, error_model="numpy")
+def _vector(p, at):
+    """Whether any of three numbers isn't zero."""
+    return p[at] != 0.0 or p[at + 1] != 0.0 or p[at + 2] != 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _kind(p, y):
+    """Which of the kinds a segment with problem p from variables y on is."""
+    spins = _vector(y, 4)
+    turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
+    translates = p[TRANSLATES] != 0.0
+    if p[HAS_STRING] != 0.0:
+        return ON_STRING
+    if not turned:
+        if not spins and not translates:
+            moves = _vector(p, REFERENCE_VELOCITY) or _vector(p, REFERENCE_ACCELERATION)
+            return COASTING if moves else ASLEEP
+        if not spins or (p[GYROSCOPIC] == 0.0 and not translates):
+            return STEADY
+        if not translates:
+            return FREE
+    return ANY_LOADS if p[HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
 
 
 def _choose(integrator: Integrator, p: np.ndarray, y: np.ndarray, step_ns: int, accuracy: float) -> Stepper:
     """The stepper of a segment with problem p from variables y on."""
-    spins = _vector(y, 4)
-    turned = _vector(p, TORQUE_BODY) or bool(p[HAS_WORLD_TORQUE]) or (spins and bool(p[DAMPING_ANGULAR]))
-    if p[HAS_STRING]:
-        return _choose_for_string(p, y, spins or turned, step_ns, accuracy)
-    if not turned:
-        if not spins and not p[TRANSLATES]:
-            if _vector(p, REFERENCE_VELOCITY) or _vector(p, REFERENCE_ACCELERATION):
-                return OneStep("auto: closed form, nothing turns the body", None, 0)
-            return OneStep("auto: asleep, nothing moves or acts", None, 0, sleeping=True)
-        if not spins or (not p[GYROSCOPIC] and not p[TRANSLATES]):
-            return OneStep("auto: closed form, nothing changes the spin", steady_steps, 1)
-        if not p[TRANSLATES]:
-            return OneStep("auto: free_body, one exact step without torque", free_body_steps, 1)
-    if p[HAS_WORLD_TORQUE]:
+    kind = _kind(p, y)
+    if kind == TURNING_LOADS:
+        return _series("the loads turn with the body", accuracy, taylor_adaptive)
+    if kind == ANY_LOADS:
         return _series("loads that depend on the attitude", accuracy, series_steps)
-    return _series("the loads turn with the body", accuracy, taylor_adaptive_steps)
+    if kind == FREE:
+        return OneStep("auto: free_body, one exact step without torque", free_body_steps, 1)
+    if kind == ON_STRING:
+        return _choose_for_string(p, y, step_ns, accuracy)
+    if kind == STEADY:
+        return OneStep("auto: closed form, nothing changes the spin", steady_steps, 1)
+    if kind == COASTING:
+        return OneStep("auto: closed form, nothing turns the body", None, 0)
+    return OneStep("auto: asleep, nothing moves or acts", None, 0, sleeping=True)
 
 
-def _series(why: str, accuracy: float, kernel) -> Stepper:
+def _series(why: str, accuracy: float, method: ModuleType) -> Stepper:
     degree = degree_for(accuracy)
-    control = ctl.new_control(accuracy, degree)
-    return AdaptiveSteps(f"auto: taylor of degree {degree}, {why}", control, kernel, 1)
+    choice = f"auto: taylor of degree {degree}, {why}"
+    return AdaptiveSteps(choice, ctl.new_control(accuracy, degree), method.steps, method.workspace(degree))
 
 
-def _choose_for_string(p, y, turns: bool, step_ns: int, accuracy: float) -> Stepper:
+def _choose_for_string(p, y, step_ns: int, accuracy: float) -> Stepper:
     x, _ = stretch(y, p)
+    turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
     accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
     if x <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
         return OneStep("auto: asleep, the string is slack and nothing moves", None, 0, sleeping=True)

@@ -19,7 +19,8 @@ EVALUATIONS = 5  # in committed steps, one for each series
 PENDING = 6  # evaluations spent on the step that waits
 FLOOR_BINDS = 7  # 1 once rounding, not the accuracy, set the allowance of a step
 FAILED = 8  # 1 when a nanosecond would be too long a step, or the motion ran away
-SIZE = 9
+SERIES = 9  # 1 while the workspace holds the series from the committed variables on
+SIZE = 10
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
@@ -40,3 +41,4 @@ def commit(control):
     control[STEPS] += 1.0
     control[ACCEPTED_NS] = 0.0
     control[PENDING] = 0.0
+    control[SERIES] = 0.0

@@ -100,7 +100,10 @@ def _walk(y, p, control, longest_ns, look, c, out):
     gone = 0.0
     parts = 0
     while True:
-        motion_series(out, p, degree, taut, c)
+        if control[ctl.SERIES] == 0.0 or parts > 0:
+            motion_series(out, p, degree, taut, c)
+        # Of a chain of parts the workspace holds the last one's.
+        control[ctl.SERIES] = 1.0 if parts == 0 else 0.0
         parts += 1
         control[ctl.PENDING] += 1.0
         # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much better.
@@ -146,13 +149,17 @@ def _move(c, p, degree, h, slack, out):
         out[HEAT] += 0.5 * p[STIFFNESS] * (before - after) * (before + after)
 
 
+def workspace(degree: int) -> np.ndarray:
+    """Room for the coefficients, which stay there until the step is committed: every look before takes them once more."""
+    return np.zeros((degree + 2, COLUMNS))
+
+
 @njit(cache=True, error_model="numpy")
-def series_steps(y, p, control, following, span_ns, look):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays.
+def steps(y, p, control, following, c, span_ns, look):
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
 
     look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
     """
-    c = np.zeros((int(control[ctl.DEGREE]) + 2, COLUMNS))
     advanced = 0
     while True:
         if look or control[ctl.ACCEPTED_NS] == 0.0:

@@ -100,18 +100,18 @@ class OneStep:
 
 
 class AdaptiveSteps:
-    """Steps as long as the error allows. kernel(y, p, control, following, span_ns, look) commits them, or looks; control:
-    integrators/control.py. evaluations: series or right-hand sides that the step which ends a segment takes.
+    """Steps as long as the error allows. kernel(y, p, control, following, workspace, span_ns, look) commits them, or looks;
+    control: integrators/control.py.
     """
 
     sleeping = False
 
-    def __init__(self, choice: str, control: np.ndarray, kernel, evaluations: int):
+    def __init__(self, choice: str, control: np.ndarray, kernel, workspace: np.ndarray):
         self.choice = choice
         self._control = control
-        self._following = np.zeros(VARIABLES)
+        self._following = np.empty(VARIABLES)
+        self._workspace = workspace
         self._kernel = kernel
-        self._cost = evaluations
         self._cuts = 0
 
     @property
@@ -124,14 +124,15 @@ class AdaptiveSteps:
 
     @property
     def evaluations(self) -> int:
-        return int(self._control[ctl.EVALUATIONS] + self._control[ctl.PENDING]) + self._cuts * self._cost
+        # The step that ends a segment takes the series of the one that waits.
+        return int(self._control[ctl.EVALUATIONS] + self._control[ctl.PENDING])
 
     def advance(self, y: np.ndarray, p: np.ndarray, span_ns: int) -> tuple[int, bool]:
-        advanced_ns = self._kernel(y, p, self._control, self._following, span_ns, False)
+        advanced_ns = self._kernel(y, p, self._control, self._following, self._workspace, span_ns, False)
         return int(advanced_ns), not self._control[ctl.FAILED]
 
     def look(self, y: np.ndarray, p: np.ndarray, rest_ns: int) -> bool:
-        return self._kernel(y, p, self._control, self._following, rest_ns, True) == rest_ns
+        return self._kernel(y, p, self._control, self._following, self._workspace, rest_ns, True) == rest_ns
 
     def cut(self) -> None:
         self._cuts += 1

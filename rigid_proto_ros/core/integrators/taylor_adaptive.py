@@ -7,6 +7,7 @@ degree N is (σh)^(N+1)/(1 − σh); h is where that is the accuracy times h.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -22,6 +23,7 @@ PART = 0.5
 scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed."""
 
 
+@functools.cache
 def degree_for(accuracy: float) -> int:
     """The degree at which work per time is smallest for this accuracy: measured, a flat minimum (12 at 1e-3, 19 at 1e-9)."""
     return min(max(round(8.5 - 1.15 * math.log10(accuracy)), 6), 26)
@@ -55,18 +57,23 @@ def step_length(growth, accuracy, degree, part):
     return min(x / growth, ctl.LONGEST)
 
 
+def workspace(degree: int) -> np.ndarray:
+    """Room for the coefficients, which stay there until the step is committed: every look before sums them once more."""
+    return np.zeros((ROWS, degree + 1))
+
+
 @njit(cache=True, error_model="numpy")
-def taylor_adaptive_steps(y, p, control, following, span_ns, look):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays.
+def steps(y, p, control, following, c, span_ns, look):
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
 
     look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
     """
     degree = int(control[ctl.DEGREE])
-    c = np.zeros((ROWS, degree + 1))
     advanced = 0
     while True:
-        if look or control[ctl.ACCEPTED_NS] == 0.0:
+        if control[ctl.SERIES] == 0.0:
             series(y, p, degree, c)
+            control[ctl.SERIES] = 1.0
         if look:
             sum_series(c, p, degree, span_ns * 1e-9, y)
             return span_ns if is_good(y) else 0

@@ -6,6 +6,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +18,9 @@ BLOCK_ROWS = 4096
 BLOCKS_WAITING_MAX = 16
 """Full blocks that may wait. Beyond these (65 000 rows: a minute at 1 kHz) the producer waits for the flusher, which
 only a run faster than real time reaches: the file keeps every row, and memory stays bounded."""
+
+PATIENCE_S = 10.0
+"""A flusher that has taken nothing for so long, with all blocks full, won't: the flight goes on and nothing is kept."""
 
 
 @dataclass
@@ -42,9 +46,16 @@ class Block:
 
 
 class Mailbox:
-    """One producer, one consumer. ``put`` copies a row in about a microsecond."""
+    """One producer, one consumer. ``put`` copies a row in about a microsecond.
 
-    def __init__(self) -> None:
+    on_given_up() is called, from the producer's thread, when the consumer is stuck and everything is thrown away from
+    then on.
+    """
+
+    def __init__(self, on_given_up: Callable[[], None] = lambda: None) -> None:
+        self._on_given_up = on_given_up
+        self._taken_at = time.monotonic()
+        self._given_up = False
         # The plain lock itself on the hot path: a Condition's own enter and exit cost more than the copy.
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
@@ -72,9 +83,13 @@ class Mailbox:
             self._filling.marks.append(Mark(self._filling.count, time_ns, _wall_ns(), kind, content))
 
     def _hand_over(self) -> None:
-        while len(self._waiting) >= BLOCKS_WAITING_MAX and not self._closed:
-            self._changed.wait()
-        if not self._closed:
+        while len(self._waiting) >= BLOCKS_WAITING_MAX and not self._closed and not self._given_up:
+            rest = self._taken_at + PATIENCE_S - time.monotonic()
+            if rest <= 0.0:
+                self._given_up = True
+                self._on_given_up()
+            self._changed.wait(max(0.0, rest))
+        if not self._closed and not self._given_up:
             self._waiting.append(self._filling)
         self._filling = self._spare.pop() if self._spare and not self._closed else Block()
         self._changed.notify_all()
@@ -82,10 +97,11 @@ class Mailbox:
     def take(self) -> tuple[Block | None, int]:
         """The oldest block, or what has been put since, and how many more full ones wait; None when empty."""
         with self._changed:
+            self._taken_at = time.monotonic()
             if self._waiting:
                 block = self._waiting.popleft()
                 self._changed.notify_all()
-            elif self._filling.count or self._filling.marks:
+            elif not self._given_up and (self._filling.count or self._filling.marks):
                 block = self._filling
                 self._filling = self._spare.pop() if self._spare else Block()
             else:
