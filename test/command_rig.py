@@ -21,13 +21,15 @@ TYPES = {
     "pose": "PoseStamped",
     "twist": "TwistStamped",
     "odom": "Odometry",
+    "imu": "Imu",
     "inertia": "InertiaStamped",
     "applied": "WrenchStamped",
     "events": "String",
     "scene": "String",
+    "robot_description": "String",
 }
 COMMANDS = ("wrench", "poke", "string/target", "string/attach", "inertia/set", "schedule")
-LATCHED = ("inertia", "scene")
+LATCHED = ("inertia", "scene", "robot_description")
 
 
 def stamped(stamp_ns: int, frame_id: str, **content) -> dict:
@@ -307,6 +309,10 @@ class Commanded(RosClient):
     def counters(self) -> dict[str, int]:
         """All whole-number counters of a report that has everything sent so far, and its consequences."""
         self.until_received(self.sent)
+        return self.counters_now()
+
+    def counters_now(self) -> dict[str, int]:
+        """All whole-number counters of the next report."""
         report = self.diagnostics(1)
         return {key: int(value) for key, value in report.items() if str(value).lstrip("-").isdigit()}
 

@@ -14,7 +14,7 @@ from rigid_proto_ros.parameters import PARAMETERS, READ_ONLY
 from rigid_proto_ros.scenario import make_scenario
 from rigid_proto_ros.scene_file import read_scene_file
 
-PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs"}
+PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs", "Imu": "sensor_msgs"}
 KEYS = (
     *(
         "sim_time_ns",
