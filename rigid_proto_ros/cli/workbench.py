@@ -10,6 +10,9 @@ import time
 
 from ..core.errors import InputError
 
+RESTART_S = 3.0
+"""[s] A page that is killed sooner after its start isn't started again."""
+
 
 def add_parser(subparsers) -> None:
     """Declare the command's arguments."""
@@ -17,6 +20,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="scene file or bundled name (t_handle)")
     parser.add_argument("--mesh", metavar="PATH", help="fly this mesh")
     parser.add_argument("--node", metavar="NAME", help="show the node of this name, which runs already")
+    parser.add_argument("--link", metavar="LINK", help="open this situation, made by a page's button")
     parser.add_argument("--port", type=int, metavar="PORT", help="of the page (8080, or the next free one)")
     parser.add_argument("--host", metavar="ADDRESS", help="that the page is served on (this machine only)")
     parser.add_argument("--no-browser", action="store_true", help="only say the address")
@@ -25,35 +29,60 @@ def add_parser(subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Start what is needed and stay."""
-    if importlib.util.find_spec("viser") is None:
-        raise InputError("workbench", "no viser", "its package: pip install 'viser>=1.1,<1.2' (extra [workbench])")
+    for package, remedy in (("viser", "pip install 'viser>=1.1,<1.2'"), ("rclpy", "a ROS 2 installation")):
+        if importlib.util.find_spec(package) is None:
+            raise InputError("workbench", f"no package {package}", f"{remedy} (extras [workbench] and [ros])")
     if args.node and (args.scene or args.mesh):
         raise InputError("--node", args.node, "a running node, or a scene to start one with, not both")
-    from ..offline import read_scene, scene_file
+    from ..workbench.upload import sweep
+
+    try:
+        return _stay(args)
+    finally:
+        sweep()  # a page that was killed leaves its uploads
+
+
+def _stay(args: argparse.Namespace) -> int:
+    from ..bundled import scene_names
     from ..parameters import PARAMETERS
     from ..rerun_view.ports import LOOPBACK, choose_port
     from .processes import Processes, own_executable
 
-    port = choose_port("--port", args.port, PARAMETERS["workbench_port"].default)
-    node_arguments: list[str] = []
-    if not args.node:
-        overrides = {"mesh": args.mesh} if args.mesh else {}
-        scene = args.scene or "t_handle"
-        read_scene(scene, overrides)  # what is wrong with it is said before anything starts
-        node_arguments = ["--ros-args", "--params-file", str(scene_file(scene))]
-        node_arguments += ["-p", f"mesh:={args.mesh}"] if args.mesh else []
+    scene = args.scene or "t_handle"
+    node_arguments, asked = ([], None) if args.node else _node_arguments(scene, args.mesh)
+    port = choose_port("--port", args.port or asked, PARAMETERS["workbench_port"].default)
+    page_arguments = ["--port", str(port), "--host", args.host or LOOPBACK, "--node", args.node or "/rigid_body"]
+    page_arguments += ["--lesson", scene] if not args.mesh and not args.node and scene in scene_names() else []
+    page_arguments += ["--link", args.link] if args.link else []
+    page_arguments += [] if args.no_browser else ["--open"]
+    page_command = [*own_executable("workbench"), *page_arguments]
     with Processes() as processes:
-        running = []
-        if not args.node:
-            running.append(processes.start([*own_executable("rigid_body_node"), *node_arguments]))
-        host = args.host or LOOPBACK
-        page_arguments = ["--port", str(port), "--host", host, "--node", args.node or "/rigid_body"]
-        page_arguments += [] if args.no_browser else ["--open"]
-        page = processes.start([*own_executable("workbench"), *page_arguments])
-        running.append(page)
-        while all(process.poll() is None for process in running):
-            time.sleep(0.2)
-        ended = next(process for process in running if process.poll() is not None)
-        name = "the page" if ended is page else "rigid_body_node"
-        print(f"rigid_proto workbench: {name} ended with status {ended.returncode}", file=sys.stderr)
-        return ended.returncode or 1
+        node = None if args.node else processes.start([*own_executable("rigid_body_node"), *node_arguments])
+        page, began = processes.start(page_command), time.monotonic()
+        while True:
+            time.sleep(0.1)
+            if node is not None and node.poll() is not None:
+                return _ended("rigid_body_node", node.returncode)
+            if page.poll() is not None:
+                if page.returncode >= 0 or time.monotonic() < began + RESTART_S:
+                    return _ended("the page", page.returncode)
+                # Killed: the body flies on, and the browsers find the next page by themselves.
+                print("rigid_proto workbench: the page was killed; here is another one", file=sys.stderr)
+                page, began = processes.start([part for part in page_command if part != "--open"]), time.monotonic()
+
+
+def _ended(name: str, status: int) -> int:
+    print(f"rigid_proto workbench: {name} ended with status {status}", file=sys.stderr)
+    return status if status > 0 else 1
+
+
+def _node_arguments(scene: str, mesh: str | None) -> tuple[list[str], int | None]:
+    """How to start the node, and the page's port where the scene asks for one; what is wrong with it is said before anything
+    starts."""
+    from ..offline import read_scene, scene_file
+    from ..parameters import PARAMETERS
+
+    values = read_scene(scene, {"mesh": mesh} if mesh else {}).values
+    arguments = ["--ros-args", "--params-file", str(scene_file(scene)), *(["-p", f"mesh:={mesh}"] if mesh else [])]
+    port = values["workbench_port"]
+    return arguments, None if port == PARAMETERS["workbench_port"].default else port

@@ -20,7 +20,7 @@ from std_msgs.msg import String
 from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
-from ..core.frames import parse_frame
+from ..core.frames import Frame, parse_frame
 from ..poke_script import (
     MAX_SCHEDULE_LENGTH,
     MESH_FRAME,
@@ -43,6 +43,9 @@ QUIET_NS = 4_000_000
 
 PUBLISHERS_NS = 250_000_000
 """How often it is noted who publishes on a topic that carries nothing [ns of wall time]."""
+
+MOST_FRAMES = 1000
+"""Frames of wrenches that are kept as read."""
 
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
@@ -88,6 +91,7 @@ class CommandIntake:
         self.sequence_gaps = 0
         self._next_quiet_look_ns = 0
         self._next_publishers_look_ns = 0
+        self._read_frames: dict[str, Frame] = {}
         self._on_refusal = on_refusal
         group = _TakenByHand()
 
@@ -167,7 +171,13 @@ class CommandIntake:
 
     def _submit_wrench(self, held: bool, data: bytes, simulation, scenario) -> None:
         stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
-        frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
+        frame = self._read_frames.get(frame_id)
+        if frame is None:
+            frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
+            # Contacts and frames' names are set at start only, so what was read once stays so.
+            if len(self._read_frames) >= MOST_FRAMES:
+                self._read_frames.clear()
+            self._read_frames[frame_id] = frame
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))

@@ -22,18 +22,20 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--host", default=LOOPBACK)
     parser.add_argument("--open", action="store_true")
+    parser.add_argument("--lesson", default="")
+    parser.add_argument("--link", default="")
     args = parser.parse_args(argv)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
-        return serve(args.node, args.host, args.port, stop, args.open)
+        return serve(args, stop)
     except InputError as error:
         print(f"rigid_proto workbench: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 
 
-def serve(node: str, host: str, port: int, stop: threading.Event, in_browser: bool) -> int:
+def serve(args: argparse.Namespace, stop: threading.Event) -> int:
     """Run the page until ``stop`` is set; open it in a browser where there is a display."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -42,19 +44,21 @@ def serve(node: str, host: str, port: int, stop: threading.Event, in_browser: bo
     from .server import make_server, stop_server
 
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    server = make_server(host, port)
-    page = Page(server, node)
+    address = f"http://{args.host}:{args.port}"
+    server = make_server(args.host, args.port)
+    page = Page(server, args.node, address, args.lesson)
+    if args.link:
+        asyncio.run_coroutine_threadsafe(page.open_link(args.link), server.get_event_loop())
     running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
-    address = f"http://{host}:{port}"
     print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
-    if in_browser and has_display():
+    if args.open and has_display():
         webbrowser.open(address)
     try:
         stop.wait()
     finally:
         running.cancel()
         stop_server(server)
-        page.link.close()
+        page.close()
     return 0
 
 

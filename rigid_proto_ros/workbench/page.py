@@ -10,23 +10,39 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections.abc import Awaitable
+from pathlib import Path
 
 import numpy as np
 import viser
 
 from ..core.errors import InputError
-from ..core.rotation import rotate_inverse
 from ..core.state import State
+from ..parameters import READ_ONLY, parameter_named
 from ..scenario import Scenario, make_scenario
 from ..scene_file import read_scene_text
 from .acting import Acting
+from .body_tab import BodyTab
+from .controls import Controls, ParameterSetter
+from .history import History, Rewind, core_row
+from .panel import Panel, show_tab
 from .pointer import Pointer, Tools
+from .readout_panel import ReadoutPanel
 from .ros_link import RosLink
 from .scene_view import SceneView
+from .session_tab import SessionTab
 from .sighting import DrawnPose, Sightings
+from .situation import Situation, bring_about
+from .upload_button import UploadButton
 
 FRAME_S = 0.02
 """[s] Between two looks at what the node has said."""
+
+GRACE_S = 2.0
+"""[s] After the last browser left: a page that is loaded anew finds its history."""
+
+SILENT_S = 1.5
+"""[s] Without a state: a node that lives sends one every 0.1 s at least, unless its publish_rate is low."""
 
 LEASH = 1.0
 """Body sizes that the body may fly from the picture's middle before the picture follows."""
@@ -36,23 +52,49 @@ POKE_TRAVEL = 0.3
 
 
 class Page:
-    """Follows one node. state: the last one heard; scenario: the parameters in force, as the node said last."""
+    """Follows one node. state: the last one heard; scenario: the parameters in force, as the node said last.
 
-    def __init__(self, server: viser.ViserServer, target: str) -> None:
+    address: of this page. lesson: name of the bundled scene that it was started with, or empty.
+    """
+
+    def __init__(self, server: viser.ViserServer, target: str, address: str, lesson: str = "") -> None:
         self.server = server
+        self.address = address
         self.loop = server.get_event_loop()
         self.scenario: Scenario | None = None
         self.state: State | None = None
         self.tools = Tools()
+        self.usual_force = 1.0
         self.follow = True
+        self.paused = False
+        self.history = History(target.strip("/"), self._attachments)
+        self.looking_at: int | None = None
+        self.looking_from: int | None = None
+        self._paused_before_looking = False
+        self.diagnostics: dict[str, str] = {}
         self.link = RosLink(target, self.deliver, self._on_scene, self._on_diagnostics)
         self.view = SceneView(server)
         self.sightings = Sightings()
         self.acting = Acting()
         self.pointer = Pointer(self.link, self, self.sightings, self.tools)
+        self._setter = ParameterSetter(self.link.set_parameters, self._refused)
+        self._controls = Controls(server.gui, self._setter.set)
+        self._readouts = ReadoutPanel(server, 300)
+        self._status = server.gui.add_markdown("")
+        tabs = server.gui.add_tab_group()
+        self._panel = Panel(self, self._controls, tabs)
+        self.body_tab = BodyTab(self, self._controls, tabs)
+        self._session = SessionTab(self, tabs, self._panel.play_tab)
+        show_tab(self, tabs)
+        self._upload = UploadButton(self)
+        self._session.show_lesson_named(lesson)
         self._open = asyncio.Event()
-        self._scene_text = ""
+        self._known = asyncio.Event()
+        self._scene_text = self._loaded_text = ""
         self._loading: asyncio.Task | None = None
+        self._another_body = True
+        self._doing = ""
+        self._heard_s = self._slow_due_s = 0.0
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
 
@@ -71,23 +113,129 @@ class Page:
             self.tick(started)
             await asyncio.sleep(max(0.002, started + FRAME_S - time.monotonic()))
 
-    # Pages come and go
+    def close(self) -> None:
+        """Leave ROS, and nothing on the disk."""
+        self.link.close()
+        self._upload.close()
+
+    # Browsers come and go
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
-        self.link.listen()
-        self._open.set()
+        if not self._open.is_set():
+            self.link.listen()
+            self._open.set()
 
     async def _on_disconnect(self, client: viser.ClientHandle) -> None:
-        if not self.server.get_clients():
+        await asyncio.sleep(GRACE_S)
+        if not self.server.get_clients() and self._open.is_set():
             self._open.clear()
             self.pointer.let_go()
             self.link.stop_listening()
+            # What happens from now on isn't heard: the memory of the flight ends here.
+            self.end_looking()
             self.state = None
+            self.history = History(self.link.target.strip("/"), self._attachments)
             self.sightings.forget()
+            self._readouts.restart()
+            self._scene_text = self._loaded_text = ""
+
+    # What the tabs ask for
+
+    def set(self, changes) -> None:
+        """Set parameters of the node."""
+        self._setter.set(changes)
+
+    def call(self, service: str, data: bool | None = None) -> None:
+        """Call a service; a failure is said on the page."""
+        self.link.call(service, data, lambda successful, message: None if successful else self.say(message))
+
+    def pause(self, paused: bool) -> None:
+        """Stop or resume simulated time."""
+        self.call("pause", paused)
+
+    def centre(self) -> None:
+        """The picture's middle is where the body is."""
+        if self.state is not None:
+            self.view.origin = self.state.position.copy()
+
+    def new_body(self) -> None:
+        """Another body comes: what fits it is found anew."""
+        self._another_body = True
+
+    async def known(self) -> None:
+        """Wait until the node's scene is known."""
+        await self._known.wait()
+
+    async def doing(self, what: str, work: Awaitable) -> None:
+        """Await work that takes a while, saying so; a refusal is said on the page and not raised."""
+        self._doing = what
+        try:
+            await work
+        except InputError as error:
+            self.say(str(error))
+        finally:
+            self._doing = ""
+
+    async def bring_about(self, situation: Situation, rewind: Rewind | None = None) -> None:
+        """Take the node into a situation; raises InputError."""
+        self.pointer.let_go()
+        paused = self._paused_before_looking if self.looking_at is not None else self.paused
+
+        def before_reset() -> None:
+            self.history.rewinding(rewind)
+            if rewind is None:
+                self.history.forget_ghost()
+
+        def received() -> int:
+            return int(self.diagnostics.get("commands_received", 0))
+
+        try:
+            await bring_about(self.link, situation, paused, received, before_reset)
+        except InputError:
+            self.history.rewinding(None)
+            raise
+        self.paused = paused
+
+    async def open_link(self, text: str) -> None:
+        """Bring the node where a link leads, once a page is open."""
+        await self._session.open_link(text)
+
+    def say(self, text: str) -> None:
+        """A line to all pages."""
+        for client in self.server.get_clients().values():
+            client.add_notification("Workbench", text, auto_close_seconds=10.0)
+
+    # Looking back
+
+    def look_at(self, from_ns: int, back_s: float) -> None:
+        """Show the body as it was, the node paused meanwhile."""
+        if self.looking_at is None:
+            self._paused_before_looking = self.paused
+            self.looking_from = from_ns
+            self.pause(True)
+        self.looking_at = max(from_ns - round(back_s * 1e9), self.history.span[0])
+
+    def resume_after_looking(self) -> None:
+        """Back to now, running or paused as it was."""
+        if self.looking_at is not None:
+            self.pause(self._paused_before_looking)
+        self.end_looking()
+
+    def end_looking(self) -> None:
+        """Show what is."""
+        self.looking_at = self.looking_from = None
 
     # What the node says
 
+    def _attachments(self) -> list[tuple[str, bytes]]:
+        upload = self._upload.present
+        try:
+            return [] if upload is None else [(upload.name, Path(upload.path).read_bytes())]
+        except OSError:
+            return []  # another one has taken its place
+
     def _on_scene(self, text: str) -> None:
+        self.history.scene(text)
         self._scene_text = text
         if self._loading is None:
             self._loading = self.loop.create_task(self._load_scene())
@@ -95,9 +243,9 @@ class Page:
     async def _load_scene(self) -> None:
         """Take on what the node flies; a big mesh is read beside the loop."""
         try:
-            while (text := self._scene_text) and (self.scenario is None or text != self._loaded_text):
-                values = read_scene_text(text).values
-                scenario = await asyncio.to_thread(self._scenario, values)
+            while self._scene_text != self._loaded_text:
+                text = self._scene_text
+                scenario = await asyncio.to_thread(self._scenario, read_scene_text(text).values)
                 self._loaded_text = text
                 self._take_on(scenario)
         except InputError as error:
@@ -110,68 +258,106 @@ class Page:
         if present is None or present.values.keys() != values.keys():
             return make_scenario(values)
         changes = {name: value for name, value in values.items() if present.values[name] != value}
+        if any(parameter_named(name).changes == READ_ONLY for name in changes):
+            return make_scenario(values)
+        if "density" in changes and "mass" not in changes:
+            changes["mass"] = values["mass"]
         return present.with_changes(changes)
 
     def _take_on(self, scenario: Scenario) -> None:
         old, self.scenario = self.scenario, scenario
-        if self.view.set_body(scenario):
+        if self.view.set_body(scenario, zoom=self._another_body):
             self.sightings.forget()
             self.pointer.attach(self.view.body)
-        if old is None:
-            self.tools.force = suggested_force(scenario, 2.0 * self.view.radius)
-        elif self.state is not None:
+            self._another_body = True
+        if old is not None and self.state is not None:
             self.acting.changed(old, scenario, self.state)
+        self.body_tab.changed(scenario, self._another_body)
+        self._upload.flies(str(scenario.values["mesh"]))
+        self._controls.update(scenario.values)
+        if self._another_body:
+            self._another_body = False
+            self.usual_force = self.tools.force = suggested_force(scenario, 2.0 * self.view.radius)
+            self._panel.show_force()
+        self._known.set()
 
     def _on_diagnostics(self, values: dict[str, str]) -> None:
         self.diagnostics = values
+        self.paused = values.get("state") == "paused"
+        self._panel.show_state(self.paused)
 
-    def say(self, text: str) -> None:
-        """A line to all pages."""
-        for client in self.server.get_clients().values():
-            client.add_notification("Workbench", text, auto_close_seconds=8.0)
+    def _refused(self, reason: str) -> None:
+        self.say(f"Refused: {reason}")
+        self._controls.show_again()
 
     # Every frame
 
     def tick(self, now_s: float) -> None:
         """Take what the node has said and draw it."""
         heard = self.link.take()
-        scenario = self.scenario
-        if scenario is None:
-            return
         for line in heard.events:
-            self._hear(json.loads(line))
-        if heard.states:
-            time_ns, row = heard.states[-1]
-            first = self.state is None
-            self.state = State(time_ns, body_row(row))
-            if first:
-                self.acting.begin(scenario.setup, self.state)
-        if self.state is not None:
-            self._draw(now_s)
+            self.history.event(line)
+        for time_ns, row in heard.states:
+            self.history.state(time_ns, row[:7], row[7:])
+        if self.scenario is not None:
+            for line in heard.events:
+                self._hear(json.loads(line))
+            if heard.states:
+                self._heard_s = now_s
+                time_ns, row = heard.states[-1]
+                first = self.state is None
+                self.state = State(time_ns, core_row(row))
+                if first:
+                    self.acting.begin(self.scenario.setup, self.state)
+            if self.state is not None:
+                self._draw(now_s)
         self.pointer.hold()
+        if now_s >= self._slow_due_s:
+            self._slow_due_s = now_s + 1.0
+            self._every_second(now_s)
 
     def _hear(self, event: dict) -> None:
-        if self.state is None:
-            return
-        if event["kind"] == "reset":
-            self.acting.begin(self.scenario.setup, State(0, self.scenario.setup.initial))
-        elif event["kind"] == "string_attach":
+        kind = event["kind"]
+        if kind == "reset":
+            setup = self.scenario.setup
+            self.acting.begin(setup, State(0, setup.initial))
+            self._readouts.restart()
+            if self.looking_at is None:
+                self.view.origin = np.zeros(3)
+        elif kind == "pause":
+            self.paused = bool(event["content"].get("data"))
+            self._panel.show_state(self.paused)
+        elif kind == "string_attach":
             self.pointer.knot_moved()
-        self.acting.event(event, self.scenario, self.state)
+        if self.state is not None:
+            self.acting.event(event, self.scenario, self.state)
 
     def _draw(self, now_s: float) -> None:
-        state, setup, view = self.state, self.scenario.setup, self.view
+        state, setup, view = self._shown_state(), self.scenario.setup, self.view
         size = 2.0 * view.radius
         if self.follow and not self.pointer.dragging:
             self._lead_back(state.position, LEASH * size)
+        looking = self.looking_at is not None
+        ghost, moment = self.history.ghost, self.looking_at or self.history.span[1]
         with self.server.atomic():
             view.place(state.row)
             view.place_grid()
-            view.show_string(self.acting.string_ends(setup, state))
-            view.show_loads(self.acting.arrows(setup, state, size))
+            view.show_string(None if looking else self.acting.string_ends(setup, state))
+            view.show_loads([] if looking else self.acting.arrows(setup, state, size))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
-            view.show_momentum(state.position, _direction(momentum, 0.8 * size), _direction(spin, 0.8 * size))
+            view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.7 * size))
+            view.show_ghost(None if ghost is None else ghost.at(moment))
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
+        tied = self.acting.string
+        stretched = 0.0 if tied is None or looking else tied.potential_energy(setup.body, state)
+        self._readouts.show(now_s, self.scenario, state, stretched, [])
+
+    def _shown_state(self) -> State:
+        if self.looking_at is not None:
+            row = self.history.row(self.looking_at)
+            if row is not None:
+                return State(self.history.simulated_ns(self.looking_at), core_row(row))
+        return self.state
 
     def _lead_back(self, position, leash: float) -> None:
         away = position - self.view.origin
@@ -179,17 +365,28 @@ class Page:
         if distance > leash:
             self.view.origin = self.view.origin + away * (1.0 - leash / distance)
 
-
-def body_row(row: np.ndarray) -> np.ndarray:
-    """A state with ω in world axes (13,), as the topics have it, with ω in body axes."""
-    return np.concatenate([row[:10], rotate_inverse(*row[3:7], *row[10:13])])
+    def _every_second(self, now_s: float) -> None:
+        self._session.every_second()
+        silent = self.state is None or now_s - self._heard_s > SILENT_S
+        if self._doing:
+            status = f"*{self._doing} …*"
+        elif silent:
+            status = f"⚠ no word from `{self.link.target}`"
+        else:
+            status = f"`{self.link.target}` is {self.diagnostics.get('state', 'there')}"
+            if (choice := self.diagnostics.get("integrator_choice")) and choice != self.diagnostics.get("integrator"):
+                status += f", method {choice}"
+            warning = self.diagnostics.get("message", "")
+            if warning and warning != self.diagnostics.get("state"):
+                status += f"  \n⚠ {warning}"
+        if self._status.content != status:
+            self._status.content = status
 
 
 def suggested_force(scenario: Scenario, size: float) -> float:
-    """A poke [N] that moves the body by a part of its size in a second: two digits are enough."""
-    values = scenario.values
-    force = POKE_TRAVEL * size * scenario.setup.body.mass / values["poke_duration"]
-    return float(f"{force:.2g}")
+    """A poke [N] that gives the body a part of its size a second: two digits are enough."""
+    duration_s = scenario.values["poke_duration"]
+    return float(f"{POKE_TRAVEL * size * scenario.setup.body.mass / duration_s:.2g}")
 
 
 def _direction(vector: np.ndarray, length: float) -> np.ndarray:

@@ -103,8 +103,9 @@ class SceneView:
 
     # The body
 
-    def set_body(self, scenario: Scenario) -> bool:
-        """Draw the body anew where it changed; returns whether ``body`` is another node of the picture now."""
+    def set_body(self, scenario: Scenario, zoom: bool) -> bool:
+        """Draw the body anew where it changed; returns whether ``body`` is another node of the picture now. ``zoom`` makes it
+        fill the picture, else it does so only where it would be lost or too large to be seen."""
         body = scenario.setup.body
         surface = scenario.setup.surface
         replaced = self.body is None or surface is not self._surface
@@ -112,7 +113,7 @@ class SceneView:
         corners = _box_corners(surface, body.scale) if surface else np.array([-ellipsoid, ellipsoid])
         size = float(np.linalg.norm(corners[1] - corners[0]))
         self._radius = 0.5 * size
-        if replaced or not 0.1 <= size / self.unit <= 4.0:
+        if zoom or replaced or not 0.1 <= size / self.unit <= 4.0:
             self.unit = nice_length(size)
         unit = self.unit
         if replaced:
@@ -230,9 +231,9 @@ class SceneView:
 
 
 def nice_length(length: float) -> float:
-    """1, 2 or 5 times a power of ten, near a length [m]."""
+    """1, 2 or 5 times a power of ten, the next above a length [m]."""
     power = 10.0 ** math.floor(math.log10(length))
-    return min((power, 2.0 * power, 5.0 * power, 10.0 * power), key=lambda nice: abs(math.log(nice / length)))
+    return next(nice for nice in (power, 2.0 * power, 5.0 * power, 10.0 * power) if nice >= length)
 
 
 def surface_reference(surface) -> np.ndarray:

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""The body's tab: mesh, size, mass, ballast, and the tensor, true next to approximate."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..bundled import body_names
+from ..core.inertia_tensor import six_from_tensor
+from ..mesh_body import mesh_body
+from ..mesh_io import Mesh
+from ..scenario import Scenario
+from .controls import Controls, read_numbers
+from .tensors import comparison, judged
+
+if TYPE_CHECKING:
+    from .page import Page
+
+OWN_FILE = "(a file)"
+
+
+class BodyTab:
+    """Everything about mass and shape. ``changed`` is called whenever the node's parameters have."""
+
+    def __init__(self, page: Page, controls: Controls, tabs) -> None:
+        self._page = page
+        self._controls = controls
+        self._gui = page.server.gui
+        self._base_scale = self._base_mass = 1.0
+        self._judged_mesh: tuple = ()
+        with tabs.add_tab("Body"):
+            self._mesh_folder()
+            self._size_and_mass_folder()
+            self._inertia_folder()
+            self._ballast_folder()
+
+    def changed(self, scenario: Scenario, another: bool) -> None:
+        """Show what follows from the parameters in force; ``another`` body is the measure of "times" from now on."""
+        body = scenario.setup.body
+        if another:
+            self._base_scale = float(np.prod(np.abs(body.scale))) ** (1.0 / 3.0)
+            self._base_mass = body.mass
+        self._table.content = comparison(scenario)
+        mesh = str(scenario.values["mesh"])
+        self._file.content = "" if mesh in body_names() else f"Mesh file: `{Path(mesh).name}`"
+        self._list.content = _ballast_list(scenario)
+        key = tuple(scenario.values[name] for name in ("mesh", "mesh_repair", "mesh_fallback"))
+        if key != self._judged_mesh and scenario.body_mesh is not None:
+            self._judged_mesh = key
+            asyncio.get_running_loop().create_task(self._judge(scenario.body_mesh.mesh, *key[1:]))
+
+    async def _judge(self, mesh: Mesh, repair: bool, fallback: str) -> None:
+        body = await asyncio.to_thread(mesh_body, mesh, repair=repair, fallback=fallback)
+        self.show_verdict(
+            [f"{finding.severity}: {finding.message}" for finding in body.verdict.findings]
+            or ["closed and consistently wound: nothing to say"]
+        )
+
+    def show_verdict(self, lines: list[str]) -> None:
+        """What is to be said of a mesh, one line each."""
+        self._verdict.content = "**Verdict**\n\n" + "\n".join(f"- {line}" for line in lines)
+
+    # Mesh
+
+    def _mesh_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Mesh"):
+            mesh = gui.add_dropdown(
+                "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="Bundled bodies (mesh)"
+            )
+            self._file = gui.add_markdown("")
+            self.upload_place = gui.add_folder("Upload", expand_by_default=True)
+            self._verdict = gui.add_markdown("")
+            self._controls.checkbox("mesh_repair", "Repair")
+            self._controls.choice("mesh_fallback", "Stand-in when open")
+
+        def shown(values):
+            return values["mesh"] if values["mesh"] in body_names() else OWN_FILE
+
+        self._controls.bind(mesh, shown, lambda name: None if name == OWN_FILE else {"mesh": name})
+
+    # Size and mass
+
+    def _size_and_mass_folder(self) -> None:
+        gui, controls = self._gui, self._controls
+        with gui.add_folder("Size and mass"):
+            controls.factor("Size ×", "All three scales together (scale)", 1.0, self._size_factor, self._set_size)
+            controls.vector("scale", "Scale x y z", 3)
+            controls.factor(
+                "Mass ×", "Times the mass that the body came with (mass)", 2.0, self._mass_factor, self._set_mass
+            )
+            controls.number("mass", "Mass [kg]; 0: by density")
+            controls.number("density", "Density [kg/m³]")
+
+    def _size_factor(self, values) -> float:
+        scale = values["scale"]
+        return math.prod(abs(s) for s in scale) ** (1.0 / len(scale)) / self._base_scale
+
+    def _set_size(self, factor: float) -> dict:
+        scale = self._page.scenario.setup.body.scale
+        present = float(np.prod(np.abs(scale))) ** (1.0 / 3.0)
+        return {"scale": (scale * (factor * self._base_scale / present)).tolist()}
+
+    def _mass_factor(self, values) -> float:
+        scenario = self._page.scenario
+        return scenario.setup.body.mass / self._base_mass if scenario is not None else 1.0
+
+    def _set_mass(self, factor: float) -> dict:
+        if self._page.scenario.values["inertia_model"] == "explicit":
+            return {"explicit_inertia.mass": factor * self._base_mass}
+        return {"mass": factor * self._base_mass}
+
+    # Inertia
+
+    def _inertia_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Inertia"):
+            self._controls.choice("inertia_model", "Model")
+            self._table = gui.add_markdown("")
+            with gui.add_folder("Edit the tensor", expand_by_default=False):
+                tensor = gui.add_text("Tensor", "", hint="ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes")
+                verdict = gui.add_markdown("")
+                present = gui.add_button("Take the present one")
+                apply = gui.add_button(
+                    "Fly it", disabled=True, hint="inertia_model explicit, with present mass and COM"
+                )
+
+        def judge() -> list[float] | None:
+            numbers = read_numbers(tensor.value, 6)
+            valid, verdict.content = judged(numbers)
+            apply.disabled = not valid
+            return numbers if valid else None
+
+        @tensor.on_update
+        async def _(event) -> None:
+            judge()
+
+        @present.on_click
+        async def _(event) -> None:
+            inertia = self._page.scenario.setup.body.inertia
+            tensor.value = " ".join(f"{x:.9g}" for x in six_from_tensor(inertia))
+
+        @apply.on_click
+        async def _(event) -> None:
+            numbers = judge()
+            if numbers is not None:
+                self._page.set(_explicit(self._page.scenario, numbers))
+
+    # Ballast
+
+    def _ballast_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Ballast", expand_by_default=False):
+            self._list = gui.add_markdown("")
+            name = gui.add_text("Name", "weight", hint="Letters, digits and _; an old name is changed")
+            mass = gui.add_text("Its mass [kg]", "0")
+            place = gui.add_text("At x y z", "0 0 0", hint="Mesh coordinates")
+            put = gui.add_button("Put it there")
+
+        @put.on_click
+        async def _(event) -> None:
+            numbers = read_numbers(f"{mass.value} {place.value}", 4)
+            if numbers is None or not re.fullmatch(r"[a-z][a-z0-9_]*", name.value):
+                self._page.say("Ballast: a name of small letters, a mass, and three mesh coordinates")
+            else:
+                self._page.set({f"ballast.{name.value}": numbers})
+
+
+def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
+    """The present body with another tensor."""
+    body = scenario.setup.body
+    changes: dict[str, object] = {
+        "inertia_model": "explicit",
+        "explicit_inertia.mass": body.mass,
+        "explicit_inertia.center_of_mass": (body.center_of_mass / body.scale).tolist(),
+        "explicit_inertia.tensor": numbers,
+    }
+    for name, value in scenario.values.items():
+        if name.startswith("ballast."):
+            changes[name] = [0.0, *value[1:]]
+    return changes
+
+
+def _ballast_list(scenario: Scenario) -> str:
+    weights = {n.removeprefix("ballast."): v for n, v in scenario.values.items() if n.startswith("ballast.") and v[0]}
+    return "\n".join(f"- {name}: {v[0]:g} kg at {v[1]:g} {v[2]:g} {v[3]:g}" for name, v in weights.items())

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: MIT
+"""Inputs of the page that are the node's parameters: what a user sets goes to the node, what the node has is shown.
+
+The node decides. A value that it refuses goes back to the one in force; one that somebody else sets appears here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import viser
+
+from ..parameters import parameter_named
+
+TYPING_S = 0.6
+"""[s] A text that hasn't changed for this long is meant as it stands."""
+
+TOUCHED_S = 1.0
+"""[s] An input isn't written to this soon after its user touched it: it would jump back under the finger."""
+
+
+class ParameterSetter:
+    """Sends changes to the node, one call at a time; what comes in meanwhile goes with the next, the newest value winning.
+
+    send(changes, done) as RosLink.set_parameters; on_refusal(reason).
+    """
+
+    def __init__(self, send: Callable, on_refusal: Callable[[str], None]) -> None:
+        self._send = send
+        self._on_refusal = on_refusal
+        self._waiting: dict[str, object] = {}
+        self._calling = False
+
+    def set(self, changes: Mapping[str, object]) -> None:
+        """Set parameters soon."""
+        self._waiting.update(changes)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        if self._calling or not self._waiting:
+            return
+        changes, self._waiting = self._waiting, {}
+        self._calling = True
+        self._send(changes, self._done)
+
+    def _done(self, successful: bool, reason: str) -> None:
+        self._calling = False
+        if not successful:
+            self._on_refusal(reason)
+        self._go_on()
+
+
+@dataclass
+class _Control:
+    """handle: the input. shown(values) gives what it shows of parameters; changes(input) what an input means for them,
+    None where it can't be read."""
+
+    handle: viser.GuiInputHandle
+    shown: Callable[[Mapping], object]
+    changes: Callable[[object], dict | None]
+    touched_s: float = -1e9
+
+
+class Controls:
+    """The inputs of one page server. set(changes) sends parameters, as ParameterSetter.set."""
+
+    def __init__(self, gui: viser.GuiApi, set_parameters: Callable[[Mapping[str, object]], None]) -> None:
+        self._gui = gui
+        self._set = set_parameters
+        self._controls: list[_Control] = []
+        self._values: Mapping[str, object] = {}
+
+    def update(self, values: Mapping[str, object], at_once: bool = False) -> None:
+        """Show the parameters in force; ``at_once`` also in inputs that somebody is just using."""
+        self._values = values
+        for control in self._controls:
+            if at_once or time.monotonic() > control.touched_s + TOUCHED_S:
+                control.touched_s = -1e9
+                shown = control.shown(values)
+                if not _same(shown, control.handle.value):
+                    control.handle.value = shown
+
+    def show_again(self) -> None:
+        """Everything as it is in force, after a refusal."""
+        self.update(self._values, at_once=True)
+
+    # Kinds of inputs
+
+    def checkbox(self, name: str, label: str) -> viser.GuiInputHandle:
+        """A switch."""
+        handle = self._gui.add_checkbox(label, False, hint=_hint(name))
+        return self.bind(handle, lambda values: values[name], lambda value: {name: value})
+
+    def choice(self, name: str, label: str, options: tuple[str, ...] | None = None) -> viser.GuiInputHandle:
+        """One of the parameter's choices; an empty one is shown as a dash."""
+        options = tuple(option or "–" for option in options or parameter_named(name).choices)
+        handle = self._gui.add_dropdown(label, options, hint=_hint(name))
+
+        def shown(values):
+            value = values[name] or "–"
+            return value if value in options else handle.value
+
+        return self.bind(handle, shown, lambda value: {name: "" if value == "–" else value})
+
+    def number(self, name: str, label: str) -> viser.GuiInputHandle:
+        """A number of any size, as text."""
+        return self._text(
+            label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1)
+        )
+
+    def vector(self, name: str, label: str, length: int) -> viser.GuiInputHandle:
+        """Numbers of any size, as text with blanks between them."""
+
+        def shown(values):
+            numbers = values[name]
+            return _written([numbers[0]] * length if len(numbers) == 1 else numbers)
+
+        return self._text(label, _hint(name), shown, lambda text: _numbers(name, text, length))
+
+    def slider(self, name: str, label: str, lower: float, upper: float, step: float) -> viser.GuiInputHandle:
+        """A number within what is usual; one beyond it stands at the end."""
+        handle = self._gui.add_slider(label, lower, upper, step, lower, hint=_hint(name))
+        return self.bind(
+            handle, lambda values: min(max(float(values[name]), lower), upper), lambda value: {name: float(value)}
+        )
+
+    def factor(
+        self, label: str, hint: str, decades: float, shown: Callable[[Mapping], float], changes: Callable[[float], dict]
+    ) -> viser.GuiInputHandle:
+        """How many times of something: shown(values) > 0 gives it, changes(factor) sets it. The slider is logarithmic."""
+        handle = self._gui.add_slider(label, -decades, decades, 0.01, 0.0, hint=hint, marks=_marks(decades))
+
+        def place(values):
+            factor = shown(values)
+            return round(min(max(math.log10(factor), -decades), decades), 2) if factor > 0.0 else 0.0
+
+        return self.bind(handle, place, lambda value: changes(10.0 ** float(value)))
+
+    def _text(self, label, hint, shown, changes) -> viser.GuiInputHandle:
+        handle = self._gui.add_text(label, "", hint=hint)
+
+        def place(values):
+            # "1.50" means what is in force, so it may stay as it was typed.
+            mine = changes(handle.value)
+            in_force = mine is not None and all(_equal(values.get(name), value) for name, value in mine.items())
+            return handle.value if in_force else shown(values)
+
+        return self.bind(handle, place, changes, TYPING_S)
+
+    def bind(self, handle, shown, changes, wait_s: float = 0.0):
+        control = _Control(handle, shown, changes)
+        self._controls.append(control)
+
+        @handle.on_update
+        async def _(event) -> None:
+            if event.client is None:
+                return  # we wrote it ourselves
+            touched_s = control.touched_s = time.monotonic()
+            if wait_s:
+                asyncio.get_running_loop().call_later(wait_s, self._settle, control, touched_s)
+            else:
+                self._settle(control, touched_s)
+
+        return handle
+
+    def _settle(self, control: _Control, touched_s: float) -> None:
+        if control.touched_s != touched_s:
+            return  # touched again since
+        changes = control.changes(control.handle.value)
+        if changes is None:
+            control.touched_s = -1e9
+            self.update(self._values)
+        else:
+            self._set(changes)
+
+
+def _hint(name: str) -> str:
+    parameter = parameter_named(name)
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    return f"{parameter.description}{unit} ({name})"
+
+
+def _marks(decades: float) -> tuple:
+    whole = range(-int(decades), int(decades) + 1)
+    return tuple((float(k), f"×{10.0**k:g}") for k in whole) if decades >= 1.0 else ((0.0, "×1"),)
+
+
+def _written(numbers) -> str:
+    return " ".join(f"{x:.9g}" for x in numbers)
+
+
+def read_numbers(text: object, length: int) -> list[float] | None:
+    """As many finite numbers as asked for, separated by blanks or commas; None where the text holds others."""
+    words = str(text).replace(",", " ").strip(" []").split()
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        return None
+    return numbers if len(numbers) == length and all(abs(x) < 1e308 for x in numbers) else None
+
+
+def _numbers(name: str, text, length: int) -> dict | None:
+    numbers = read_numbers(text, length)
+    if numbers is None:
+        return None
+    return {name: numbers[0] if parameter_named(name).type == "double" else numbers}
+
+
+def _equal(a, b) -> bool:
+    if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
+        return len(a) == len(b) and all(x == y for x, y in zip(a, b, strict=True))
+    return a == b
+
+
+def _same(a, b) -> bool:
+    return abs(a - b) < 1e-9 if isinstance(a, float) and isinstance(b, float) else a == b

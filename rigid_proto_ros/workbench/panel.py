@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: MIT
+"""The panel beside the picture: time, pointer, string and physics. All inputs are shared: every page shows the same."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..core.integrators import INTEGRATORS
+from .controls import Controls, read_numbers
+from .pointer import POKE, PUSH
+from .scene_view import SWITCHES
+
+if TYPE_CHECKING:
+    from .page import Page
+
+SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
+"""Simulated seconds per second, as the panel names them."""
+
+GRABBED, COM = "Grabbed point", "Centre of mass"
+PAUSE, GO_ON, STEP, RESET = "Pause", "Go on", "Step", "Reset"
+EARTH = [0.0, 0.0, -9.81]
+
+HELP = """
+**Drag** the body: a string ties it to the pointer. **Click**: a poke along the view. **Shift-click**: a push inward.
+Drag beside it: turn the view; right button: move it; wheel or two fingers: closer.
+"""
+
+
+class Panel:
+    """Play, physics and show: the tabs that need nothing but parameters, services and the pointer's tools."""
+
+    def __init__(self, page: Page, controls: Controls, tabs) -> None:
+        self._page = page
+        self._controls = controls
+        self._gui = page.server.gui
+        self.play_tab = tabs.add_tab("Play")
+        with self.play_tab:
+            self._gui.add_markdown(HELP, order=-2.0)
+            self._time_folder()
+            self._poke_folder()
+            self._string_folder()
+        with tabs.add_tab("Physics"):
+            self._physics()
+
+    def show_state(self, paused: bool) -> None:
+        """Whether simulated time stands still."""
+        text = "Simulated time stands still." if paused else ""
+        if self._running.content != text:
+            self._running.content = text
+
+    def show_force(self) -> None:
+        """The poke's force was changed by something else than its own input."""
+        self._force.value = f"{self._page.tools.force:.4g}"
+
+    # Play
+
+    def _time_folder(self) -> None:
+        gui, page = self._gui, self._page
+        with gui.add_folder("Time"):
+            buttons = gui.add_button_group("Simulation", (PAUSE, GO_ON, STEP, RESET), hint="~/pause, ~/step, ~/reset")
+            self._running = gui.add_markdown("")
+            speed = gui.add_dropdown(
+                "Speed", tuple(SPEEDS), initial_value="1", hint="Simulated seconds per second (real_time_factor)"
+            )
+
+        @buttons.on_click
+        async def _(event) -> None:
+            pressed = buttons.value
+            if pressed in (PAUSE, GO_ON):
+                page.pause(pressed == PAUSE)
+            else:
+                page.call(pressed.lower())
+
+        def shown(values):
+            return next((name for name, factor in SPEEDS.items() if factor == values["real_time_factor"]), speed.value)
+
+        self._controls.bind(speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
+
+    def _poke_folder(self) -> None:
+        gui, tools = self._gui, self._page.tools
+        with gui.add_folder("Poke (click)"):
+            click = gui.add_dropdown(
+                "Click", (POKE, PUSH), initial_value=POKE, hint="Shift-click does the other; for pages without shift"
+            )
+            self._force = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
+            times = gui.add_slider(
+                "Force ×", -2.0, 2.0, 0.05, 0.0, hint="Times the force that suits the body", marks=_TENS
+            )
+            self._controls.number("poke_duration", "Duration [s]")
+
+        @click.on_update
+        async def _(event) -> None:
+            tools.click = click.value
+
+        @self._force.on_update
+        async def _(event) -> None:
+            numbers = read_numbers(self._force.value, 1)
+            if event.client is not None and numbers is not None and abs(numbers[0]) <= 1e12:
+                tools.force = numbers[0]
+
+        @times.on_update
+        async def _(event) -> None:
+            if event.client is not None:
+                tools.force = float(f"{self._page.usual_force * 10.0**times.value:.3g}")
+                self.show_force()
+
+    def _string_folder(self) -> None:
+        gui, tools, controls = self._gui, self._page.tools, self._controls
+        with gui.add_folder("String (drag)"):
+            at = gui.add_dropdown(
+                "Pull at", (GRABBED, COM), initial_value=GRABBED, hint="Where the string is tied when you drag"
+            )
+            strength = gui.add_slider(
+                "Strength [rad/s]",
+                1.0,
+                40.0,
+                0.5,
+                tools.frequency,
+                hint="Frequency of the effective mass (string.frequency)",
+            )
+            scaled = gui.add_checkbox("Scaled by effective mass", True, hint="So that a nut and a ship pull alike")
+            controls.number("string.stiffness", "Stiffness [N/m]")
+            controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
+            controls.number("string.rest_length", "Rest length [m]")
+            controls.checkbox("string.bilateral", "Pushes too")
+            controls.number("string.timeout", "Lets go after [s]")
+
+        def take() -> None:
+            tools.frequency = float(strength.value) if scaled.value else 0.0
+            self._page.set({"string.frequency": tools.frequency})
+
+        @at.on_update
+        async def _(event) -> None:
+            tools.at_com = at.value == COM
+
+        for handle in (strength, scaled):
+
+            @handle.on_update
+            async def _(event) -> None:
+                if event.client is not None:
+                    take()
+
+    # Physics
+
+    def _physics(self) -> None:
+        gui, controls = self._gui, self._controls
+        controls.checkbox("gyroscopic", "Gyroscopic term ω × Iω")
+        controls.vector("gravity", "Gravity [m/s²]", 3)
+        gravity = gui.add_button_group("Gravity is", ("off", "Earth's", "Moon's"))
+        controls.number("linear_damping", "Linear damping [N s/m]")
+        controls.number("angular_damping", "Angular damping [N m s]")
+        controls.choice("integrator", "Integrator", tuple(INTEGRATORS))
+        controls.number("step", "Step [s]")
+        controls.number("accuracy", "Accuracy [1/s]")
+        with gui.add_folder("Ghost in Rerun", expand_by_default=False):
+            controls.choice("ghost.inertia_model", "Its tensor")
+            controls.choice("ghost.integrator", "Its integrator")
+
+        @gravity.on_click
+        async def _(event) -> None:
+            down = {"off": [0.0, 0.0, 0.0], "Earth's": EARTH, "Moon's": [0.0, 0.0, -1.62]}
+            self._page.set({"gravity": down[gravity.value]})
+
+
+_TENS = ((-2.0, "×0.01"), (-1.0, "×0.1"), (0.0, "×1"), (1.0, "×10"), (2.0, "×100"))
+
+
+def show_tab(page: Page, tabs) -> None:
+    """Switches of what is drawn."""
+    gui = page.server.gui
+    with tabs.add_tab("Show"):
+        for name, shown in SWITCHES.items():
+            switch = gui.add_checkbox(name, shown)
+
+            @switch.on_update
+            async def _(event, name=name, switch=switch) -> None:
+                page.view.switch(name, switch.value)
+
+        follow = gui.add_checkbox(
+            "Keep the body in view", True, hint="The picture follows; the grid shows the way made"
+        )
+        centre = gui.add_button("Centre on the body")
+
+        @follow.on_update
+        async def _(event) -> None:
+            page.follow = follow.value
+
+        @centre.on_click
+        async def _(event) -> None:
+            page.centre()

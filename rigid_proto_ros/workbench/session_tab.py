@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Time as a session: lessons, rewind and branch, saving what was done by hand, links."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import TYPE_CHECKING
+
+from ..bundled import example_path
+from ..core.errors import InputError
+from .history import Rewind
+from .lessons import Lesson, lessons
+from .link import decode, encode
+from .situation import Situation, situation_of
+
+if TYPE_CHECKING:
+    from .page import Page
+
+NO_LESSON = "–"
+
+MAX_QUERY = 7000
+"""Characters of a link that a server reads from an address; a longer one is pasted."""
+
+STEP_S = 0.05
+"""[s] Of the rewind slider."""
+
+
+class SessionTab:
+    """The folder of lessons, and the tab of rewind, save and link."""
+
+    def __init__(self, page: Page, tabs, play_tab) -> None:
+        self._page = page
+        self._gui = page.server.gui
+        self._lessons: dict[str, Lesson] = {lesson.title: lesson for lesson in lessons()}
+        self._was_paused = False
+        with play_tab:
+            self._lesson_folder()
+        with tabs.add_tab("Session"):
+            self._rewind_folder()
+            self._save_folder()
+            self._link_folder()
+
+    # Lessons
+
+    def _lesson_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Lesson", order=-1.0):
+            choice = gui.add_dropdown("Lesson", (NO_LESSON, *self._lessons), initial_value=NO_LESSON)
+            self._text = gui.add_markdown("")
+            self._script = gui.add_button("Run its script", visible=False)
+        self._choice = choice
+
+        @choice.on_update
+        async def _(event) -> None:
+            lesson = self._lessons.get(choice.value)
+            self._show_lesson(lesson)
+            if event.client is not None and lesson is not None:
+                await self._fly(lesson.path.read_text("utf-8"), "")
+
+        @self._script.on_click
+        async def _(event) -> None:
+            lesson = self._lessons.get(choice.value)
+            if lesson is not None and lesson.script:
+                script = example_path(lesson.script).read_text("utf-8")
+                await self._fly(lesson.path.read_text("utf-8"), script)
+
+    def _show_lesson(self, lesson: Lesson | None) -> None:
+        self._script.visible = lesson is not None and bool(lesson.script)
+        if lesson is None:
+            self._text.content = ""
+        else:
+            self._text.content = (
+                "\n".join(f"{k}. {s}" for k, s in enumerate(lesson.sentences, 1)) + f"\n\n{lesson.reason}"
+            )
+
+    def show_lesson_named(self, name: str) -> None:
+        """The page was started with the scene of a lesson."""
+        for title, lesson in self._lessons.items():
+            if lesson.name == name:
+                self._choice.value = title
+
+    async def _fly(self, scene: str, script: str) -> None:
+        await self._page.doing("setting the scene", self._bring(scene, script))
+
+    async def _bring(self, scene: str, script: str) -> None:
+        page = self._page
+        await page.known()
+        await page.bring_about(situation_of(scene, script, page.scenario.values))
+        page.new_body()
+
+    # Rewind
+
+    def _rewind_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Rewind"):
+            gui.add_markdown("Go back, look, and go on from there: the old future stays as a ghost.")
+            self._back = gui.add_slider("Seconds back", 0.0, 10.0, STEP_S, 0.0)
+            self._go_on = gui.add_button("Go on from here", disabled=True)
+            self._forget = gui.add_button("Forget the ghost", visible=False)
+            self._looking = gui.add_markdown("")
+
+        @self._back.on_update
+        async def _(event) -> None:
+            if event.client is not None:
+                self._look(float(self._back.value))
+
+        @self._go_on.on_click
+        async def _(event) -> None:
+            await self._page.doing("going back", self._rewind())
+
+        @self._forget.on_click
+        async def _(event) -> None:
+            self._page.history.forget_ghost()
+
+    def every_second(self) -> None:
+        """How far back one can go grows while the body flies."""
+        first_ns, last_ns = self._page.history.span
+        if self._page.looking_at is None:
+            available = max(10.0, 10.0 * math.ceil((last_ns - first_ns) * 1e-10))
+            if self._back.max != available:
+                self._back.max = available
+        self._forget.visible = self._page.history.ghost is not None
+
+    def _look(self, back_s: float) -> None:
+        page = self._page
+        if back_s <= 0.0:
+            self._stop_looking()
+            page.resume_after_looking()
+            return
+        page.look_at(page.history.span[1] if page.looking_from is None else page.looking_from, back_s)
+        self._go_on.disabled = False
+        self._looking.content = f"Looking at {page.history.simulated_ns(page.looking_at) * 1e-9:.2f} s"
+
+    def _stop_looking(self) -> None:
+        self._go_on.disabled = True
+        self._looking.content = ""
+        self._back.value = 0.0
+
+    async def _rewind(self) -> None:
+        page = self._page
+        moment_ns = page.looking_at
+        if moment_ns is None:
+            return
+        try:
+            rewind: Rewind = await asyncio.to_thread(page.history.rewind, moment_ns)
+            await page.bring_about(Situation(rewind.changes, rewind.commands), rewind)
+            for note in rewind.notes:
+                page.say(note)
+        finally:
+            self._stop_looking()
+            page.end_looking()
+
+    # Save
+
+    def _save_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Save as script"):
+            gui.add_markdown("What was done since the last reset, as a scene and a script that fly the same again.")
+            save = gui.add_button("Save scene and script")
+            notes = gui.add_markdown("")
+
+        @save.on_click
+        async def _(event) -> None:
+            await self._page.doing("saving", self._save(event.client, notes))
+
+    async def _save(self, client, notes) -> None:
+        saved = await asyncio.to_thread(self._page.history.save_as_script)
+        client.send_file_download("scene.yaml", saved.scene.encode(), save_immediately=True)
+        client.send_file_download("script.yaml", saved.script.encode(), save_immediately=True)
+        lines = [f"{saved.commands} commands. Fly it again:", "`rigid_proto simulate scene.yaml --script script.yaml`"]
+        notes.content = "\n\n".join([*lines, *saved.notes])
+
+    # Link
+
+    def _link_folder(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Link"):
+            make = gui.add_button("Make a link", hint="Scene and script since the last reset, in one line")
+            self._link = gui.add_text("Link", "", hint="Copy it, or paste one and open it")
+            opening = gui.add_button("Open the link above")
+
+        @make.on_click
+        async def _(event) -> None:
+            await self._page.doing("making a link", self._make_link())
+
+        @opening.on_click
+        async def _(event) -> None:
+            await self.open_link(self._link.value)
+
+    async def _make_link(self) -> None:
+        saved = await asyncio.to_thread(self._page.history.save_as_script)
+        link = encode(saved.scene, saved.script)
+        self._link.value = f"{self._page.address}/?{link}" if len(link) <= MAX_QUERY else link
+
+    async def open_link(self, text: str) -> None:
+        """Bring the node where a link leads; a refusal is said on the page."""
+        try:
+            scene, script = decode(text.rpartition("?")[2])
+        except InputError as error:
+            self._page.say(str(error))
+            return
+        await self._fly(scene, script)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Bringing a node into a situation: parameters, a reset, commands stamped with the time at which they act.
+
+The node is paused meanwhile, so that each command is there before its time: the motion that follows is the one that
+``poke_client --reset`` or ``simulate`` would give, to the bit.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from .. import parameters
+from ..core.errors import InputError
+from ..core.frames import parse_frame
+from ..poke_script import ScriptCommand, parse_script, with_contacts
+from ..scene_file import read_scene_text
+from .history import changes_to
+from .ros_link import RosLink
+
+MAX_UNCONFIRMED = 400
+"""Commands sent beyond what the node has reported as received, which it does once a second."""
+
+MAX_COMMANDS = 4000
+"""More would take a page a minute to send; poke_client has the patience."""
+
+STALLED_S = 5.0
+"""[s] A node that answers nothing for this long is gone."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """changes: parameters to be set together. commands: with ``t_ns`` in simulated time after the reset."""
+
+    changes: Mapping[str, object]
+    commands: Sequence[ScriptCommand] = field(default_factory=tuple)
+
+
+def situation_of(scene: str, script: str, present: Mapping[str, object]) -> Situation:
+    """The situation of a scene (parameter-file text) and a poke script (YAML text); raises InputError.
+
+    What the scene doesn't name is at its default. Contacts can't change in flight: the script's are taken from the scene as
+    the points that they are.
+    """
+    given = parameters.convert_all(read_scene_text(scene).values)
+    values = {**parameters.defaults(), **given}
+    contacts = {n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")}
+    timeout_s = float(values["wrench_timeout"])
+    commands = with_contacts(parse_script(script, wrench_timeout=timeout_s) if script.strip() else [], contacts)
+    commands = [_at_its_point(command, contacts) for command in commands]
+    if len(commands) > MAX_COMMANDS:
+        raise InputError("script", f"{len(commands)} commands", f"at most {MAX_COMMANDS}; send it with poke_client")
+    return Situation(changes_to(values, present), commands)
+
+
+def _at_its_point(command: ScriptCommand, contacts: Mapping[str, tuple]) -> ScriptCommand:
+    """A wrench or poke at a contact as one at the point where the contact lies."""
+    if command.kind not in ("wrench", "poke"):
+        return command
+    frame = parse_frame(command.frame_id, frozenset(contacts))
+    if frame.point[0] != "contact":
+        return command
+    return replace(command, frame_id=replace(frame, point=("point", contacts[frame.point[1]])).text)
+
+
+async def bring_about(
+    link: RosLink, situation: Situation, paused: bool, received: Callable[[], int], before_reset: Callable[[], None]
+) -> None:
+    """Take the node there; it is paused or running then as it was, ``paused``, before. Raises InputError when it refuses.
+
+    received() gives its count of commands, before_reset() is called right before its time starts again.
+    """
+    await asked(link, "pause", True)
+    try:
+        if situation.changes:
+            successful, _ = await set_parameters(link, situation.changes)
+            if not successful:
+                # What acts now may stand in the way of a change that nothing at its own time does.
+                await asked(link, "reset")
+                successful, reason = await set_parameters(link, situation.changes)
+                if not successful:
+                    raise InputError("node", reason, "parameters that it takes")
+        before_reset()
+        await asked(link, "reset")
+        await _send(link, situation.commands, received)
+    finally:
+        await asked(link, "pause", paused)
+
+
+async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Callable[[], int]) -> None:
+    first = received()
+    for number, command in enumerate(commands, 1):
+        link.command(command)
+        if number % MAX_UNCONFIRMED == 0 or number == len(commands):
+            deadline = time.monotonic() + STALLED_S
+            while received() - first < number:
+                if time.monotonic() > deadline:
+                    raise InputError(
+                        "node", f"{received() - first} commands confirmed", f"{number}, all that were sent"
+                    )
+                await asyncio.sleep(0.02)
+
+
+async def asked(link: RosLink, service: str, data: bool | None = None) -> str:
+    """Call a service and wait; returns its message, raises InputError where it fails."""
+    answer = asyncio.get_running_loop().create_future()
+    link.call(service, data, _giving(answer))
+    successful, message = await _within(answer, service)
+    if not successful:
+        raise InputError(service, message, "success")
+    return message
+
+
+async def set_parameters(link: RosLink, changes: Mapping[str, object]) -> tuple[bool, str]:
+    """Set parameters together and wait; whether the node took them, and its reason where it didn't."""
+    answer = asyncio.get_running_loop().create_future()
+    link.set_parameters(dict(changes), _giving(answer))
+    return await _within(answer, "set_parameters_atomically")
+
+
+def _giving(answer: asyncio.Future) -> Callable[[bool, str], None]:
+    def give(successful: bool, message: str) -> None:
+        if not answer.done():  # it may come after we stopped waiting
+            answer.set_result((successful, message))
+
+    return give
+
+
+async def _within(answer: asyncio.Future, what: str):
+    try:
+        return await asyncio.wait_for(answer, STALLED_S)
+    except TimeoutError:
+        raise InputError(what, f"no answer within {STALLED_S:g} s", "an answer of the node") from None

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""A workbench with a page in headless Chromium, and a client that listens to its node, for tests and pictures."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+from command_rig import RosClient
+from ros_process import RosProcess, descendants
+
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
+PATIENCE_S = 60.0
+CAMERA, FIELD_OF_VIEW = np.array([1.3, -2.2, 1.1]), math.radians(40.0)
+"""Where a page looks from at first, to its middle, in units of the picture."""
+
+
+class Bench:
+    """``rigid_proto workbench`` in a ROS domain of its own."""
+
+    def __init__(self, environment: dict[str, str], folder: Path, port: int, *arguments: str) -> None:
+        self.port = port
+        self.process = RosProcess(
+            *("rigid_proto", "workbench", "--port", port, "--no-browser", *arguments),
+            environment={**environment, "TMPDIR": str(folder)},
+            log=folder / "workbench",
+        )
+        self.process.wait_for("The workbench is at")
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def children(self) -> dict[str, int]:
+        """Process ids by what they run: ``page`` and ``node``."""
+        found = {}
+        for pid in descendants(self.process.pid):
+            command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
+            for name, module in (("page", "workbench.main"), ("node", "ros.main")):
+                if any(part.endswith(module) for part in command):
+                    found[name] = pid
+        return found
+
+
+class Page:
+    """One browser page. The body is at the middle of the canvas while it rests at the world's origin."""
+
+    def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
+        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        self.page.set_default_timeout(PATIENCE_S * 1e3)
+        self.page.goto(address)
+        self.page.wait_for_selector("canvas")
+        # viser says that WebGL runs in software, and stands before the picture while it does.
+        self.page.locator(".mantine-Notification-closeButton").first.click()
+        self.until(lambda: "is flying" in self.text or "is sleeping" in self.text, "a node on the page")
+
+    @property
+    def text(self) -> str:
+        return self.page.inner_text("body")
+
+    def until(self, condition, what: str, timeout_s: float = PATIENCE_S):
+        """Wait for a condition; returns its value."""
+        deadline = time.monotonic() + timeout_s
+        while not (found := condition()):
+            assert time.monotonic() < deadline, f"no {what} within {timeout_s} s: {self.text}"
+            time.sleep(0.05)
+        return found
+
+    def tab(self, name: str) -> None:
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def button(self, name: str) -> None:
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def press(self, name: str) -> None:
+        """A button of a group."""
+        self.page.locator("button", has_text=name).first.click()
+
+    def input(self, label: str):
+        """The input beside a label."""
+        path = f'xpath=//p[label[normalize-space()="{label}"]]/../following-sibling::div//input[not(@type="hidden")]'
+        return self.page.locator(path).first
+
+    def write(self, label: str, text: str) -> None:
+        field = self.input(label)
+        field.fill(text)
+        field.press("Enter")
+
+    def choose(self, label: str, option: str) -> None:
+        """Take an option of a dropdown."""
+        self.input(label).click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Of the canvas [pixels]."""
+        box = self.page.locator("canvas").first.bounding_box()
+        return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+
+    def ray(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+        """The view ray through a pixel, by pinhole geometry: origin (3,) [units of the picture] and direction (3,)."""
+        box = self.page.locator("canvas").first.bounding_box()
+        forward = -CAMERA / np.linalg.norm(CAMERA)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        up = np.cross(right, forward)
+        half = 0.5 * box["height"]
+        mx, my = self.middle
+        slope = math.tan(0.5 * FIELD_OF_VIEW) / half
+        direction = forward + (x - mx) * slope * right + (my - y) * slope * up
+        return CAMERA, direction / np.linalg.norm(direction)
+
+    def click(self, x: float, y: float, modifier: str = "") -> None:
+        """Press and release soon: a poke. Software WebGL needs its time to see what the pointer is over."""
+        mouse = self.page.mouse
+        mouse.move(x - 2.0, y)
+        mouse.move(x, y)
+        time.sleep(0.4)
+        if modifier:
+            self.page.keyboard.down(modifier)
+        mouse.down()
+        time.sleep(0.1)
+        mouse.up()
+        if modifier:
+            self.page.keyboard.up(modifier)
+
+    def grab(self, x: float, y: float) -> None:
+        self.page.mouse.move(x - 2.0, y)
+        self.page.mouse.move(x, y)
+        time.sleep(0.4)
+        self.page.mouse.down()
+        time.sleep(0.6)
+
+    def drag(self, x: float, y: float, dx: float, dy: float, steps: int = 3) -> None:
+        """Press at a point and move on from there in steps; the button stays down."""
+        self.grab(x, y)
+        for k in range(1, steps + 1):
+            self.page.mouse.move(x + dx * k / steps, y + dy * k / steps)
+            time.sleep(0.4)
+
+    def release(self) -> None:
+        self.page.mouse.up()
+
+
+class Ear(RosClient):
+    """Listens to the node of a bench."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        super().__init__(environment)
+        self.listen("pose", "events", "scene")
+
+    def event(self, kind: str, after: int = 0) -> dict:
+        """The first event of a kind after so many of any kind."""
+        return self.until(
+            lambda: next((event for event in self.events()[after:] if event["kind"] == kind), None), f"event {kind}"
+        )
+
+    def values(self) -> dict:
+        """The parameters in force, as ~/scene says."""
+        from rigid_proto_ros.scene_file import read_scene_text
+
+        return read_scene_text(self.until(lambda: self.heard("scene", last=1), "a scene")[-1]["data"]).values
+
+    def until_value(self, name: str, condition):
+        """Wait until a parameter meets a condition; returns it."""
+        return self.until(lambda: condition(value := self.values().get(name)) and [value], f"{name} as asked for")[0]
