@@ -132,7 +132,7 @@ def test_a_stamp_ahead_acts_at_exactly_that_nanosecond(rig):
     assert rig.gained(before) == {"refused_total": 1, "refused_stamp": 1}
 
 
-@pytest.mark.parametrize("rate", [3.7, 1000.0 / 3.0, 7.0])
+@pytest.mark.parametrize("rate", [3.0, 3.7, 1000.0 / 3.0])
 def test_publication_k_is_at_the_rounded_kth_period(rig, rate):
     rig.set(publish_rate=rate, real_time_factor=0.0)
     rig.start_over(paused=False)
