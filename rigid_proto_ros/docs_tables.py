@@ -30,8 +30,8 @@ from .core.integrators.integrator import (
     WORLD_TORQUE,
 )
 from .interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from .lessons import lesson, lessons
 from .parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
-from .workbench.lessons import lesson, lessons
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = ("README.md", "docs/physics.md", "docs/architecture.md")

@@ -13,10 +13,10 @@ from test_lessons import Z, degrees_between, fly
 import rigid_proto_ros
 from rigid_proto_ros.bundled import scene_names
 from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.lessons import lesson
 from rigid_proto_ros.offline import OfflineRun, read_scene
 from rigid_proto_ros.poke_script import parse_script
 from rigid_proto_ros.scenario import nanoseconds
-from rigid_proto_ros.workbench.lessons import lesson
 
 PAGES = Path(rigid_proto_ros.__file__).resolve().parent.parent / "docs" / "lessons"
 pytestmark = pytest.mark.skipif(not PAGES.is_dir(), reason="not run from a source tree")
