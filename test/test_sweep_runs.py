@@ -35,7 +35,7 @@ def expected(own) -> dict[str, list]:
 @pytest.fixture
 def long_run(tmp_path):
     """The command of a run of many small chunks, its files, and the study."""
-    spec = {**PULLED, "samples": 600, "duration": 0.3}
+    spec = {**PULLED, "samples": 320, "duration": 0.3}
     file = tmp_path / "long.yaml"
     file.write_text(yaml.safe_dump(spec, sort_keys=False))
     out = tmp_path / "long.parquet"
@@ -83,7 +83,7 @@ def test_ctrl_c_leaves_a_readable_table_and_a_run_to_resume(long_run) -> None:
     assert process.returncode == 0 and "--resume" in said
     done = content(out)["row"]
     assert 0 < len(done) < own.rows and sorted(set(done)) == done
-    other = study(PULLED, samples=700, duration=0.3)
+    other = study(PULLED, samples=330, duration=0.3)
     with pytest.raises(Exception, match="rows of another study"):
         run_study(other, out, resume=True, progress=False)
     run_study(own, out, resume=True, progress=False, workers=1)
