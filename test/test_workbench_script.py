@@ -156,6 +156,8 @@ def test_entries_are_the_commands_of_the_hand() -> None:
     ]
 
 
-@pytest.mark.parametrize("text", ["tip", "on", "yes", "null", "true", "inf", "nan", "com", "release", "", " a", "1e3", ".inf"])
+@pytest.mark.parametrize(
+    "text", ["tip", "on", "yes", "null", "true", "inf", "nan", "com", "release", "", " a", "1e3", ".inf"]
+)
 def test_text_comes_back_from_yaml_as_text(text: str) -> None:
     assert yaml.safe_load(flow({"at": text})) == {"at": text}
