@@ -108,7 +108,7 @@ def total_energy(y, string, gravity):
     return kinetic, kinetic - float(gravity @ position) + 0.5 * string.stiffness * stretch**2
 
 
-@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e9])
+@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
 def test_discrete_gradient_keeps_energy_through_slack_and_taut_at_any_stiffness(stiffness):
     h = 1e-3
     problem, y, string, gravity = pendulum(stiffness, h)
