@@ -13,7 +13,6 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
 import problems
 from motion_measures import energy
 from problem_references import reference_row
-
 from rigid_proto_ros.core.body import make_body
 from rigid_proto_ros.core.string import StringSettings
 
