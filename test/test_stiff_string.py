@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A body on a string of any stiffness, from one that a step resolves to one that swings sixteen times within it."""
+"""A body on a string of any stiffness, from one that a step resolves to one that swings many times within it."""
 
 import sys
 from pathlib import Path
@@ -61,7 +61,7 @@ def energy_error(problem, integrator, duration_s, every_s):
 def test_a_string_of_any_stiffness_keeps_the_energy(bilateral, frequency):
     problem = problems.string_problem(frequency, 0.0, bilateral, 10.0)
     # Measured 4e-14 at most.
-    assert energy_error(problem, "discrete_gradient", 10.0, 0.013) <= 1e-12
+    assert energy_error(problem, "discrete_gradient", 10.0, 0.0125) <= 1e-12
 
 
 @pytest.mark.parametrize("frequency", [10.0, 1e3])
@@ -69,7 +69,7 @@ def test_a_string_of_any_stiffness_keeps_the_energy(bilateral, frequency):
 def test_auto_keeps_the_energy_on_a_string(bilateral, frequency):
     problem = problems.string_problem(frequency, 0.0, bilateral, 10.0)
     # Measured 8e-12 at most.
-    assert energy_error(problem, "auto", 10.0, 0.13) <= 1e-9
+    assert energy_error(problem, "auto", 10.0, 0.125) <= 1e-9
 
 
 @pytest.mark.stress
@@ -77,7 +77,7 @@ def test_auto_keeps_the_energy_on_a_string(bilateral, frequency):
 @pytest.mark.parametrize("bilateral", [True, False], ids=["bilateral", "pull-only"])
 def test_auto_keeps_the_energy_on_a_string_of_any_stiffness(bilateral, frequency):
     problem = problems.string_problem(frequency, 0.0, bilateral, 10.0)
-    assert energy_error(problem, "auto", 10.0, 0.013) <= 1e-9
+    assert energy_error(problem, "auto", 10.0, 0.0125) <= 1e-9
 
 
 @pytest.mark.stress
@@ -90,5 +90,4 @@ def test_a_damped_string_leaves_the_body_where_it_belongs(bilateral, frequency, 
     simulation = hung(problem, integrator)
     state = simulation.advance(SECOND)
     exact = reference_row(problem)
-    # Measured 4e-4 rad at most.
     assert angle_between(state.orientation_xyzw, rotation_of(exact[3:7])) <= 5e-3
