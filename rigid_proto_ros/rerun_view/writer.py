@@ -40,7 +40,7 @@ PICTURES_WAITING = 1000
 """As many of them go out at once."""
 
 REPEATED_ROWS = 16384
-"""After as many states viewers are told again what holds since long: a seventh of what the live server keeps."""
+"""After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
 
 MOTION_ARROWS = 0.7
 """Length of the arrows of ω and L against those of loads."""
@@ -354,7 +354,10 @@ class SceneWriter:
             (e.ANGULAR_VELOCITY, w, MIDDLING_SPIN),
             (e.MOMENTUM, L, spin_of_middling),
         ):
-            self._send_rows(entity, times, rr.Arrows3D.columns(vectors=_drawn(vectors, reference, self._size)))
+            # None at rest: one of no length would still have its name written beside it.
+            turns = vectors.any(axis=1)
+            drawn = rr.Arrows3D.columns(vectors=_drawn(vectors[turns], reference, self._size))
+            self._send_rows(entity, times, drawn.partition(turns.astype(int)))
         if self._tip is not None:
             spacing = 1.5 * TRAIL_RADIUS * self._size
             points, counts = self._trail.between(times_ns, rows, self._tip, spacing)
