@@ -196,9 +196,9 @@ class Page:
             raise
         self.paused = paused
 
-    async def open_link(self, text: str) -> None:
+    def follow_link(self, link: str) -> None:
         """Bring the node where a link leads, once a page is open."""
-        await self._session.open_link(text)
+        self._following = self.loop.create_task(self._session.open_link(link))
 
     def say(self, text: str) -> None:
         """A line to all pages."""
