@@ -348,9 +348,8 @@ class Page:
             view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.7 * size))
             view.show_ghost(None if ghost is None else ghost.at(moment))
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
-        tied = self.acting.string
-        stretched = 0.0 if tied is None or looking else tied.potential_energy(setup.body, state)
-        self._readouts.show(now_s, self.scenario, state, stretched, [])
+        stretched = 0.0 if looking else self.acting.string_energy(setup, state)
+        self._readouts.show(now_s, self.scenario, state, stretched)
 
     def _shown_state(self) -> State:
         if self.looking_at is not None:

@@ -153,7 +153,7 @@ class SceneView:
         axes[:, 1] = np.diag(1.25 * self._radius / unit * np.sqrt(body.principal_moments / body.principal_moments[2]))
         see_through = {"opacity": 0.3, "cast_shadow": False, "receive_shadow": False}
         made = {
-            "COM": scene.add_icosphere("/body/com", 0.035, (30, 30, 30), opacity=0.8),
+            "COM": scene.add_icosphere("/body/com", 0.02, (30, 30, 30)),
             "Principal axes": scene.add_arrows(
                 "/body/axes", axes, AXES_COLOURS, wxyz=turned, shaft_radius=0.008, head_radius=0.022, head_length=0.06
             ),
