@@ -15,6 +15,7 @@ VERSION = next(
 # Real rclpy on Fast DDS from PyPI. An extra, because a machine with a ROS installation must keep that one's.
 ROS = ["ros-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 MCAP = ["mcap>=1.2,<2"]
+SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 TEST = [
@@ -39,14 +40,21 @@ setup(
         (SHARE, ["package.xml"]),
         *(
             (f"{SHARE}/{folder}", found)
-            for folder in ("config", "msg_examples")
+            for folder in ("config", "config/studies", "msg_examples")
             if (found := sorted(glob(f"{folder}/*.*")))
         ),
         *((f"{SHARE}/{folder}", found) for folder in ("launch",) if (found := sorted(glob(f"{folder}/*.py")))),
     ],
     python_requires=">=3.11,<3.14",
     install_requires=["numpy>=1.26", "numba>=0.59", "trimesh>=4.4", "PyYAML>=6.0"],
-    extras_require={"ros": ROS, "rerun": RERUN, "mcap": MCAP, "workbench": WORKBENCH, "test": TEST},
+    extras_require={
+        "ros": ROS,
+        "rerun": RERUN,
+        "mcap": MCAP,
+        "workbench": WORKBENCH,
+        "sweep": SWEEP,
+        "test": TEST,
+    },
     zip_safe=False,
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",

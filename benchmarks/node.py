@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the node costs, in real processes: CPU, rate, jitter, latency, start-up, memory, floods, several bodies.
+"""What the node costs, in real processes: CPU, rate, jitter, latency, start-up, memory, floods, several bodies, skipped work.
 
-python benchmarks/node.py [--short]      writes results/node.csv, with the machine's load beside each figure.
+    python benchmarks/node.py [--short] [--only start_up,processor,...] [--out FOLDER]
+
+Writes node.csv and node_skips.csv, with the machine's load beside each figure; benchmarks/node_figure.py draws from them.
 """
 
 from __future__ import annotations
@@ -9,41 +11,67 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import os
 import statistics
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import psutil
 
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
 from node_processes import Process, client, node
+from node_skips import skips
 from result_table import ResultTable
 
 RESULTS = Path(__file__).parent / "results"
 SPIN = "initial.angular_velocity:=[0.05, 0.1, 12.0]"
 KILOHERTZ = "publish_rate:=1000.0"
+COLUMNS = ("what", "figure", "value", "unit", "load_1min", "cores")
+SKIP_COLUMNS = ("skipped", "unit", "done", "as_it_is", "load_1min")
 
 
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parts = {
+        "start_up": start_up,
+        "processor": processor,
+        "baselines": baselines,
+        "rate": rate,
+        "latency": latency,
+        "recording": recording,
+        "flood": flood,
+        "bodies": bodies,
+    }
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--short", action="store_true", help="a tenth of the time, for a look")
-    seconds = 2.0 if parser.parse_args().short else 15.0
-    table = ResultTable(RESULTS / "node.csv", ("what", "figure", "value", "unit", "load_1min"))
+    parser.add_argument("--only", default=",".join((*parts, "skips")), help="names of parts")
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    options = parser.parse_args()
+    seconds, wanted = (2.0 if options.short else 15.0), options.only.split(",")
+    table = ResultTable(options.out / "node.csv", COLUMNS)
 
     def note(what: str, figure: str, value: float, unit: str) -> None:
         load = psutil.getloadavg()[0]
-        table.add({"what": what, "figure": figure, "value": value, "unit": unit, "load_1min": load})
+        entry = {"what": what, "figure": figure, "value": value, "unit": unit, "load_1min": load}
+        table.add({**entry, "cores": os.cpu_count()})
         print(f"{what:58s} {figure:10s} {value:12.4g} {unit:8s} (load {load:.1f})", flush=True)
 
-    start_up(note)
-    processor(note, seconds)
-    baselines(note, seconds)
-    rate_and_latency(note, seconds)
-    recording(note, seconds)
-    floods(note, 60.0 if seconds > 10 else 5.0)
-    bodies(note, seconds)
-    table.write()
+    for name, part in parts.items():
+        if name in wanted:
+            part(note, seconds)
+            # What has been measured is kept if the run is ended.
+            table.write()
+    if "skips" in wanted:
+        skipped = ResultTable(options.out / "node_skips.csv", SKIP_COLUMNS)
+        for what, unit, done, as_it_is in skips(seconds):
+            load = psutil.getloadavg()[0]
+            skipped.add({"skipped": what, "unit": unit, "done": done, "as_it_is": as_it_is, "load_1min": load})
+            ratio = f"{done / as_it_is:8.3g} times" if as_it_is else "   never done"
+            print(f"{what:88s} {done:10.4g} {as_it_is:10.4g} {unit:11s} {ratio} (load {load:.1f})", flush=True)
+        skipped.write()
 
 
 @contextlib.contextmanager
@@ -54,7 +82,7 @@ def listeners():
         yield
 
 
-def start_up(note) -> None:
+def start_up(note, seconds: float) -> None:
     """From the start of the process until it says that it flies, kernels and mesh cached by a first start."""
     node().end()
     for label, parameters in (("start", []), ("start with recording", [f"record:={_recording()}"])):
@@ -93,28 +121,30 @@ def baselines(note, seconds: float) -> None:
                 )
 
 
-def rate_and_latency(note, seconds: float) -> None:
-    """Intervals between publications by the middleware's own stamps, and from wrench to the twist that shows it."""
-    with node(KILOHERTZ, SPIN, "wrench_timeout:=0.0"):
-        with client("subscribe", "twist", str(2 + seconds)) as listener:
-            time.sleep(4 + seconds)
-            for figure, value in json.loads(listener.end()).items():
-                note(
-                    "1 kHz, publications",
-                    figure,
-                    value,
-                    "" if figure == "messages" else "1/s" if figure == "rate" else "ms",
-                )
-        with client("latency", str(int(20 * seconds))) as listener:
-            listener.popen.wait(120)
-            for figure, value in json.loads(listener.end()).items():
-                note("wrench to first twist showing it, 1 kHz", figure, value, "" if figure == "count" else "ms")
+def rate(note, seconds: float) -> None:
+    """Intervals between publications by the middleware's own stamps: rate and jitter."""
+    with node(KILOHERTZ, SPIN), client("subscribe", "twist", str(2 + seconds)) as listener:
+        units = {"messages": "", "rate": "1/s"}
+        for figure, value in result_of(listener).items():
+            note("1 kHz, publications", figure, value, units.get(figure, "ms"))
+
+
+def latency(note, seconds: float) -> None:
+    """From the publication of a wrench to that of the first twist that shows it."""
+    with node(KILOHERTZ, SPIN, "wrench_timeout:=0.0"), client("latency", str(int(20 * seconds))) as sender:
+        for figure, value in result_of(sender).items():
+            note("wrench to first twist showing it, 1 kHz", figure, value, "" if figure == "count" else "ms")
+
+
+def result_of(process: Process) -> dict:
+    """What a client prints when it is done."""
+    process.popen.wait(600)
+    return json.loads(process.end())
 
 
 def recording(note, seconds: float) -> None:
-    """What a recording at 1 kHz adds."""
-    path = _recording()
-    with node(KILOHERTZ, SPIN, f"record:={path}") as process:
+    """What a recording at 1 kHz costs."""
+    with node(KILOHERTZ, SPIN, f"record:={_recording()}") as process:
         note("1 kHz, recording, nobody listens", "cpu", process.cpu_share(seconds), "%")
 
 
@@ -122,30 +152,33 @@ def _recording() -> str:
     return str(Path(tempfile.mkdtemp()) / "benchmark.rrd")
 
 
-def floods(note, seconds: float) -> None:
-    """10 000 wrenches a second: rate, memory, and every message accounted for."""
+def flood(note, seconds: float) -> None:
+    """10 000 wrenches a second for a minute: rate, memory, and every message accounted for."""
+    seconds = 60.0 if seconds > 10.0 else 5.0
+    what = "flood of 10 000 wrenches/s"
     with node(KILOHERTZ, SPIN) as process, client("subscribe", "twist", str(seconds + 4)) as listener:
         time.sleep(2.0)
-        before = process.memory_mb()
         with client("flood", "10000", str(seconds)) as flooder:
-            share = process.cpu_share(seconds + 3)
+            time.sleep(2.0)
+            before = process.memory_mb()
+            share = process.cpu_share(seconds - 2.0)
+            growth = process.memory_mb() - before
+            sent = json.loads(flooder.popen.stdout.readline())["sent"]
+            time.sleep(1.0)
             counters = diagnostics()
-            sent = json.loads(flooder.end())["sent"]
-        note("flood of 10 000 wrenches/s", "cpu", share, "%")
-        note("flood of 10 000 wrenches/s", "sent", sent, "")
-        note("flood of 10 000 wrenches/s", "received", float(counters["wrench_received"]), "")
-        note("flood of 10 000 wrenches/s", "gaps", float(counters["sequence_gaps"]), "")
-        note("flood of 10 000 wrenches/s", "lost time", float(counters["real_time_lost_s"]), "s")
-        note("flood of 10 000 wrenches/s", "rss growth", process.memory_mb() - before, "MB")
-        time.sleep(2.0)
-        note("flood of 10 000 wrenches/s, publications", "rate", json.loads(listener.end())["rate"], "1/s")
+        note(what, "cpu", share, "%")
+        note(what, "sent", sent, "")
+        note(what, "received", float(counters["wrench_received"]), "")
+        note(what, "gaps", float(counters["sequence_gaps"]), "")
+        note(what, "lost time", float(counters["real_time_lost_s"]), "s")
+        note(what, "rss growth", growth, "MB")
+        note(f"{what}, publications", "rate", result_of(listener)["rate"], "1/s")
 
 
 def diagnostics() -> dict[str, str]:
     """The node's newest counters."""
     with client("diagnostics") as process:
-        process.popen.wait(20)
-        return json.loads(process.end())
+        return result_of(process)
 
 
 def bodies(note, seconds: float) -> None:
@@ -156,7 +189,7 @@ def bodies(note, seconds: float) -> None:
         scenes.append(folder / f"body_{k}.yaml")
         scenes[k].write_text(f"/**:\n  ros__parameters:\n    {SPIN.replace(':=', ': ')}\n", encoding="utf-8")
     shares = {}
-    for count in (1, 4, 16, 64):
+    for count in (1, 2, 4, 8, 16, 32, 64):
         with Process("-m", "rigid_proto_ros.ros.main", "--bodies", *map(str, scenes[:count])) as process:
             process.wait_until_flying()
             time.sleep(2.0)

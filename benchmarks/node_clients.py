@@ -67,10 +67,15 @@ def latency(count: str) -> None:
                 twists.append((taken[1]["source_timestamp"], float(velocity)))
         times = np.array([t for t, _ in twists])
         slopes = np.diff([v for _, v in twists])
-        after = np.nonzero((times[1:] > sent) & (np.sign(slopes) == -sign))[0]
+        before = np.nonzero(times[1:] <= sent)[0]
+        if not len(before):
+            continue
+        # Under a held force the velocity changes evenly; where it doesn't, the new force has acted for a while.
+        even = slopes[before[-1]]
+        after = np.nonzero((times[1:] > sent) & (np.abs(slopes - even) > 0.02 * abs(even)))[0]
         if len(after):
             delays.append((times[1:][after[0]] - sent) * 1e-6)
-        twists = twists[-2:]
+        twists = twists[-3:]
     print(json.dumps({"count": len(delays), **{f"p{q}": float(np.percentile(delays, q)) for q in (50, 99)}}))
 
 

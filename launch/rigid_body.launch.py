@@ -19,7 +19,7 @@ ARGUMENTS = (
     ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),
     ("reset", "true", "reset first, so that the script's times are simulated time itself"),
     ("viewer", "none", "live view in Rerun: none, web or native"),
-    ("record", "", "record the session to this .rrd file"),
+    ("record", "", "record the session to this .rrd or .mcap file"),
     ("use_sim_time", "false", "simulated time follows /clock"),
 )
 

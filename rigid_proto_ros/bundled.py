@@ -30,6 +30,16 @@ def scene_names() -> list[str]:
     return sorted(_files(_shared("config"), ".yaml"))
 
 
+def study_path(name: str) -> Path:
+    """Study ``config/studies/<name>.yaml``. Raises InputError naming the studies there are."""
+    return _named("study", name, _files(_shared("config/studies"), ".yaml"))
+
+
+def study_names() -> list[str]:
+    """Names of the bundled studies, sorted."""
+    return sorted(_files(_shared("config/studies"), ".yaml"))
+
+
 def example_path(name: str) -> Path:
     """Poke script or message ``msg_examples/<name>.yaml``. Raises InputError naming the examples there are."""
     return _named("example", name, _files(_shared("msg_examples"), ".yaml"))

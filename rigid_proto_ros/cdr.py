@@ -7,6 +7,7 @@ header 00 01 00 00; strings as length with their NUL, then the bytes; doubles al
 
 from __future__ import annotations
 
+import functools
 import struct
 
 _HEADER = b"\x00\x01\x00\x00"
@@ -24,8 +25,16 @@ def _aligned(body: bytes, to: int) -> bytes:
 
 def stamped_doubles(stamp_ns: int, frame_id: str, doubles) -> bytes:
     """PoseStamped (7: x y z, x y z w), TwistStamped (6) or WrenchStamped (6): a header and doubles."""
-    body = _aligned(_stamp_and_frame(stamp_ns, frame_id), 8)
-    return _HEADER + body + struct.pack(f"<{len(doubles)}d", *doubles)
+    frame = frame_id.encode()
+    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    layout = _stamped_layout(len(frame) + 1, len(doubles))
+    return layout.pack(_HEADER, seconds, nanoseconds, len(frame) + 1, frame, *doubles)
+
+
+@functools.lru_cache(maxsize=1024)
+def _stamped_layout(length: int, count: int) -> struct.Struct:
+    """Header, stamp, a string of ``length`` with its NUL, and doubles aligned to 8."""
+    return struct.Struct(f"<4siII{length}s{-(12 + length) % 8}x{count}d")
 
 
 def wrench_stamped(stamp_ns: int, frame_id: str, force, torque) -> bytes:

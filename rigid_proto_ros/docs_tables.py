@@ -86,7 +86,7 @@ def modules() -> str:
     for path in sorted(package.rglob("*.py")):
         if not path.name.startswith("__"):
             folders.setdefault(path.parent, []).append(path)
-    order = ("core", "core/integrators", "", "bodies", "rerun_view", "ros", "cli")
+    order = ("core", "core/integrators", "", "bodies", "sweep", "rerun_view", "ros", "cli")
     known = {place: i for i, place in enumerate(order)}
     places = sorted(folders, key=lambda f: (known.get(f.relative_to(package).as_posix().strip("."), len(order)), f))
     lines = []

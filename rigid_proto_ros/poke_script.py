@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import yaml
@@ -39,7 +39,8 @@ _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
 
 @dataclass(frozen=True)
 class ScriptCommand:
-    """One command of an expanded script. t_ns: when it acts, from the script's start.
+    """One command of an expanded script. t_ns: when it acts, from the script's start. entry: which entry of the script it
+    comes from, counted from 1.
 
     kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and point
     (3,), or the name of a contact to attach to. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
@@ -53,6 +54,7 @@ class ScriptCommand:
     changes: dict | None = None
     point: tuple = (0.0, 0.0, 0.0)
     contact: str = ""
+    entry: int = field(default=0, compare=False)
 
     @property
     def topic(self) -> str:
@@ -131,7 +133,8 @@ def expand_script(
             for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}", max_commands):
                 jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
                 at_ns = max(0, t_ns + offset_ns + jitter_ns)
-                commands += _expand(entry, at_ns, where, wrench_timeout, max_commands)
+                expanded = _expand(entry, at_ns, where, wrench_timeout, max_commands)
+                commands += [replace(command, entry=number) for command in expanded]
             if len(commands) > max_commands:
                 raise InputError(where, f"over {max_commands} commands", f"at most {max_commands}")
     return sorted(commands, key=lambda command: command.t_ns)

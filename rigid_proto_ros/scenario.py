@@ -66,7 +66,7 @@ class Scenario:
         if "density" in changes and "mass" not in changes:
             values["mass"] = 0.0
         reuse = mesh is None and all(values[name] == self.values[name] for name in _MESH_PARAMETERS)
-        return _build(values, self.body_mesh if reuse else _load(values, mesh))
+        return build_scenario(values, self.body_mesh if reuse else load_body_mesh(values, mesh))
 
     def with_inertia(self, mass: float, com, tensor6, relative: bool) -> Scenario:
         """The scenario with an explicit inertia, as a message gives it; raises InputError.
@@ -106,10 +106,11 @@ def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Sce
     mesh: a mesh at hand, used instead of loading the one that the parameter names.
     """
     complete = {**parameters.defaults(), **parameters.convert_all(values)}
-    return _build(complete, _load(complete, mesh))
+    return build_scenario(complete, load_body_mesh(complete, mesh))
 
 
-def _load(values, mesh: Mesh | None = None) -> BodyMesh | None:
+def load_body_mesh(values: Mapping[str, object], mesh: Mesh | None = None) -> BodyMesh | None:
+    """The mesh that checked values name (or the one at hand), with its moments; None without one. Raises MeshError."""
     if values["mesh"] == "":
         if values["inertia_model"] != "explicit":
             raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
@@ -121,7 +122,8 @@ def _load(values, mesh: Mesh | None = None) -> BodyMesh | None:
     return BodyMesh(body.mesh, body.moments, Surface(body.vertices, np.ascontiguousarray(triangles)))
 
 
-def _build(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:
+def build_scenario(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:
+    """The scenario of a complete set of checked values whose mesh is loaded already; raises InputError."""
     setup, warnings = _setup(values, body_mesh)
     ghost = {name: values[f"ghost.{name}"] for name in ("inertia_model", "integrator") if values[f"ghost.{name}"]}
     ghost_setup = _setup({**values, **ghost}, body_mesh)[0] if ghost else None

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from .core.errors import InputError
@@ -14,6 +16,7 @@ from .recorded_session import RecordedSession
 from .replay import resimulation
 from .scenario import Scenario
 from .session_messages import PROJECTIONS
+from .session_recorder import make_recorder
 
 
 def play(session: RecordedSession, observer: Observer, given: Scenario | None = None) -> None:
@@ -39,6 +42,26 @@ def play(session: RecordedSession, observer: Observer, given: Scenario | None = 
         again.simulation.tell_status()
         if again.ghost is not None:
             again.ghost.advance(time_ns)
+
+
+def record(runs: list[RecordedSession], path: str | Path, given: Scenario | None = None) -> None:
+    """Play all runs of a session into a recording, .rrd or .mcap; given: the scene of a session that lacks it.
+
+    Raises InputError for a session without a scene and a file that can't be written.
+    """
+    for session in runs:
+        if not session.scene and given is None:
+            raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
+    recorder = make_recorder(str(path), runs[-1].node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
+    try:
+        for number, session in enumerate(runs):
+            if number:
+                recorder.reset()
+            play(session, recorder, given)
+    finally:
+        recorder.close()
+    if error := getattr(recorder, "error", ""):
+        raise InputError("--record", str(path), f"a file that can be written ({error})")
 
 
 def sorted_states(session: RecordedSession):

@@ -22,13 +22,16 @@ FLOOR = 32.0 * 2.0**-52
 
 @dataclass(frozen=True)
 class CommittedStep:
-    """Problem (SIZE,) of its segment, variables before and after, times from the segment's start [ns]."""
+    """Problem (SIZE,) of its segment, variables before and after, times from the segment's start [ns], and whether the
+    integrator had reported by then that rounding, not the accuracy, sets what a step may err.
+    """
 
     problem: np.ndarray
     before: np.ndarray
     after: np.ndarray
     begin_ns: int
     end_ns: int
+    floor_binds: bool
 
     @property
     def length(self) -> float:
@@ -61,6 +64,7 @@ def committed_steps(
                         segment._variables.copy(),
                         begin_ns - origin_ns,
                         segment.committed_ns - origin_ns,
+                        segment.stepper.floor_binds,
                     )
                 )
                 break

@@ -76,8 +76,8 @@ class _Series:
     q: list
     v: list
     w: list
-    stretch: list = field(default_factory=list)
-    tension: list = field(default_factory=list)
+    span: list = field(default_factory=list)
+    rate: list = field(default_factory=list)
 
 
 def reference_motion(problem: ReferenceProblem, row, times, digits: int = 40) -> list[list]:
@@ -107,8 +107,22 @@ def _starts_taut(problem, state, order) -> bool:
         return True
     series = _series(problem, state, order, False)
     # Only a start exactly on the switch needs a look ahead.
-    t = _step(series, 20) * mpf("1e-6") if series.stretch[0] == 0 or series.tension[0] == 0 else mpf(0)
-    return _polynomial(series.stretch, t) > 0 and _polynomial(series.tension, t) > 0
+    t = mpf(0) if all(_stretch_and_tension(problem.string, series, mpf(0))) else _step(series, 20) * mpf("1e-6")
+    return _is_taut(problem.string, series, t)
+
+
+def _stretch_and_tension(string, series, t):
+    """l − rest length and k(l − rest length) + c l' at t, from the span itself: the series of l has poles of its own."""
+    if string.rest_length == 0.0:
+        return mpf(1), mpf(1)
+    span, rate = ([_polynomial(c, t) for c in part] for part in (series.span, series.rate))
+    length = mpmath.sqrt(mp.fdot(span, span))
+    stretch = length - mpf(string.rest_length)
+    return stretch, mpf(string.stiffness) * stretch + mpf(string.damping) * mp.fdot(span, rate) / length
+
+
+def _is_taut(string, series, t) -> bool:
+    return all(x > 0 for x in _stretch_and_tension(string, series, t))
 
 
 def _switch(problem, series, h, taut):
@@ -117,24 +131,30 @@ def _switch(problem, series, h, taut):
     Taut means stretched and pulling. The grid is far finer than an oscillation, of which a step spans few.
     """
     string = problem.string
-    if string is None or string.bilateral:
+    if string is None or string.bilateral or string.rest_length == 0.0:
         return None
     # Doubles find the interval, high precision the time in it.
     points = 200
     grid = np.linspace(0.0, 1.0, points + 1)[1:]
-    scaled = [[float(c * h**k) for k, c in enumerate(part)] for part in (series.stretch, series.tension)]
-    is_taut = np.logical_and(*(np.polynomial.polynomial.polyval(grid, part) > 0.0 for part in scaled))
-    switched = np.flatnonzero(is_taut != taut)
+    span, rate = (
+        np.array(
+            [np.polynomial.polynomial.polyval(grid, [float(c * h**k) for k, c in enumerate(part)]) for part in row]
+        )
+        for row in (series.span, series.rate)
+    )
+    length = np.sqrt((span * span).sum(axis=0))
+    stretch = length - string.rest_length
+    tension = string.stiffness * stretch + string.damping * (span * rate).sum(axis=0) / length
+    switched = np.flatnonzero(((stretch > 0.0) & (tension > 0.0)) != taut)
     if switched.size == 0:
         return None
-    return _bisect(series, h * int(switched[0]) / points, h * int(switched[0] + 1) / points, taut)
+    return _bisect(string, series, h * int(switched[0]) / points, h * int(switched[0] + 1) / points, taut)
 
 
-def _bisect(series, low, high, taut):
+def _bisect(string, series, low, high, taut):
     for _ in range(int(mp.prec) + 10):
         middle = (low + high) / 2
-        is_taut = _polynomial(series.stretch, middle) > 0 and _polynomial(series.tension, middle) > 0
-        low, high = (low, middle) if is_taut != taut else (middle, high)
+        low, high = (low, middle) if _is_taut(string, series, middle) != taut else (middle, high)
     return high
 
 
@@ -229,7 +249,7 @@ def _series(problem: ReferenceProblem, state: ReferenceState, order: int, taut: 
             w[i].append(sum(inverse[i, j] * torque[j] for j in range(3)) / (k + 1))
     if string is None:
         return _Series(x, q, v, w)
-    return _Series(x, q, v, w, string.stretch, string.tension)
+    return _Series(x, q, v, w, string.d, string.rate)
 
 
 def _append_rotation(R, products):
@@ -245,7 +265,7 @@ def _append_rotation(R, products):
 
 
 class _StringSeries:
-    """Series of the string's length l = |target − point|, its stretch and tension, and what it does to the body."""
+    """Series of the string's length l = |target − point|, its tension, and what it does to the body."""
 
     def __init__(self, string: ReferenceString, R, x, v, w) -> None:
         self.string, self.R, self.x, self.v, self.w = string, R, x, v, w
@@ -254,7 +274,7 @@ class _StringSeries:
         self.d = [[], [], []]
         self.rate = [[], [], []]
         self.length, self.inverse, self.unit = [], [], [[], [], []]
-        self.stretch, self.tension, self.pull = [], [], [[], [], []]
+        self.tension, self.pull = [], [[], [], []]
 
     def append(self, k: int, taut: bool):
         """Order k of the force on the body (world) and of the torque about the COM (body axes)."""
@@ -271,13 +291,11 @@ class _StringSeries:
         if s.rest_length == 0.0:
             # Regular at zero length, and always taut: the force is linear in d and its rate.
             pull = [stiffness * self.d[i][k] + damping * self.rate[i][k] for i in range(3)]
-            self.stretch.append(mpf(1) if k == 0 else mpf(0))
-            self.tension.append(mpf(1) if k == 0 else mpf(0))
         else:
             self._append_length(k)
             rate = sum(_dot(self.unit[i], self.rate[i], k) for i in range(3))
-            self.stretch.append(self.length[k] - (rest if k == 0 else 0))
-            self.tension.append(stiffness * self.stretch[k] + damping * rate)
+            stretch = self.length[k] - (rest if k == 0 else 0)
+            self.tension.append(stiffness * stretch + damping * rate)
             pull = [_dot(self.tension, self.unit[i], k) if taut else mpf(0) for i in range(3)]
         for i in range(3):
             self.pull[i].append(pull[i])

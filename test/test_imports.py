@@ -28,6 +28,7 @@ ALLOWED = {
         f"{PACKAGE}.parameters",
         f"{PACKAGE}.session_bag",
         f"{PACKAGE}.session_branch",
+        f"{PACKAGE}.sweep.",
         f"{PACKAGE}.ros.",
         f"{PACKAGE}.cli.",
     ),
@@ -35,7 +36,10 @@ ALLOWED = {
     "manifold3d": (f"{PACKAGE}.bodies.surfaces",),
     "rerun": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.inspect_view"),
     "rerun_bindings": (f"{PACKAGE}.rerun_view",),
-    "pyarrow": (f"{PACKAGE}.rerun_view",),  # comes with rerun, as PIL does
+    "pyarrow": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.sweep.table"),  # comes with rerun, as PIL does
+    "scipy": (f"{PACKAGE}.sweep.sampling",),
+    "distributed": (f"{PACKAGE}.sweep.cluster",),
+    "matplotlib": (f"{PACKAGE}.sweep.plot",),
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
     "viser": (f"{PACKAGE}.workbench",),
@@ -122,6 +126,11 @@ def test_ros_imports_neither_the_page_nor_the_command_line() -> None:
 def test_the_page_does_not_import_the_command_line() -> None:
     page, line = f"{PACKAGE}.workbench.", f"{PACKAGE}.cli."
     assert not complaints(lambda module, name: not (within(module, page) and within(name, line)))
+
+
+def test_sweeps_are_imported_by_the_command_line_alone() -> None:
+    sweep = f"{PACKAGE}.sweep."
+    assert not complaints(lambda module, name: within(module, sweep, f"{PACKAGE}.cli.") or not within(name, sweep))
 
 
 def test_the_generator_of_bodies_is_imported_by_nobody() -> None:

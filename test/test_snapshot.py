@@ -12,6 +12,7 @@ import rerun_flight as flight
 from PIL import Image
 
 from rigid_proto_ros.cli import snapshot as command
+from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view.layout import BACKGROUND
@@ -74,6 +75,23 @@ def test_tabs_and_views_behind_the_front_one_can_be_drawn_by_name(recording, tmp
         assert part.width < whole.width == 1000
     args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"), "--view", "nothing")
     with pytest.raises(InputError, match="Debugging.*Flight.*Lesson"):
+        args.run(args)
+
+
+def test_a_bag_is_drawn_as_the_recording_of_the_same_flight(tmp_path):
+    pytest.importorskip("mcap")
+    bag, rrd = tmp_path / "s.mcap", tmp_path / "s.rrd"
+    assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(bag), "--record", str(rrd)]) == 0
+    pictures = []
+    for session in (bag, rrd):
+        picture = session.with_suffix(session.suffix + ".png")
+        take(str(session), "--at", "0.4", "-o", str(picture), "--view", "Flight", "--size", "800x500")
+        with Image.open(picture) as image:
+            pictures.append(np.asarray(image.convert("RGB"), dtype=float))
+    assert pictures[0].shape == pictures[1].shape
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.5
+    args = arguments(str(bag), "--at", "0.6", "-o", str(tmp_path / "x.png"))
+    with pytest.raises(InputError, match="^--at: "):
         args.run(args)
 
 

@@ -10,14 +10,15 @@ from random_scenes import DURATION_S, random_scene
 from rigid_proto_ros.core.integrators.error_measure import jerk_of_rounding, scales
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)
-SCENES = 6
+SCENES = 10
 STRESS_SCENES = 300
+STRESS_SCENES_A_TEST = 10
 STEPS_PER_SCENE = 6
 
 
-def allowed(step, accuracy, reported):
+def allowed(step, accuracy):
     """accuracy·h and the floor; where the floor is reported to bind, what a rounding of a stiff string's knot does too."""
-    if not reported:
+    if not step.floor_binds:
         return accuracy * step.length + FLOOR
     _, spin, _, speed = scales(step.before, step.problem, step.begin_ns * 1e-9)
     return accuracy * step.length + 2.0 * FLOOR + jerk_of_rounding(step.problem, spin, speed) * step.length
@@ -33,9 +34,8 @@ def check(seeds):
             )
             assert not simulation.failure
             assert np.isfinite(simulation.state.row).all()
-            reported = simulation._segment.stepper.floor_binds or accuracy == ACCURACIES[-1]
             for step in steps:
-                share = local_error(step) / allowed(step, accuracy, reported)
+                share = local_error(step) / allowed(step, accuracy)
                 worst, judged = max(worst, share), judged + 1
                 if share > 1.0:
                     failures.append(
@@ -51,5 +51,6 @@ def test_auto_meets_its_accuracy_in_random_scenes():
 
 
 @pytest.mark.stress
-def test_auto_meets_its_accuracy_in_three_hundred_random_scenes():
-    check(range(1000, 1000 + STRESS_SCENES))
+@pytest.mark.parametrize("first", range(1000, 1000 + STRESS_SCENES, STRESS_SCENES_A_TEST))
+def test_auto_meets_its_accuracy_in_three_hundred_random_scenes(first):
+    check(range(first, first + STRESS_SCENES_A_TEST))

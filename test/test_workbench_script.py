@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import pytest
-from hand_session import random_hand_session
+import yaml
+from hand_session import SCENE, HandSession, random_hand_session
 
+from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.offline import OfflineRun
-from rigid_proto_ros.poke_script import parse_script
+from rigid_proto_ros.poke_script import ScriptCommand, parse_script
 from rigid_proto_ros.scenario import make_scenario
 from rigid_proto_ros.scene_file import read_scene_text
 from rigid_proto_ros.workbench.save_as_script import SavedScript, save_as_script
@@ -23,10 +25,132 @@ def flown(saved: SavedScript, until_ns: int) -> str:
     return run.simulation.state.sha256()
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_a_hand_session_saved_as_a_script_flies_again_to_the_bit(seed: int) -> None:
-    hand = random_hand_session(seed, seconds=6.0)
+def assert_flies_again(hand: HandSession) -> SavedScript:
     saved = save_as_script(hand.session())
+    assert flown(saved, hand.now_ns) == hand.simulation.state.sha256()
+    return saved
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_hand_session_saved_as_a_script_flies_again_to_the_bit(seed: int) -> None:
+    saved = assert_flies_again(random_hand_session(seed, seconds=4.0))
     assert saved.notes == []
     assert saved.commands > 10
-    assert flown(saved, hand.now_ns) == hand.simulation.state.sha256()
+
+
+@pytest.mark.stress
+def test_three_hundred_hand_sessions_fly_again_to_the_bit() -> None:
+    noted = 0
+    for seed in range(100, 400):
+        noted += bool(assert_flies_again(random_hand_session(seed, seconds=5.0)).notes)
+    assert noted < 30  # impulses along normals in one paused instant, whose order a script can't keep; measured 15
+
+
+def test_what_was_done_before_a_reset_is_no_part_of_it() -> None:
+    hand = HandSession(SCENE)
+    hand.set(mass=0.2)
+    hand.load(False, "world@tip", [0.03, 0.0, 0.0])
+    hand.wait(SECOND)
+    hand.reset()
+    hand.load(False, "world@tip", [0.0, 0.03, 0.0])
+    hand.wait(SECOND)
+    saved = assert_flies_again(hand)
+    assert saved.commands == 1
+    assert read_scene_text(saved.scene).values["mass"] == 0.2
+
+
+def test_sliders_of_a_paused_body_leave_one_entry_and_those_that_move_the_com_all_of_theirs() -> None:
+    hand = HandSession(SCENE)
+    hand.wait(SECOND)
+    hand.pause()
+    for k in range(40):
+        hand.set(mass=0.1 + 0.001 * k)
+    for k in range(40):
+        hand.set(ballast__tip=[0.001 * k, 0.0, 0.0, 0.07])
+    hand.wait(SECOND)
+    saved = assert_flies_again(hand)
+    assert saved.notes == []
+    changes = [entry["set"] for entry in yaml.safe_load(saved.script)]
+    assert [list(change) for change in changes].count(["mass"]) == 1
+    assert [list(change) for change in changes].count(["ballast.tip"]) == 40
+
+
+def test_release_and_changes_of_one_instant_keep_their_order() -> None:
+    hand = HandSession(SCENE)
+    hand.tie("body/mesh", [0.0, 0.0, 0.07])
+    hand.pull([0.1, 0.0, 0.0])
+    hand.wait(SECOND // 2)
+    hand.pause()
+    hand.set(string__attached=True, string__target=[0.0, 0.1, 0.0])
+    hand.set(string__target=[0.0, 0.2, 0.0])
+    hand.release()
+    hand.clear()
+    hand.set(string__attached=False)
+    hand.set(string__attached=True)
+    hand.set(string__stiffness=2.0)
+    hand.wait(SECOND // 2)
+    assert hand.simulation.string is not None
+    assert assert_flies_again(hand).notes == []
+
+
+def test_a_spelled_out_change_is_one_that_the_nodes_schedule_takes() -> None:
+    hand = HandSession(SCENE)
+    hand.pause()
+    for k in range(200):
+        hand.set(ballast__tip=[0.0001 * k, 0.0, 0.0, 0.07])
+    hand.wait(SECOND)
+    saved = assert_flies_again(hand)
+    assert saved.notes == []
+    for command in parse_script(saved.script):
+        text = command.schedule_text(command.t_ns)
+        assert len(text) <= 10_000
+        # As the node reads it: YAML, and a script of this one entry.
+        (again,) = parse_script(yaml.safe_dump([yaml.safe_load(text)]))
+        assert again == command
+
+
+def test_a_change_that_only_a_later_scene_allows_flies_again() -> None:
+    tensor = [1.0e-4, 0.0, 0.0, 2.0e-4, 0.0, 2.5e-4]
+    hand = HandSession({"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": tensor})
+    hand.wait(SECOND // 10)
+    hand.set(mesh="t_handle")
+    hand.wait(SECOND // 10)
+    hand.set(inertia_model="solid")
+    hand.load(False, "world@vertex/3", [0.01, 0.0, 0.0])
+    hand.wait(SECOND // 10)
+    assert make_scenario(hand.first.values).body_mesh is None
+    with pytest.raises(InputError):
+        hand.first.with_changes({"inertia_model": "solid"})
+    saved = save_as_script(hand.session())
+    assert yaml.safe_load(saved.script)[1]["set"]["mesh"] == "t_handle"
+
+
+def test_a_log_with_a_line_missing_is_refused() -> None:
+    hand = random_hand_session(1, seconds=2.0)
+    session = hand.session()
+    del session.events[3]
+    with pytest.raises(InputError):
+        save_as_script(session)
+
+
+def test_nothing_of_the_running_program_is_saved() -> None:
+    hand = HandSession({**SCENE, "record": "out.mcap", "viewer": "none", "start_paused": True})
+    hand.set(record="elsewhere.mcap")
+    hand.wait(SECOND)
+    saved = assert_flies_again(hand)
+    assert "mcap" not in saved.scene + saved.script
+    # The change cut a step of the motion: what stands for it does so too.
+    assert [command.kind for command in parse_script(saved.script)] == ["set"]
+
+
+def test_entries_are_the_commands_of_the_hand() -> None:
+    hand = HandSession(SCENE)
+    hand.wait(SECOND // 3)
+    hand.load(False, "normal@tip", [0.02, 0.0, 0.0])
+    hand.load(True, "body@point/0.01,0.02,0.03", [0.1, 0.2, 0.3], [0.0, 0.0, 1e-7])
+    hand.wait(SECOND // 3)
+    third = 333_333_333
+    assert parse_script(save_as_script(hand.session()).script) == [
+        ScriptCommand(third, "wrench", "body@point/0.01,0.02,0.03", (0.1, 0.2, 0.3), (0.0, 0.0, 1e-7)),
+        ScriptCommand(third, "poke", "normal@tip", (0.02, 0.0, 0.0)),
+    ]

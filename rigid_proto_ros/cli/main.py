@@ -18,6 +18,7 @@ from ..core.errors import InputError
 COMMANDS = {
     "inspect": "mass properties of a mesh, and a verdict on it",
     "simulate": "the simulation without ROS, as fast as the machine goes",
+    "sweep": "many variations of one scene into one table",
     "replay": "show, check or branch a recorded session",
     "snapshot": "a picture of a recorded session, without a display",
     "demo": "node, scripted pokes and recording in one go, ending by itself",

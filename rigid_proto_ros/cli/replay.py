@@ -43,7 +43,9 @@ def run(args: argparse.Namespace) -> int:
     if args.repair:
         print(f"  repaired: {args.repair}")
     if args.record:
-        _record(runs, args)
+        from ..session_playback import record
+
+        record(runs, args.record, given_scene(args.scene))
     _say_how_to_see_it(args)
     if args.as_scene:
         _branch(runs[-1], args)
@@ -113,39 +115,20 @@ def _progress(done: float) -> None:
         print(f"\r{100 * done:3.0f} % verified", end="\r", file=sys.stderr, flush=True)
 
 
-def _record(runs: list, args: argparse.Namespace) -> None:
-    from ..session_playback import play
-    from ..session_recorder import make_recorder
-
-    given = _given_scene(args)
-    for session in runs:
-        if not session.scene and given is None:
-            raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
-    recorder = make_recorder(args.record, runs[-1].node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
-    try:
-        for number, session in enumerate(runs):
-            if number:
-                recorder.reset()
-            play(session, recorder, given)
-    finally:
-        recorder.close()
-    if error := getattr(recorder, "error", ""):
-        raise InputError("--record", args.record, f"a file that can be written ({error})")
-
-
-def _given_scene(args: argparse.Namespace):
-    if not args.scene:
+def given_scene(path: str | None):
+    """The scene of this file, which was given for a session that lacks its own; None without one."""
+    if not path:
         return None
     from ..offline import read_scene
 
-    return read_scene(args.scene, None, lambda text: print(f"rigid_proto replay: {text}", file=sys.stderr))
+    return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
 def _branch(session, args: argparse.Namespace) -> None:
     from ..scenario import nanoseconds
     from ..session_branch import branch_at, recorded_branch
 
-    given, time_ns = _given_scene(args), nanoseconds(args.at)
+    given, time_ns = given_scene(args.scene), nanoseconds(args.at)
     if given is None and session.missing:
         raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", "--scene FILE with it")
     branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
+from pathlib import Path
 
 from ..core.errors import InputError
 
@@ -16,7 +18,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         description="Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a "
         "Vulkan driver; mesa-vulkan-drivers will do.",
     )
-    parser.add_argument("session", metavar="SESSION", help="an .rrd recording")
+    parser.add_argument(
+        "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
+    )
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
     parser.add_argument("-o", "--output", metavar="X.png", required=True, help="the picture to write")
     parser.add_argument(
@@ -25,6 +29,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default="",
         help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Flight",
     )
+    parser.add_argument("--scene", metavar="FILE", help="the scene of a bag that lacks it")
+    parser.add_argument("--node", metavar="NAME", default="", help="the body, in a bag with several")
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
     parser.set_defaults(run=run)
 
@@ -32,9 +38,31 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Take the picture; InputError says what was wrong with the request."""
     from ..rerun_view.snapshot import take_picture
+    from ..session_reader import is_bag
 
-    take_picture(args.session, args.at, args.output, args.view, _size(args.size))
+    size = _size(args.size)
+    if not is_bag(Path(args.session)):
+        take_picture(args.session, args.at, args.output, args.view, size)
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        take_picture(_drawn(args, Path(folder)), args.at, args.output, args.view, size)
     return 0
+
+
+def _drawn(args: argparse.Namespace, folder: Path) -> Path:
+    """The last run of a bag as a recording for the viewer."""
+    from ..rerun_view.snapshot import check_picture, check_time
+    from ..session_playback import record
+    from ..session_reader import read_runs
+    from .replay import given_scene
+
+    session = read_runs(args.session, args.node)[-1]
+    # What is refused is refused before the long work.
+    check_time(session, args.at)
+    check_picture(args.output)
+    path = folder / "session.rrd"
+    record([session], path, given_scene(args.scene))
+    return path
 
 
 def _size(text: str) -> tuple[int, int]:

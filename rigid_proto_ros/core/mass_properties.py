@@ -76,7 +76,7 @@ _NO_BALLAST = np.empty((0, 4))
 
 
 @njit(cache=True, nogil=True)
-def _loaded(mass, center, second, stretch, reference, points):
+def loaded(mass, center, second, stretch, reference, points):
     """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
 
     mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
@@ -114,7 +114,7 @@ def _loaded(mass, center, second, stretch, reference, points):
 
 
 @njit(cache=True, nogil=True)
-def _stretched(left, center, center_low, reference, second, per_measure):
+def stretched(left, center, center_low, reference, second, per_measure):
     """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
     a unit of measure."""
     place = np.empty(3)
@@ -245,11 +245,11 @@ class MeshMoments:
         own = self.body_mass(scale=s, mass=mass, density=density)
         # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
         left = np.copysign(abs(s[0]), s) if model == "shell" else s
-        center, reference, com, second = _stretched(
+        center, reference, com, second = stretched(
             left, moments.center, moments.center_low, moments.reference, moments.second, own / moments.measure
         )
         unscaled = moments.reference * (left / s) if model == "shell" else moments.reference
-        total, center, inertia, principal = _loaded(own, center, second, s, unscaled, points)
+        total, center, inertia, principal = loaded(own, center, second, s, unscaled, points)
         if len(points):
             com = reference + center
         warnings = ()
@@ -287,6 +287,6 @@ def explicit_mass_properties(
     if not len(points):
         return MassProperties(float(mass), s * center, inertia, warnings, s * center, np.zeros(3))
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    total, moved, inertia, _ = _loaded(float(mass), np.zeros(3), second, s, center, points)
+    total, moved, inertia, _ = loaded(float(mass), np.zeros(3), second, s, center, points)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
     return MassProperties(total, s * center + moved, inertia, warnings, s * center, moved)

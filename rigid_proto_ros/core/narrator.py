@@ -32,7 +32,6 @@ class Narrator:
         self.observer = observer
         self._told: dict[str, str] = {}
         self.shows_loads = listens(observer, "load_began")
-        self.hears_events = listens(observer, "event")
         self._shows_status = listens(observer, "status")
         self._shows_string = listens(observer, "string_changed")
 

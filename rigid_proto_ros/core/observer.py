@@ -107,6 +107,10 @@ class Observer:
     def event(self, time_ns: int, line: str) -> None:
         """One JSON line of the event log (command, parameter change, service), as applied."""
 
+    def hears_events(self) -> bool:
+        """Whether it would do anything with the line of an event now; without anybody who does, none is written."""
+        return listens(self, "event")
+
     def refused(self, time_ns: int, reason: str, message: str) -> None:
         """A command was refused."""
 
@@ -133,12 +137,17 @@ class Observers(Observer):
     """Several observers as one; a method that only one of them implements is that one's own."""
 
     def __init__(self, *observers: Observer) -> None:
+        self._observers = observers
         for name in _METHODS:
             methods = [getattr(observer, name) for observer in observers if listens(observer, name)]
             if len(methods) == 1:
                 setattr(self, name, methods[0])
             elif methods:
                 setattr(self, name, _in_turn(methods))
+
+    def hears_events(self) -> bool:
+        """Whether one of them does."""
+        return any(observer.hears_events() for observer in self._observers)
 
 
 def listens(observer: Observer, method: str) -> bool:
@@ -154,4 +163,4 @@ def _in_turn(methods):
     return call
 
 
-_METHODS = [name for name in vars(Observer) if not name.startswith("_")]
+_METHODS = [name for name in vars(Observer) if not name.startswith("_") and name != "hears_events"]

@@ -82,7 +82,7 @@ def problem_of_segment(
     state on.
     """
     p = common.copy()
-    _begin(p, loads, state.row)
+    begin_problem(p, loads, state.row)
     if string is not None:
         hand = string.hand_velocity(state.time_ns)
         acceleration = p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3].copy()
@@ -120,7 +120,7 @@ def make_problem(
 
 
 @njit(cache=True, error_model="numpy")
-def _begin(p, loads, row):
+def begin_problem(p, loads, row):
     """Complete the body's part p with loads and the start, as far as they go without a string."""
     P, mass = PRINCIPAL_AXES, p[MASS]
     turns, pushes = False, False

@@ -206,7 +206,7 @@ class Simulation(Readings):
             self._string.move(command, self.setup, self.state)
         elif isinstance(command, ReleaseString):
             self._string.release()
-        if self._narrator.hears_events:
+        if self.observer.hears_events():
             self.log(command.kind, command.content)
         else:
             self.events.note(self.time_ns, command)

@@ -100,6 +100,8 @@ class Flusher:
             closing = self.mailbox.closed
             try:
                 self._flush()
+                if closing:
+                    self._writer.send_pictures()
             except Exception as error:  # noqa: BLE001
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
                 self._finish_file()

@@ -48,8 +48,7 @@ def take_picture(
     session_path, picture = Path(session_path), Path(picture).absolute()
     session = read_session(session_path)
     check_time(session, at_s)
-    if not picture.parent.is_dir() or picture.suffix.lower() != ".png":
-        raise InputError("-o", str(picture), "the path of a .png file in an existing folder")
+    check_picture(picture)
     with ExitStack() as stack:
         readable = session_path.absolute() if session.complete else stack.enter_context(whole_part(session_path))
         started = time.monotonic()
@@ -69,6 +68,13 @@ def take_picture(
             picture.write_bytes(pixels)
         except OSError as error:
             raise InputError("-o", str(picture), f"a path that can be written ({error.strerror})") from error
+
+
+def check_picture(picture: str | Path) -> None:
+    """Raise InputError unless a picture could be written there."""
+    picture = Path(picture).absolute()
+    if not picture.parent.is_dir() or picture.suffix.lower() != ".png":
+        raise InputError("-o", str(picture), "the path of a .png file in an existing folder")
 
 
 def check_time(session: RecordedSession, at_s: float) -> None:

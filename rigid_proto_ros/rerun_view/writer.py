@@ -33,6 +33,12 @@ PICTURE_RATE = 250
 MIDDLING_SPIN = 5.0
 """[rad/s] whose arrow is of middling length."""
 
+PICTURES_WAIT_NS = 700_000_000
+"""Plots and pictures of a file go out at the first flush after this; a kill -9 loses a second of them at most."""
+
+PICTURES_WAITING = 1000
+"""As many of them go out at once."""
+
 REPEATED_ROWS = 16384
 """After as many states viewers are told again what holds since long: a seventh of what the live server keeps."""
 
@@ -79,6 +85,7 @@ class SceneWriter:
         self._load_changes: list[tuple[int, bool]] = []
         self._acted = self._touched = False
         self._disturbed_unseen = 0
+        self._pictured: list[tuple[np.ndarray, ...]] = []
         self._tell_body()
 
     def attach(self, stream: Stream) -> None:
@@ -134,6 +141,7 @@ class SceneWriter:
                 handler(self, mark)
                 continue
             self._send_upto(block, sent, shown)
+            self.send_pictures()
             sent = shown
             handler = _BETWEEN_ROWS.get(mark.kind)
             if handler is not None:
@@ -293,13 +301,28 @@ class SceneWriter:
         if self._body is None:
             return
         chosen = self._ticks.choose(times_ns)
-        times_ns, walls, rows = times_ns[chosen], walls[chosen], rows[chosen]
         disturbed = self._gathered(disturbed, chosen)
         if len(chosen):
-            times = time_columns(times_ns, walls)
-            L = self._plots.rows(times, rows, self._body, disturbed, self._send_rows)
-            self._poinsot.rows(times_ns, walls, rows, L, self._send_rows)
-            self._write_pictures(times, times_ns, rows, L)
+            self._pictured.append((times_ns[chosen], walls[chosen], rows[chosen], disturbed))
+        if self._pictured and self._pictures_are_due():
+            self.send_pictures()
+
+    def _pictures_are_due(self) -> bool:
+        """Viewers get them at once; to a file fewer and longer columns cost less."""
+        waits_ns = self._pictured[-1][1][-1] - self._pictured[0][1][0]
+        many = sum(len(times) for times, *_ in self._pictured) >= PICTURES_WAITING
+        return many or waits_ns >= PICTURES_WAIT_NS or any(stream.may_skip for stream in self._row_streams())
+
+    def send_pictures(self) -> None:
+        """Plots, arrows and Poinsot's picture of the states since they were sent before, all of the present body."""
+        if not self._pictured:
+            return
+        times_ns, walls, rows, disturbed = (np.concatenate(columns) for columns in zip(*self._pictured, strict=True))
+        self._pictured.clear()
+        times = time_columns(times_ns, walls)
+        L = self._plots.rows(times, rows, self._body, disturbed, self._send_rows)
+        self._poinsot.rows(times_ns, walls, rows, L, self._send_rows)
+        self._write_pictures(times, times_ns, rows, L)
 
     def _disturbed(self, begin: int, end: int) -> np.ndarray:
         """Per row begin..end, whether a load acts there or did since the row before."""

@@ -20,7 +20,7 @@ from std_msgs.msg import String
 from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
-from ..core.frames import parse_frame
+from ..core.frames import Frame, parse_frame
 from ..poke_script import (
     MAX_SCHEDULE_LENGTH,
     MESH_FRAME,
@@ -39,6 +39,9 @@ TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
 
 QUIET_NS = 4_000_000
 """How often topics are looked at that carried nothing lately [ns of wall time]."""
+
+MOST_FRAMES = 1000
+"""Frames of wrenches that are kept as read."""
 
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
@@ -84,6 +87,7 @@ class CommandIntake:
         self.sequence_gaps = 0
         self._next_quiet_look_ns = 0
         self._last_sequence: dict[int, int] = {}
+        self._read_frames: dict[str, Frame] = {}
         self._on_refusal = on_refusal
         group = _TakenByHand()
 
@@ -166,7 +170,13 @@ class CommandIntake:
 
     def _submit_wrench(self, held: bool, data: bytes, simulation, scenario) -> None:
         stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
-        frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
+        frame = self._read_frames.get(frame_id)
+        if frame is None:
+            frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
+            # Contacts and frames' names are set at start only, so what was read once stays so.
+            if len(self._read_frames) >= MOST_FRAMES:
+                self._read_frames.clear()
+            self._read_frames[frame_id] = frame
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))

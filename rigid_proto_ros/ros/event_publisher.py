@@ -62,8 +62,12 @@ class EventPublisher(Observer):
 
     def event(self, time_ns: int, line: str) -> None:
         """A line of the event log."""
-        if self._events.get_subscription_count():
+        if self.hears_events():
             self._events.publish(cdr.string(line))
+
+    def hears_events(self) -> bool:
+        """Somebody listens to the topic."""
+        return self._events.get_subscription_count() > 0
 
     def _urdf(self, body: BodySnapshot) -> str:
         """The body as a URDF of one link at the COM, for viewers that draw robot descriptions."""

@@ -22,7 +22,10 @@ DRAIN_NS = 10_000_000
 """Commands are taken at least this often [ns of wall time]."""
 
 LIVELY_DRAIN_NS = 500_000
-"""At most this often while commands come in [ns of wall time]."""
+"""Between publications at most this often, while commands come in [ns of wall time]."""
+
+LEAD = 0.2
+"""Part of a publication's period before it at which commands are taken once more while they come in."""
 
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
@@ -303,9 +306,11 @@ class Flight:
             return 0
         if not self._listeners:
             return latest_ns
-        if self._lively:
-            # Twice a period: a command then shows in a state after one period on average, instead of one and a half.
-            half_ns = int(5e8 / (self.scenario.values["publish_rate"] * self._factor))
-            latest_ns = self._last_drain_ns + min(max(half_ns, LIVELY_DRAIN_NS), DRAIN_NS)
         ahead_ns = self._publication_ns() - self._anchor_simulated_ns
-        return min(latest_ns, self._anchor_wall_ns + int(ahead_ns / self._factor) + 1)
+        publication_ns = self._anchor_wall_ns + int(ahead_ns / self._factor) + 1
+        if self._lively:
+            # Commands taken a little before a publication show in it; those taken with it would show a period later.
+            early_ns = publication_ns - int(LEAD * 1e9 / (self.scenario.values["publish_rate"] * self._factor))
+            if early_ns - self._last_drain_ns >= LIVELY_DRAIN_NS:
+                return min(latest_ns, early_ns)
+        return min(latest_ns, publication_ns)

@@ -47,7 +47,7 @@ MIN_SPACING_NS = 5_000_000
 """States closer to each other than this are left out: eyes see no more, and a node at 1 kHz would fill the log in 40 s."""
 
 SCENE_GRACE_S = 0.1
-"""Topics come one by one: a scene heard this soon after a reset, and before any change, is the one that the run began with."""
+"""Topics come one by one: a scene heard this soon after a reset [wall clock] is the one that the run began with."""
 
 STALE_STATES = 20
 """States from before a reset that may still come after its event; when more come, they are of the new run after all."""
@@ -118,7 +118,7 @@ class Mark:
 @dataclass
 class _Run:
     """From a start or reset on. scene: as it began; scenes: those with another mesh since; events: (time_ns, line).
-    whole: none was dropped for their number.
+    whole: none was dropped for their number. is_new: a reset began it, and nothing has happened in it yet, not even time.
     """
 
     offset_ns: int
@@ -127,7 +127,7 @@ class _Run:
     events: list[tuple[int, str]] = field(default_factory=list)
     began_s: float = field(default_factory=time.monotonic)
     whole: bool = True
-    changed: bool = False
+    is_new: bool = False
 
     @property
     def untouched(self) -> bool:
@@ -165,7 +165,7 @@ class History:
         with self._lock:
             self._scene = text
             run = self._runs[-1]
-            if not run.scene or (not run.changed and time.monotonic() - run.began_s < SCENE_GRACE_S):
+            if not run.scene or (run.is_new and time.monotonic() - run.began_s < SCENE_GRACE_S):
                 run.scene = text
             if scene_sha256(text) != scene_sha256((run.scenes or [run.scene])[-1]):
                 run.scenes.append(text)
@@ -177,7 +177,7 @@ class History:
             if kind == "reset":
                 self._hear_reset()
             run = self._runs[-1]
-            run.changed |= kind in ("set", "inertia")
+            run.is_new &= kind == "reset"
             if run.whole and len(run.events) < MAX_EVENTS:
                 run.events.append((time_ns, line))
             else:
@@ -197,6 +197,7 @@ class History:
             if self._kept_stamp_ns < time_ns < self._kept_stamp_ns + MIN_SPACING_NS:
                 return
             self._kept_stamp_ns = time_ns
+            self._runs[-1].is_new &= time_ns == 0
             live_ns = self._runs[-1].offset_ns + time_ns
             self._states.append(live_ns, [*pose, *twist])
             oldest_ns = live_ns - round(WINDOW_S * 1e9)
@@ -314,7 +315,7 @@ class History:
             self._runs[-1].offset_ns > offset_ns or (self._runs[-1].offset_ns == offset_ns and self._runs[-1].untouched)
         ):
             self._runs.pop()
-        self._runs.append(_Run(offset_ns, self._scene))
+        self._runs.append(_Run(offset_ns, self._scene, is_new=True))
         self._last_stamp_ns, self._kept_stamp_ns = -1, -MIN_SPACING_NS
 
     def _is_stale(self, time_ns: int) -> bool:
@@ -372,7 +373,7 @@ def _rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole: bo
         time_ns=time_ns,
         row=row,
         changes=changes_to(values, read_scene_text(present).values),
-        commands=expand_script(branch.pokes),
+        commands=expand_script(branch.pokes, wrench_timeout=float(values.get("wrench_timeout", 1.5))),
         scene=branch.scene,
         script=script,
         notes=branch.notes,

@@ -30,10 +30,10 @@ MAX_LINK = 64_000
 """Characters of a link; browsers take this much behind a #, chat programs less."""
 
 MAX_DECODED = 1_000_000
-"""Bytes of JSON inside: half an hour of pulling."""
+"""Bytes of JSON inside, more than a link of this length holds of a hand's doings."""
 
-MAX_COMMANDS = 100_000
-"""That a link's script may expand to."""
+MAX_COMMANDS = 20_000
+"""That a link's script may expand to: reading them takes a second or two."""
 
 
 def encode(scene: str, script: str = "") -> str:

@@ -87,7 +87,7 @@ def _vector(p, at):
 
 
 @njit(cache=True, error_model="numpy")
-def _kind(p, y):
+def kind_of_segment(p, y):
     """Which of the kinds a segment with problem p from variables y on is."""
     spins = _vector(y, 4)
     turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
@@ -107,7 +107,7 @@ def _kind(p, y):
 
 def _choose(integrator: Integrator, p: np.ndarray, y: np.ndarray, step_ns: int, accuracy: float) -> Stepper:
     """The stepper of a segment with problem p from variables y on."""
-    kind = _kind(p, y)
+    kind = kind_of_segment(p, y)
     if kind == TURNING_LOADS:
         return _series("the loads turn with the body", accuracy, taylor_adaptive)
     if kind == ANY_LOADS:

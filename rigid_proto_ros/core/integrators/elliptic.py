@@ -3,7 +3,7 @@
 
 The modulus comes as m = k² and m₁ = 1 − m, both accurate, because near the separatrix the motion hangs on m₁ alone.
 
-Sources: Bulirsch, Numerische Mathematik 7 (1965) for sn, cn, dn; Carlson, Numerical Algorithms 10 (1995) for R_F and R_J;
+Sources: Bulirsch, Numerische Mathematik 7 (1965) for sn, cn, dn; Carlson, Numerical Algorithms 10 (1995) for R_J;
 Abramowitz and Stegun, chapters 16 and 17, for the rest.
 """
 
@@ -129,21 +129,6 @@ def _set(values, index, value):
         value if index == 12 else values[12],
         value if index == 13 else values[13],
     )
-
-
-@njit(cache=True, error_model="numpy")
-def carlson_rf(x, y, z):
-    """R_F(x, y, z), arguments ≥ 0, at most one of them 0."""
-    while True:
-        mean = (x + y + z) / 3.0
-        dx, dy, dz = 1.0 - x / mean, 1.0 - y / mean, 1.0 - z / mean
-        if max(abs(dx), abs(dy), abs(dz)) < _DUPLICATION:
-            break
-        rx, ry, rz = math.sqrt(x), math.sqrt(y), math.sqrt(z)
-        shift = rx * (ry + rz) + ry * rz
-        x, y, z = 0.25 * (x + shift), 0.25 * (y + shift), 0.25 * (z + shift)
-    e2, e3 = dx * dy - dz * dz, dx * dy * dz
-    return (1.0 + (e2 / 24.0 - 0.1 - 3.0 * e3 / 44.0) * e2 + e3 / 14.0) / math.sqrt(mean)
 
 
 @njit(cache=True, error_model="numpy")

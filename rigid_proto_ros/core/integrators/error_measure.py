@@ -27,6 +27,9 @@ from ..problem import (
     TRANSLATES,
 )
 
+WEIGHINGS = 4
+"""Of a step whose end weighs errors more than its start did, each shorter than the one before."""
+
 FLOOR = 32.0 * 2.0**-52
 
 
@@ -45,6 +48,13 @@ def scales(y, p, elapsed):
         speed += v * v
     length = p[LENGTH]
     return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
+
+
+@njit(cache=True, error_model="numpy")
+def heavier(ending, weights):
+    """The larger of the weights at a step's end and start, and whether they are clearly more than those at the start: a quarter."""
+    spin, speed = max(ending[1], weights[1]), max(ending[3], weights[3])
+    return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
 
 
 @njit(cache=True, error_model="numpy")

@@ -15,11 +15,14 @@ and no division vanishes: with D = 1 − β sn² and β = B|B−A| w₂²/P,
 The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest turn that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to the third
 axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. A short step integrates ψ' by Gauss's rule, a long one in closed
 form: with dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ = (1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ' becomes
-f_a + f_b s²/(1 + νs²), whose integral is Carlson's R_J, every argument positive.
+f_a + f_b s²/(1 + νs²), whose integral from the start of a period is Carlson's R_J, every argument positive. The integral from
+any other phase on is that over the time alone plus an arc tangent (addition theorem of the third kind): a difference of two
+incomplete integrals would cancel where both are large, near a middle axis that the body leaves or comes to.
 
 Sources: Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies (1937), section 69; van Zon and Schofield,
-J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084; the gauge and the
-positive forms are worked out here.
+J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084; Byrd
+and Friedman, Handbook of Elliptic Integrals (1971), 116.03, for the addition theorem; the gauge and the positive forms are
+worked out here.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from numba import njit
 
 from ..exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
 from ..rotation import multiply, normalize
-from .elliptic import carlson_rf, carlson_rj, complete_quarter_period, sn_cn_dn
+from .elliptic import carlson_rj, complete_quarter_period, sn_cn_dn
 
 SHORT = 0.4
 """u = ω_p h below which ψ' is integrated by Gauss's rule; beyond it the closed form is cheaper."""
@@ -215,16 +218,16 @@ def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
     f_b = 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
     modulus1 = 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
     sign = math.copysign(1.0, C - B)
-    x0, y0 = _gauss_phase(w1 * math.sqrt(A * gca / Q), sign * w2 * math.sqrt(B * gcb / Q), w3 / W, k1)
+    x0, _ = _gauss_phase(w1 * math.sqrt(A * gca / Q), sign * w2 * math.sqrt(B * gcb / Q), w3 / W, k1)
     x1, y1 = _gauss_phase(v1 * math.sqrt(A * gca / Q), sign * v2 * math.sqrt(B * gcb / Q), v3 / W, k1)
-    integral = _third_kind(x1, y1, modulus1, nu) - _third_kind(x0, y0, modulus1, nu)
-    if m1 > 0.0:
-        # Both phases lie within half a period of zero; the time says how many periods are between them.
-        quarter = K * 0.5 * (1.0 + k1)
-        ahead = 0.5 * u * (1.0 + k1) + _first_kind(x0, y0, modulus1) - _first_kind(x1, y1, modulus1)
-        periods = float(round(0.5 * ahead / quarter))
-        if periods != 0.0:
-            integral += periods * 2.0 / 3.0 * carlson_rj(0.0, modulus1, 1.0, 1.0 + nu)
+    x, y = _gauss_phase(c, s, d, k1)
+    # By the addition theorem: the integral over the time itself, and what the phase of the start adds to it.
+    integral = _added_by_phase(x0, x, x1, y1, modulus1, kappa, nu)
+    if whole != 0.0:
+        integral += whole * 2.0 / 3.0 * carlson_rj(0.0, modulus1, 1.0, 1.0 + nu)
+        if whole % 2.0 != 0.0:
+            x = -x
+    integral += _third_kind(x, y, modulus1, nu)
     psi = f_a * (u / rate) + f_b * (1.0 + kappa) / rate * integral
     return v1, v2, v3, psi + E2 / L * (beyond / rate)
 
@@ -246,20 +249,21 @@ def _side_of_separatrix(A, B, C, w1, w3):
 
 @njit(cache=True, error_model="numpy")
 def _gauss_phase(cn, sn, dn, k1):
-    """sn and cn of Gauss's transformed modulus, both turned by half a period where cn < 0."""
+    """sn and cn of Gauss's transformed modulus."""
     s = sn * (1.0 + k1) / (1.0 + dn)
     c = cn * math.sqrt(2.0 * (1.0 + k1) / ((dn + k1) * (1.0 + dn)))
     size = math.sqrt(s * s + c * c)
-    if c < 0.0:
-        size = -size
     return s / size, c / size
 
 
 @njit(cache=True, error_model="numpy")
-def _first_kind(s, c, modulus1):
-    """F(φ) with sin φ = s, cos φ = c ≥ 0."""
-    cc = c * c
-    return s * carlson_rf(cc, cc + modulus1 * s * s, 1.0)
+def _added_by_phase(s0, s, s1, c1, modulus1, kappa, nu):
+    """∫ from u₀ to u₀ + u less ∫ from 0 to u of sn²/(1 + ν sn²): s₀, s, s₁ are sn of u₀, u and u₀ + u, c₁ cn of the last."""
+    d1 = math.sqrt(c1 * c1 + modulus1 * s1 * s1)
+    product = s0 * s * s1 / (1.0 + nu * s1 * s1 - nu * s0 * s * c1 * d1)
+    root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
+    angle = root * product
+    return product if abs(angle) < 1e-9 else math.atan(angle) / root
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..problem import HAS_WORLD_TORQUE, TRANSLATES
+from ..problem import DAMPING_ANGULAR, GYROSCOPIC, HAS_WORLD_TORQUE, MOMENTS, TORQUE_BODY, TRANSLATES
 from ..rotation import normalize
 from . import slack
 from .equations import added_acceleration, angular_acceleration, torque
@@ -64,10 +64,15 @@ def _sum(y, k, c):
 @njit(cache=True, error_model="numpy")
 def rk4_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
+    if p[TRANSLATES] == 0.0 and p[HAS_WORLD_TORQUE] == 0.0:
+        return _turning_steps(y, p, h, n)
     translate = p[TRANSLATES] != 0.0
     half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
+    # Variables stay out of the array, so that what p holds is read once and not in every step.
+    u0 = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12])
+    dx, dy, dz = y[7], y[8], y[9]
+    good = n
     for done in range(n):
-        u0 = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12])
         k1 = _rates(*u0, p, translate)
         u2 = _sum(u0, k1, half)
         k2 = _rates(*u2, p, translate)
@@ -78,20 +83,78 @@ def rk4_steps(y, p, h, n):
         increment = _sum(_sum(_sum((0.0,) * 10, k1, sixth), k2, third), _sum(k3, k4, 0.5), third)
         new = _sum(u0, increment, 1.0)
         size = abs(new[4]) + abs(new[5]) + abs(new[6]) + abs(new[7]) + abs(new[8]) + abs(new[9])
-        # Negated, so that NaN counts as a runaway.
-        if not size <= MAX_SPEED:
-            return done
         qx, qy, qz, qw = normalize(new[0], new[1], new[2], new[3])
-        if not math.isfinite(qx + qy + qz + qw):
-            return done
+        # Negated, so that NaN counts as a runaway.
+        if not (size <= MAX_SPEED and math.isfinite(qx + qy + qz + qw)):
+            good = done
+            break
         if translate:
             # x' = u: the same weights on the stage velocities, so that x is of order 4 too.
-            for j in range(3):
-                y[7 + j] += h * u0[7 + j] + h * h / 6.0 * (k1[7 + j] + k2[7 + j] + k3[7 + j])
-                y[10 + j] = new[7 + j]
-        y[0], y[1], y[2], y[3] = qx, qy, qz, qw
-        y[4], y[5], y[6] = new[4], new[5], new[6]
-    return n
+            dx += h * u0[7] + h * h / 6.0 * (k1[7] + k2[7] + k3[7])
+            dy += h * u0[8] + h * h / 6.0 * (k1[8] + k2[8] + k3[8])
+            dz += h * u0[9] + h * h / 6.0 * (k1[9] + k2[9] + k3[9])
+        u0 = (qx, qy, qz, qw, new[4], new[5], new[6], new[7], new[8], new[9])
+    y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12] = u0
+    y[7], y[8], y[9] = dx, dy, dz
+    return good
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(qx, qy, qz, qw, wx, wy, wz, k):
+    """Rates of q and ω where the load turns along; k: τ/I (3,), c_ω/I (3,) and the gyroscopic factors (3,)."""
+    tx, ty, tz, cx, cy, cz, gx, gy, gz = k
+    return (
+        0.5 * (qw * wx + qy * wz - qz * wy),
+        0.5 * (qw * wy - qx * wz + qz * wx),
+        0.5 * (qw * wz + qx * wy - qy * wx),
+        -0.5 * (qx * wx + qy * wy + qz * wz),
+        tx - cx * wx + gx * (wy * wz),
+        ty - cy * wy + gy * (wz * wx),
+        tz - cz * wz + gz * (wx * wy),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _moved(u, k, c):
+    """u + c k over q and ω."""
+    return (
+        u[0] + c * k[0],
+        u[1] + c * k[1],
+        u[2] + c * k[2],
+        u[3] + c * k[3],
+        u[4] + c * k[4],
+        u[5] + c * k[5],
+        u[6] + c * k[6],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _turning_steps(y, p, h, n):
+    """The same where translation is closed form and no load hangs on the attitude: a fifth of the time."""
+    a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    T, g, d = TORQUE_BODY, p[GYROSCOPIC], p[DAMPING_ANGULAR]
+    k = (
+        *(p[T] / a, p[T + 1] / b, p[T + 2] / c),
+        *(d / a, d / b, d / c),
+        *(g * (b - c) / a, g * (c - a) / b, g * (a - b) / c),
+    )
+    half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
+    u0 = (y[0], y[1], y[2], y[3], y[4], y[5], y[6])
+    good = n
+    for done in range(n):
+        k1 = _turn(*u0, k)
+        k2 = _turn(*_moved(u0, k1, half), k)
+        k3 = _turn(*_moved(u0, k2, half), k)
+        k4 = _turn(*_moved(u0, k3, h), k)
+        increment = _moved(_moved(_moved((0.0,) * 7, k1, sixth), k2, third), _moved(k3, k4, 0.5), third)
+        new = _moved(u0, increment, 1.0)
+        qx, qy, qz, qw = normalize(new[0], new[1], new[2], new[3])
+        if not (abs(new[4]) + abs(new[5]) + abs(new[6]) <= MAX_SPEED and math.isfinite(qx + qy + qz + qw)):
+            good = done
+            break
+        u0 = (qx, qy, qz, qw, new[4], new[5], new[6])
+    y[0], y[1], y[2], y[3], y[4], y[5], y[6] = u0
+    return good
 
 
 @njit(cache=True, error_model="numpy")

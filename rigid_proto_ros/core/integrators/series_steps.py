@@ -17,7 +17,16 @@ from ..motion import HEAT
 from ..problem import BILATERAL, HAS_STRING, STIFFNESS
 from . import control as ctl
 from .equations import stretch, tension_margin
-from .error_measure import FLOOR, jerk_of_rounding, jump_of_displacement, jump_of_rounding, scales, size
+from .error_measure import (
+    FLOOR,
+    WEIGHINGS,
+    heavier,
+    jerk_of_rounding,
+    jump_of_displacement,
+    jump_of_rounding,
+    scales,
+    size,
+)
 from .motion_series import COLUMNS, motion_at, motion_series, stretch_at
 from .runge_kutta import is_good
 from .slack import extremum
@@ -82,14 +91,13 @@ def _bisect(c, p, degree, low, high, taut):
 
 
 @njit(cache=True, error_model="numpy")
-def _walk(y, p, control, longest_ns, look, c, out):
-    """From y one step into out, or ``longest_ns`` if that is shorter; returns its length [ns], 0 when there is none.
+def _walk(y, p, control, longest_ns, look, weights, c, out):
+    """From y one step into out, or ``longest_ns`` if that is shorter; returns its length [ns], 0 when there is none. weights: of errors.
 
     look: it is known to reach that far.
     """
     degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
     longest = longest_ns * 1e-9
-    weights = scales(y, p, control[ctl.ELAPSED_NS] * 1e-9)
     rate_of_error = max(accuracy, jerk_of_rounding(p, weights[1], weights[3]))
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
     part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
@@ -165,8 +173,16 @@ def steps(y, p, control, following, c, span_ns, look):
         if look or control[ctl.ACCEPTED_NS] == 0.0:
             spent = control[ctl.PENDING]
             out = np.zeros(15) if look else following
-            length = _walk(y, p, control, span_ns if look else int(ctl.LONGEST * 1e9), look, c, out)
-            good = length >= 1 and is_good(out)
+            elapsed = control[ctl.ELAPSED_NS]
+            weights = scales(y, p, elapsed * 1e-9)
+            length, good = 0, False
+            for _ in range(WEIGHINGS):
+                length = _walk(y, p, control, span_ns if look else int(ctl.LONGEST * 1e9), look, weights, c, out)
+                good = length >= 1 and is_good(out)
+                # The errors of velocities are measured by those at the end: where they fall within the step, that counts.
+                weights, more = heavier(scales(out, p, (elapsed + length) * 1e-9), weights)
+                if look or not (good and more):
+                    break
             if look:
                 control[ctl.PENDING] = spent
                 y[:] = out

@@ -76,12 +76,14 @@ def series(y, p, degree, c):
             c[_G + 2, k] = bz * qw + bx * qy - by * qx
             c[_G + 3, k] = -(bx * qx + by * qy + bz * qz)
             a1, a2, a3 = 0.0, 0.0, 0.0
-            for i in range(k + 1):
+            # The vector part of a ⊗ (g ⊗ b*) is that of b ⊗ (g ⊗ a*): half of the sum, taken twice, and its middle.
+            for i in range(k // 2 + 1):
+                weight = 1.0 if 2 * i == k else 2.0
                 qx, qy, qz, qw = c[_Q, i], c[_Q + 1, i], c[_Q + 2, i], c[_Q + 3, i]
                 x, yy, z, w = c[_G, k - i], c[_G + 1, k - i], c[_G + 2, k - i], c[_G + 3, k - i]
-                a1 += qw * x + qx * w + qy * z - qz * yy
-                a2 += qw * yy - qx * z + qy * w + qz * x
-                a3 += qw * z + qx * yy - qy * x + qz * w
+                a1 += weight * (qw * x + qx * w + qy * z - qz * yy)
+                a2 += weight * (qw * yy - qx * z + qy * w + qz * x)
+                a3 += weight * (qw * z + qx * yy - qy * x + qz * w)
             if k == 0:
                 a1, a2, a3 = a1 + p[ACCELERATION_ADDED], a2 + p[ACCELERATION_ADDED + 1], a3 + p[ACCELERATION_ADDED + 2]
             c[_U, k + 1] = f * (a1 - cv * c[_U, k])

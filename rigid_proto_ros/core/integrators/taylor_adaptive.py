@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from . import control as ctl
-from .error_measure import FLOOR, scales
+from .error_measure import FLOOR, WEIGHINGS, heavier, scales
 from .runge_kutta import is_good
 from .taylor import ROWS, series, sum_series
 
@@ -78,13 +78,21 @@ def steps(y, p, control, following, c, span_ns, look):
             sum_series(c, p, degree, span_ns * 1e-9, y)
             return span_ns if is_good(y) else 0
         if control[ctl.ACCEPTED_NS] == 0.0:
-            growth = _growth(c, degree, scales(y, p, control[ctl.ELAPSED_NS] * 1e-9))
-            length_ns = math.floor(step_length(growth, control[ctl.ACCURACY], degree, PART) * 1e9)
-            good = length_ns >= 1.0
-            if good:
+            weights = scales(y, p, control[ctl.ELAPSED_NS] * 1e-9)
+            for _ in range(WEIGHINGS):
+                growth = _growth(c, degree, weights)
+                length_ns = math.floor(step_length(growth, control[ctl.ACCURACY], degree, PART) * 1e9)
+                good = length_ns >= 1.0
+                if not good:
+                    break
                 following[:] = y
                 sum_series(c, p, degree, length_ns * 1e-9, following)
                 good = is_good(following)
+                # The error of a spin is measured by the spin at the end: where it falls within the step, that counts.
+                ending = scales(following, p, (control[ctl.ELAPSED_NS] + length_ns) * 1e-9)
+                weights, more = heavier(ending, weights)
+                if not (good and more):
+                    break
             if not good:
                 control[ctl.FAILED] = 1.0
                 return advanced

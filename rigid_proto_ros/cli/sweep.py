@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto sweep``: many variations of one scene into one table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ..core.errors import InputError
+
+
+def add_parser(subparsers) -> None:
+    """Declare the command's arguments."""
+    parser = subparsers.add_parser("sweep", help="many variations of one scene into one table")
+    parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
+    parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
+    parser.add_argument("--threads", type=int, default=0, metavar="N", help="threads here (default: one a core)")
+    parser.add_argument("--dask", default="", metavar="ADDRESS", help="fly on the cluster of this scheduler")
+    parser.add_argument("--resume", action="store_true", help="go on with a run that was stopped or killed")
+    parser.add_argument("--yes", action="store_true", help="yes, more than ten million rows")
+    parser.add_argument("--row", type=int, metavar="N", help="fly one row alone")
+    parser.add_argument("--ghosts", metavar="N,N,...", help="with --record: these rows side by side in one recording")
+    parser.add_argument("--record", metavar="FILE.rrd", help="with --row or --ghosts: record it for Rerun")
+    parser.add_argument(
+        "--as-scene", metavar="FILE.yaml", help="with --row: write it as a scene, and its script beside"
+    )
+    parser.add_argument("--plot", metavar="x=..,y=..", help="picture of the table: x, y, color, to=FILE.svg")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fly the study, or one row of it."""
+    from ..sweep.study import read_study
+
+    if args.threads < 0 or args.threads > 1024:
+        raise InputError("--threads", args.threads, "1 to 1024, or 0 for one a core")
+    if args.ghosts is not None and args.row is not None:
+        raise InputError("--ghosts", args.ghosts, "--row or --ghosts, not both")
+    for option, needs in (("record", "--row or --ghosts"), ("as_scene", "--row")):
+        if getattr(args, option) and args.row is None and (option == "as_scene" or args.ghosts is None):
+            raise InputError(f"--{option.replace('_', '-')}", getattr(args, option), f"it with {needs}")
+    study = read_study(args.study, args.yes)
+    if args.row is not None:
+        return _one_row(study, args)
+    if args.ghosts is not None:
+        return _ghosts(study, args)
+    return _whole(study, args)
+
+
+def _whole(study, args) -> int:
+    from ..sweep.plot import plot_table, read_plot
+    from ..sweep.run import Interrupted, run_study
+
+    file = Path(args.output or Path(study.name).stem + ".parquet")
+    plot = read_plot(args.plot, file) if args.plot else None
+    try:
+        metadata = run_study(study, file, workers=args.threads, dask=args.dask, resume=args.resume)
+    except Interrupted as stopped:
+        done = stopped.metadata["rows_done"]
+        if done:
+            _tell(f"{done} of {study.rows} rows are in {file}; go on with --resume")
+        raise
+    if plot:
+        plot_table(plot, file)
+    if args.json:
+        print(json.dumps({"table": str(file), **metadata, **({"plot": str(plot.file)} if plot else {})}))
+    else:
+        print(f"{metadata['rows']} rows in {file}")
+        if metadata["rows_by_simulation"]:
+            print(f"{metadata['rows_by_simulation']} of them were flown or refused one by one")
+        if plot:
+            print(f"picture in {plot.file}")
+    return 0
+
+
+def _row_number(text, study) -> int:
+    try:
+        row = int(text)
+    except ValueError:
+        row = -1
+    if not 0 <= row < study.rows:
+        raise InputError("row", text, f"0 to {study.rows - 1}")
+    return row
+
+
+def _one_row(study, args) -> int:
+    from ..sweep.one_row import record_row, row_summary, write_scene
+    from ..sweep.variation import variation
+
+    row = _row_number(args.row, study)
+    summary = row_summary(study, row)
+    if args.as_scene:
+        summary.update(write_scene(study, variation(study, row), Path(args.as_scene), summary["time"]))
+    if args.record:
+        record_row(study, variation(study, row), args.record, _tell)
+        summary["recorded"] = args.record
+    if args.json:
+        print(json.dumps(summary))
+    else:
+        for name, value in summary.items():
+            print(f"{name:<32} {value}")
+    return 1 if summary["failure"] else 0
+
+
+def _ghosts(study, args) -> int:
+    from ..sweep.one_row import MAX_GHOSTS, record_ghosts
+
+    rows = [_row_number(text, study) for text in args.ghosts.split(",")]
+    if not args.record or not 1 <= len(rows) <= MAX_GHOSTS:
+        raise InputError("--ghosts", args.ghosts, f"1 to {MAX_GHOSTS} rows, with --record FILE.rrd")
+    record_ghosts(study, rows, args.record)
+    print(json.dumps({"recorded": args.record, "rows": rows}) if args.json else f"recorded {args.record}")
+    return 0
+
+
+def _tell(message: str) -> None:
+    print(f"rigid_proto sweep: {message}", file=sys.stderr)

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""Rows of a study as arrays for the compiled batch: a group for each mesh, model and integrator, filled by columns."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..core import batch_body as bb
+from ..core import batch_flight as bf
+from ..core.batch import Variants
+from ..core.errors import InputError
+from ..core.integrators.taylor_adaptive import degree_for
+from ..parameters import convert_all, parameter_named
+from ..poke_script import expand_script
+from ..scenario import BodyMesh
+from .forms import VERTEX, Draw
+from .overlay import Overlay, fits, make_overlay
+from .study import Study, Vary, script_entries
+from .templates import (
+    FAST,
+    TIMES,
+    NotCarried,
+    Script,
+    Settler,
+    ballast_names,
+    ballast_of,
+    checked_integrator,
+    constants_of,
+    script_of,
+    settings_of,
+    times_of,
+)
+from .variation import body_mesh_of, plain, vertex_number
+
+
+def is_numeric(vary: Vary) -> bool:
+    """Whether it varies numbers of a row of settings, times or ballast."""
+    parameter = vary.target.parameter
+    return parameter in FAST or parameter in TIMES or parameter.startswith("ballast.")
+
+
+def is_structural(vary: Vary) -> bool:
+    """Whether rows with other values of it can't go through the batch together."""
+    return bool(vary.target.parameter) and not is_numeric(vary)
+
+
+class Group:
+    """Rows that share all but numbers. Making one raises InputError or NotCarried: then the simulation flies its rows, and says
+    what is wrong.
+    """
+
+    def __init__(self, study: Study, structural: Mapping[str, object], reference: Mapping[str, object] | None) -> None:
+        values = dict(study.values)
+        for vary in study.vary:
+            if is_structural(vary):
+                vary.target.put(values, [], plain(structural[vary.target.name]))
+        if study.density_decides:
+            values["mass"] = 0.0
+        self.reference = reference or {}
+        values.update(convert_all(self.reference))
+        if "density" in self.reference and "mass" not in self.reference:
+            values["mass"] = 0.0
+            self.reference = {**self.reference, "mass": 0.0}
+        self.study = study
+        self.values = values
+        self.body_mesh: BodyMesh | None = body_mesh_of(values)
+        self.constants = constants_of(values, self.body_mesh)
+        self.settings, self.times, self.ballast = settings_of(values), times_of(values), ballast_of(values)
+        self.settler = Settler(values, self.body_mesh)
+        self.overlay: Overlay | None = None
+        timeout = values["wrench_timeout"]
+        if fits(study):
+            self.overlay, loads = make_overlay(study, self.settler, timeout)
+        else:
+            _, loads = script_of(expand_script(study.script, "script", timeout), self.settler)
+        self.integrator = checked_integrator(values, loads)
+
+    def variants(self, columns: list[np.ndarray], count: int) -> tuple[Variants, np.ndarray]:
+        """Arrays of ``count`` rows with these values of what varies, and which of them the batch may judge (n,)."""
+        good = np.ones(count, bool)
+        settings, times, ballast = self._numbers(columns, count, good)
+        if self.overlay is not None:
+            targets = [(v.target, c) for v, c in zip(self.study.vary, columns, strict=True) if v.target.entry]
+            if targets:
+                commands, loads, in_order = self.overlay.rows(targets, count)
+                good &= in_order
+            else:
+                commands, loads = self.overlay.base.commands[None], self.overlay.base.loads[None]
+        else:
+            commands, loads = self._expanded(columns, count, good)
+        return Variants(settings, times, ballast, self.constants, self.integrator, commands, loads), good
+
+    def _numbers(self, columns, count: int, good: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        settings = np.broadcast_to(self.settings, (count, bb.SETTINGS)).copy()
+        times = np.broadcast_to(self.times, (count, bb.TIMES)).copy()
+        names = ballast_names(self.values)
+        varies_ballast = any(v.target.parameter.startswith("ballast.") for v in self.study.vary)
+        ballast = np.broadcast_to(self.ballast, (count if varies_ballast else 1, *self.ballast.shape)).copy()
+        for vary, column in zip(self.study.vary, columns, strict=True):
+            parameter = vary.target.parameter
+            if not is_numeric(vary) or parameter in self.reference:
+                continue
+            declared = parameter_named(parameter)
+            above = column > declared.lower if declared.above else column >= declared.lower
+            within = above & (column <= declared.upper)
+            good &= within if within.ndim == 1 else within.all(axis=1)
+            if parameter in TIMES:
+                times[:, TIMES[parameter]] = np.maximum(1, np.rint(np.where(within, column, 1.0) * 1e9))
+                continue
+            if parameter in FAST:
+                rows, (at, size) = settings, FAST[parameter]
+            else:
+                rows, at, size = ballast[:, names.index(parameter)], 0, 4
+            if vary.target.path:
+                rows[:, at + vary.target.path[0]] = column
+            else:
+                rows[:, at : at + size] = column[:, None] if column.ndim == 1 else column
+            if parameter == "accuracy":
+                times[:, bb.DEGREE] = [degree_for(a) if a > 0.0 else 1 for a in column.tolist()]
+        return settings, times, ballast
+
+    def _expanded(self, columns, count: int, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Commands and loads of scripts that are expanded row by row, padded with commands that never come."""
+        scripts: list[Script | None] = []
+        for i in range(count):
+            try:
+                commands = expand_script(self._script([c[i] for c in columns]), "script", self.values["wrench_timeout"])
+                script, loads = script_of(commands, self.settler)
+                checked_integrator(self.values, loads)
+                scripts.append(script)
+            except (NotCarried, InputError, TypeError, AttributeError, KeyError):
+                scripts.append(None)
+                good[i] = False
+        longest = max((len(s.commands) for s in scripts if s), default=0)
+        commands = np.zeros((count, longest, 3), np.int64)
+        commands[:, :] = bf.NEVER, -1, bf.CLEAR
+        loads = np.zeros((count, longest, bf.LOAD))
+        for i, script in enumerate(scripts):
+            if script:
+                commands[i, : len(script.commands)] = script.commands
+                loads[i, : len(script.loads)] = script.loads
+        return commands, loads
+
+    def _script(self, chosen: list):
+        script = copy.deepcopy(self.study.script)
+        entries = script_entries(script)
+        for vary, value in zip(self.study.vary, chosen, strict=True):
+            if vary.target.entry:
+                vertex = isinstance(vary.form, Draw) and vary.form.shape == VERTEX
+                number = {"vertex": vertex_number(value, self.body_mesh)} if vertex else plain(value)
+                vary.target.put({}, entries, number)
+        return script

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Chunks of a study on this machine: threads around the compiled batch, which leaves the interpreter's lock alone.
+
+Rows that only the simulation can fly would wait for that lock, so a study of such rows is given to processes instead.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Generator, Iterable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+
+import numpy as np
+
+from .chunk import Chunk, is_carried, run_chunk
+from .study import Study
+from .table import Parts
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def chunk_rows(study: Study, workers: int) -> int:
+    """Rows a chunk: enough that a chunk's own cost doesn't count, few enough that all workers have some."""
+    most = 4096 if carried(study) else 32
+    # A chunk keeps its commands in memory: long scripts make it shorter.
+    most = max(1, min(most, 500_000 // max(1, len(study.entries))))
+    return max(1, min(most, -(-study.rows // (2 * workers))))
+
+
+def carried(study: Study) -> bool:
+    """Whether the compiled batch carries the study's rows, judged by some of them."""
+    rows = np.unique(np.linspace(0, study.rows - 1, min(study.rows, 9)).astype(np.int64))
+    return is_carried(study, rows)
+
+
+def local_chunks(
+    study: Study, parts: Parts, todo: Iterable[int], workers: int
+) -> Generator[tuple[int, Chunk], None, None]:
+    """Chunks as they get done, a few ahead of whoever takes them."""
+    pool = _threads(workers) if carried(study) else _processes(workers)
+    pending: dict[Future, int] = {}
+    waiting = iter(todo)
+    try:
+        while True:
+            while len(pending) < 2 * workers and (k := next(waiting, None)) is not None:
+                pending[pool.submit(run_chunk, study, *parts.bounds(k))] = k
+            if not pending:
+                return
+            done, _ = wait(pending, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield pending.pop(future), future.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _threads(workers: int) -> Executor:
+    return ThreadPoolExecutor(workers, thread_name_prefix="sweep")
+
+
+def _processes(workers: int) -> Executor:
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent)
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

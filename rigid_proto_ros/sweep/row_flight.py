@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""One row flown by ``Simulation``: what a row is by definition, and how those go that the compiled batch can't carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.flight_measures import measure_flight
+from ..core.quantities import CONTEXT, STATE, begin, which_is_met
+from ..core.simulation import Simulation
+from ..offline import OfflineRun
+from ..scenario import Scenario
+from .measures import Measures
+from .study import Study
+from .variation import Variation
+
+
+@dataclass
+class RowResult:
+    """failure: why there is no result, or empty. stop: number of the condition that ended the flight, or −1. end_ns: when it
+    ended. measured (k,), state (13,) at the end.
+    """
+
+    failure: str
+    stop: int
+    end_ns: int
+    measured: np.ndarray
+    state: np.ndarray
+
+
+def fly_row(study: Study, row: Variation) -> RowResult:
+    """The row's flight, beside its reference if the study has one; a failure is told, not raised."""
+    measures = study.measures
+    measured = np.full(len(measures.table), np.nan)
+    states, others = np.zeros((len(measures.looks_ns), STATE)), np.zeros((len(measures.looks_ns), STATE))
+    context = np.zeros(CONTEXT)
+    try:
+        scenario = row.scenario
+        if study.reference is not None:
+            reference = scenario.with_changes(study.reference)
+            reached, _, failure = _fly(reference, row, measures, others, context, np.zeros((0, 3)))
+            if failure:
+                return RowResult(f"reference: {failure}", -1, 0, measured, np.full(13, np.nan))
+        reached, stop, failure = _fly(scenario, row, measures, states, context, measures.stops)
+    except InputError as error:
+        return RowResult(" ".join(str(error).split()), -1, 0, measured, np.full(13, np.nan))
+    if failure:
+        return RowResult(failure, -1, 0, measured, np.full(13, np.nan))
+    looks = measures.looks_ns
+    measure_flight(measures.table, states, others, looks, measures.watched, reached, context, measured)
+    return RowResult("", stop, int(looks[reached - 1]), measured, states[reached - 1, :13].copy())
+
+
+def _fly(
+    scenario: Scenario, row: Variation, measures: Measures, states: np.ndarray, context: np.ndarray, stops: np.ndarray
+) -> tuple[int, int, str]:
+    """Fill ``states`` at the looks; how many were reached, which stop held, and why it failed."""
+    simulation = OfflineRun(scenario, row.commands).simulation
+    body = simulation.setup.body
+    first = _state(simulation)
+    begin(body.mass, body.inertia.ravel(), simulation.setup.gravity, first, context)
+    for k, look_ns in enumerate(measures.looks_ns.tolist()):
+        simulation.advance(look_ns)
+        if simulation.failure:
+            return 0, -1, simulation.failure
+        states[k] = _state(simulation)
+        stop = which_is_met(stops, states[k], context)
+        if stop >= 0:
+            return k + 1, stop, _refusals(simulation)
+    return len(measures.looks_ns), -1, _refusals(simulation)
+
+
+def _state(simulation: Simulation) -> np.ndarray:
+    """State row and the string's energy (STATE,)."""
+    string = simulation.string
+    energy = string.potential_energy(simulation.setup.body, simulation.state) if string else 0.0
+    return np.array([*simulation.state.row, energy])
+
+
+def _refusals(simulation: Simulation) -> str:
+    """A row whose commands were refused in flight isn't the row that was asked for."""
+    return "; ".join(f"{count} commands refused: {reason}" for reason, count in simulation.refused.items())

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: MIT
+"""A study: one scene, one script, what varies, what is measured. Read and checked whole before anything runs.
+
+Row i is a function of the study and i alone. Grids make every combination, the first one slowest; lists go in step with one
+another and count as one more grid; each combination is drawn ``samples`` times where something is random.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from ..bundled import example_names, example_path, study_names, study_path
+from ..core.errors import InputError
+from ..offline import OfflineRun, scene_file, scene_values
+from ..parameters import READ_ONLY, convert_all, parameter_named
+from ..poke_script import expand_script
+from ..scenario import Scenario, make_scenario, nanoseconds
+from ..scene_file import MAX_BYTES
+from .fields import mapping, number, whole
+from .forms import GRID, LIST, Draw, Points, read_form
+from .measures import Measures, read_measures
+from .sampling import MAX_SOBOL, SAMPLERS, uniforms
+from .targets import Target, read_target
+
+MANY_ROWS = 10_000_000
+"""More rows than this are likelier a slip than a wish."""
+MOST_ROWS = 1 << 53
+_MOTION_KEYS = ("scene", "script", "duration", "set", "vary", "reference")
+_KEYS = (*_MOTION_KEYS, "seed", "sampler", "samples", "watch", "measure", "stop")
+
+
+@dataclass(frozen=True)
+class Vary:
+    """One thing that varies, and how."""
+
+    target: Target
+    form: Points | Draw
+
+
+@dataclass(frozen=True)
+class Study:
+    """values: all parameters of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
+    samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise, or None.
+    """
+
+    name: str
+    values: Mapping[str, object]
+    script: object
+    duration_ns: int
+    seed: int
+    sampler: str
+    samples: int
+    vary: tuple[Vary, ...]
+    reference: Mapping[str, object] | None
+    measures: Measures
+    fingerprint: str
+
+    @property
+    def entries(self) -> list:
+        """The script's entries."""
+        return script_entries(self.script)
+
+    @property
+    def density_decides(self) -> bool:
+        """The density varies and not the mass: the scene's own mass, which would win, doesn't count then."""
+        varied = {v.target.parameter for v in self.vary}
+        return "density" in varied and "mass" not in varied
+
+    @property
+    def grids(self) -> list[int]:
+        """Points of each grid, then of the lists, if any."""
+        sizes = [len(v.form.values) for v in self.vary if v.form.kind == GRID]
+        return sizes + [len(v.form.values) for v in self.vary if v.form.kind == LIST][:1]
+
+    @property
+    def rows(self) -> int:
+        """How many variations there are."""
+        return math.prod(self.grids) * self.samples
+
+    def columns(self, rows: np.ndarray) -> list[np.ndarray]:
+        """The varied values of rows (n,), one array for each of ``vary``: numbers (n,) or (n, k), or objects (n,)."""
+        points = self._points(rows)
+        dimensions = sum(v.form.uniforms for v in self.vary if isinstance(v.form, Draw))
+        drawn = uniforms(self.sampler, self.seed, rows, self.samples, dimensions) if dimensions else None
+        found, at = [], 0
+        for vary, index in zip(self.vary, points, strict=True):
+            if isinstance(vary.form, Draw):
+                found.append(vary.form.shaped(drawn[:, at : at + vary.form.uniforms]))
+                at += vary.form.uniforms
+            else:
+                found.append(vary.form.taken(index))
+        return found
+
+    def _points(self, rows: np.ndarray) -> list:
+        """Which point of its grid or list each of ``vary`` has, None for a random one."""
+        rest = rows // self.samples
+        digits: list[np.ndarray] = []
+        for size in reversed(self.grids):
+            digits.append(rest % size)
+            rest = rest // size
+        digits.reverse()
+        found, at = [], 0
+        for vary in self.vary:
+            if vary.form.kind == GRID:
+                found.append(digits[at])
+                at += 1
+            else:
+                found.append(digits[-1] if vary.form.kind == LIST else None)
+        return found
+
+
+def script_entries(script) -> list:
+    """The list of entries in a script as YAML gives it."""
+    return (script["script"] if isinstance(script, dict) else script) or []
+
+
+def study_file(name: str) -> Path:
+    """The file of a study given by path or bundled name."""
+    path = Path(name)
+    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in study_names():
+        return study_path(name.removesuffix(".yaml"))
+    if not path.is_file():
+        raise InputError("study", name, f"a study file, or one of the bundled {', '.join(study_names()) or 'none'}")
+    return path
+
+
+def _yaml(path: Path) -> object:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(str(path), f"{path.stat().st_size} bytes", f"a file of at most {MAX_BYTES} bytes")
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(str(path), error.strerror, "a readable file") from None
+    except UnicodeDecodeError:
+        raise InputError(str(path), "bytes that aren't UTF-8", "a YAML file") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"{path}, line {mark.line + 1}" if mark else str(path)
+        raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
+
+
+def read_study(name: str, yes: bool = False) -> Study:
+    """A study file, by path or bundled name, checked whole; raises InputError naming the field. yes: however many rows."""
+    path = study_file(name)
+    return make_study(_yaml(path), str(path), path.parent, yes)
+
+
+def make_study(spec, name: str = "study", folder: Path = Path(), yes: bool = False) -> Study:
+    """The same from what YAML gives; scene and script are found from ``folder`` on."""
+    spec = mapping(spec, name, _KEYS, ("scene", "duration", "vary"))
+    scene = str(spec["scene"])
+    beside = folder / scene
+    path = beside if beside.is_file() else scene_file(scene)
+    own = convert_all(_settings(spec.get("set"), f"{name}, set"))
+    given = {**scene_values(path, lambda text: None), **own}
+    if "density" in own and "mass" not in own:
+        given["mass"] = 0.0
+    base = make_scenario(given)
+    script = _script(spec.get("script"), folder, f"{name}, script")
+    duration_s = number(spec["duration"], f"{name}, duration", 1e-9, 1e9)
+    seed = whole(spec.get("seed", 0), f"{name}, seed", 0, 1 << 128)
+    sampler = spec.get("sampler", "random")
+    if sampler not in SAMPLERS:
+        raise InputError(f"{name}, sampler", sampler, ", ".join(SAMPLERS))
+    watch = number(spec.get("watch", 50.0), f"{name}, watch", 1e-6, 1e6)
+    measures = read_measures(spec.get("measure"), spec.get("stop"), watch, duration_s, f"{name}, measure")
+    vary = _vary(spec["vary"], name, base.values, script_entries(script))
+    reference = _reference(spec.get("reference"), f"{name}, reference", base)
+    if measures.needs_reference and reference is None:
+        raise InputError(f"{name}, reference", None, "parameters of a reference, as a difference is measured")
+    samples = _samples(spec.get("samples"), f"{name}, samples", vary, sampler)
+    study = Study(
+        name, base.values, script, nanoseconds(duration_s), seed, sampler, samples, vary, reference, measures, ""
+    )
+    _check_rows(study, f"{name}, samples", yes)
+    _check_flyable(study, base)
+    content = json.dumps([spec, dict(base.values), script], sort_keys=True, default=str)
+    return replace(study, fingerprint=hashlib.sha256(content.encode()).hexdigest())
+
+
+def _settings(spec, field: str) -> dict:
+    if spec is None:
+        return {}
+    if not isinstance(spec, dict):
+        raise InputError(field, spec, "{parameter: value, ...}")
+    found: dict = {}
+    for key, value in spec.items():
+        if isinstance(value, dict):
+            found.update(_settings({f"{key}.{k}": v for k, v in value.items()}, field))
+            continue
+        parameter = parameter_named(str(key))
+        try:
+            found[str(key)] = parameter.convert(value)
+        except InputError as error:
+            raise InputError(f"{field}.{key}", error.received, error.accepted) from None
+    return found
+
+
+def _script(spec, folder: Path, field: str):
+    if spec is None:
+        return []
+    if isinstance(spec, str):
+        beside = folder / spec
+        if not beside.is_file() and spec.removesuffix(".yaml") in example_names():
+            beside = example_path(spec.removesuffix(".yaml"))
+        if not beside.is_file():
+            raise InputError(field, spec, f"a script file, or one of the bundled {', '.join(example_names())}")
+        field, spec = str(beside), _yaml(beside)
+    expand_script(spec, field)
+    return spec
+
+
+def _vary(spec, name: str, values, entries: list) -> tuple[Vary, ...]:
+    if not isinstance(spec, dict) or not spec:
+        raise InputError(f"{name}, vary", spec, "{name: how, ...} with at least one thing that varies")
+    found = []
+    for key, how in spec.items():
+        field = f"{name}, vary.{key}"
+        target = read_target(str(key), f"{name}, vary", values, entries)
+        form = read_form(how, field)
+        for probe in form.probes:
+            _check_value(target, probe, field, values, entries)
+        found.append(Vary(target, form))
+    lengths = {len(v.form.values) for v in found if v.form.kind == LIST}
+    if len(lengths) > 1:
+        raise InputError(f"{name}, vary", sorted(lengths), "lists of one length: they go in step")
+    return tuple(found)
+
+
+def _check_value(target: Target, value, field: str, values, entries: list) -> None:
+    """Put a value where it will stand, and see whether that is accepted there."""
+    changed, copied = dict(values), json.loads(json.dumps(entries))
+    try:
+        target.put(changed, copied, value)
+        if target.entry:
+            expand_script(copied, "script")
+    except InputError as error:
+        where = f"{field} ({error.field})" if target.entry else field
+        raise InputError(where, error.received, error.accepted) from None
+    except (TypeError, AttributeError, IndexError, KeyError):
+        raise InputError(field, value, f"a value that fits {target.name}") from None
+
+
+def _reference(spec, field: str, base: Scenario) -> dict | None:
+    if spec is None:
+        return None
+    changes = _settings(spec, field)
+    if not changes:
+        raise InputError(field, spec, "{parameter: value, ...}, at least one")
+    for parameter in changes:
+        if parameter_named(parameter).changes == READ_ONLY:
+            raise InputError(f"{field}.{parameter}", changes[parameter], "a parameter that changes the motion")
+    return changes
+
+
+def _samples(spec, field: str, vary: tuple[Vary, ...], sampler: str) -> int:
+    random = any(isinstance(v.form, Draw) for v in vary)
+    points = any(isinstance(v.form, Points) for v in vary)
+    if not random:
+        if spec not in (None, 1):
+            raise InputError(field, spec, "nothing: the study has nothing random to draw samples of")
+        return 1
+    if spec is None and not points:
+        raise InputError(field, None, "how many rows to draw")
+    most = MAX_SOBOL if sampler == "sobol" else MOST_ROWS
+    return whole(1 if spec is None else spec, field, 1, most)
+
+
+def _check_rows(study: Study, field: str, yes: bool) -> None:
+    if study.rows > MANY_ROWS and not yes:
+        raise InputError(field, f"{study.rows} rows in all", f"at most {MANY_ROWS} without --yes")
+    if study.rows > MOST_ROWS:
+        raise InputError(field, f"{study.rows} rows in all", f"at most {MOST_ROWS}")
+
+
+def _check_flyable(study: Study, base: Scenario) -> None:
+    """The scene as it stands takes off with its script, and so does its reference: what fails later is the row's own."""
+    commands = expand_script(study.script, "script", base.values["wrench_timeout"])
+    OfflineRun(base, commands)
+    if study.reference is not None:
+        OfflineRun(base.with_changes(study.reference), commands)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""What a study varies: a parameter, one component of it, or a field of an entry of the poke script.
+
+``mass``, ``initial.angular_velocity.x``, ``explicit_inertia.tensor.izz``, ``ballast.tip.mass``; ``script.1.force.z``,
+``script.2.at.vertex``, ``script.1.wrench.duration``.
+"""
+
+from __future__ import annotations
+
+import copy
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..core.errors import InputError
+from ..parameters import READ_ONLY, Parameter, parameter_named
+
+_COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
+_BALLAST = "mass x y z"
+_LOAD_FIELDS = ("at", "force", "push", "impulse", "torque", "angular_impulse", "axes", "duration")
+SCRIPT_FIELDS = ("t", *_LOAD_FIELDS, "repeat", "every", "jitter", "seed", "wrench", "string", "set")
+
+
+@dataclass(frozen=True)
+class Target:
+    """name: as the study writes it. parameter: and ``path`` a component (k,) or (). Otherwise ``entry`` counts from 1 in the
+    script, and ``path`` leads to the field.
+    """
+
+    name: str
+    parameter: str = ""
+    entry: int = 0
+    path: tuple = ()
+
+    def put(self, values: dict, entries: list, value) -> None:
+        """Set the varied value in parameters (complete ones) or in the script's entries."""
+        if self.parameter:
+            whole = _with_component(values[self.parameter], self.path[0], value) if self.path else value
+            values[self.parameter] = parameter_named(self.parameter).convert(whole)
+            return
+        place = entries[self.entry - 1]
+        for key, following in zip(self.path, self.path[1:], strict=False):
+            if isinstance(place, list):
+                place = place[key]
+                continue
+            if not isinstance(place.get(key), (dict, list)):
+                place[key] = [0.0, 0.0, 0.0] if isinstance(following, int) else {}
+            place = place[key]
+        place[self.path[-1]] = copy.deepcopy(value)
+
+    def component_names(self, count: int) -> list[str]:
+        """Names of ``count`` columns for a vector value."""
+        labels = component_labels(self.parameter, count)
+        return [f"{self.name}.{label}" for label in labels]
+
+
+def component_labels(parameter: str, count: int) -> list[str]:
+    """What the components of a vector are called."""
+    if parameter.startswith("ballast.") and count == 4:
+        return _BALLAST.split()
+    return _COMPONENTS[count].split() if count in _COMPONENTS else [str(k) for k in range(count)]
+
+
+def _with_component(vector: list, k: int, value) -> list:
+    vector = list(vector) * (3 if len(vector) == 1 else 1)
+    vector[k] = value
+    return vector
+
+
+def read_target(name: str, field: str, values: Mapping[str, object], entries: list) -> Target:
+    """The target of a name, given the scene's values and the script's entries; raises InputError with the nearest name."""
+    if name.split(".")[0] == "script":
+        return _script_target(name, field, entries)
+    parameter, component = name, ""
+    try:
+        declared = parameter_named(name)
+    except InputError as error:
+        parameter, _, component = name.rpartition(".")
+        if not parameter:
+            raise InputError(field, name, error.accepted) from None
+        try:
+            declared = parameter_named(parameter)
+        except InputError:
+            raise InputError(field, name, error.accepted) from None
+    if declared.changes == READ_ONLY:
+        raise InputError(field, name, "a parameter that varies; this one is fixed for the node")
+    if parameter not in values:
+        raise InputError(field, name, f"a parameter that the scene has: add {parameter} to `set`")
+    path = (_component(declared, component, field),) if component else ()
+    return Target(name, parameter, 0, path)
+
+
+def _component(declared: Parameter, component: str, field: str) -> int:
+    labels = component_labels(declared.name, max(declared.lengths, default=0))
+    if component not in labels:
+        raise InputError(field, component, f"a component of {declared.name}: {', '.join(labels) or 'it has none'}")
+    return labels.index(component)
+
+
+def _script_target(name: str, field: str, entries: list) -> Target:
+    _, _, rest = name.partition(".")
+    number, *keys = rest.split(".")
+    accepted = f"script.<entry>.<field>, entries 1 to {len(entries)}"
+    if not entries:
+        raise InputError(field, name, "a study with a script")
+    if not number.isdigit() or not 1 <= int(number) <= len(entries) or not keys:
+        raise InputError(field, name, accepted)
+    if keys[0] not in SCRIPT_FIELDS:
+        near = difflib.get_close_matches(keys[0], SCRIPT_FIELDS, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise InputError(field, keys[0], f"{hint}one of {', '.join(SCRIPT_FIELDS)}")
+    if keys[0] == "set":
+        # A parameter's name has dots of its own.
+        keys = ["set", ".".join(keys[1:])]
+        parameter_named(keys[1])
+    path = tuple("xyz".index(key) if key in ("x", "y", "z") else key for key in keys)
+    return Target(name, "", int(number), path)

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT
+"""What rows have in common, settled once: mesh constants, integrator, and the script as arrays for the compiled batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import batch_body as bb
+from ..core import batch_flight as bf
+from ..core.commands import WrenchCommand
+from ..core.errors import InputError, MeshError
+from ..core.frames import parse_frame
+from ..core.integrators import check_carried, integrator_named
+from ..core.integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, Integrator, needs_of_load
+from ..core.integrators.taylor_adaptive import degree_for
+from ..core.loads import Load, settle
+from ..poke_script import ScriptCommand
+from ..scenario import BodyMesh, nanoseconds
+
+FAST = {
+    "scale": (bb.SCALE, 3),
+    "mass": (bb.BODY_MASS, 1),
+    "density": (bb.DENSITY, 1),
+    "explicit_inertia.mass": (bb.GIVEN_MASS, 1),
+    "explicit_inertia.center_of_mass": (bb.GIVEN_CENTER, 3),
+    "explicit_inertia.tensor": (bb.GIVEN_TENSOR, 6),
+    "gravity": (bb.GRAVITY, 3),
+    "linear_damping": (bb.LINEAR_DAMPING, 1),
+    "angular_damping": (bb.ANGULAR_DAMPING, 1),
+    "initial.position": (bb.POSITION, 3),
+    "initial.orientation_xyzw": (bb.ORIENTATION, 4),
+    "initial.linear_velocity": (bb.VELOCITY, 3),
+    "initial.angular_velocity": (bb.ANGULAR_VELOCITY, 3),
+    "accuracy": (bb.ACCURACY, 1),
+}
+"""Parameters that are numbers of a row of settings: where they stand, how many they are."""
+
+TIMES = {"step": bb.STEP_NS, "poke_duration": bb.POKE_NS}
+"""Parameters that are whole nanoseconds of a row, at least one."""
+
+MAX_COMMANDS = 2000
+"""Of a script in the compiled batch; longer ones are rare, and rows of them are the simulation's."""
+
+_AXES = {"world": bf.WORLD_AXES, "body": bf.BODY_AXES, "normal": bf.NORMAL_AXES}
+
+
+class NotCarried(Exception):
+    """The compiled batch can't carry the row; the simulation can, or knows why not."""
+
+
+@dataclass(frozen=True)
+class Script:
+    """Commands in the order in which equal times act: numbers (n, 3) and loads (n, LOAD) of core/batch_flight.py."""
+
+    commands: np.ndarray
+    loads: np.ndarray
+
+
+def settings_of(values: Mapping[str, object]) -> np.ndarray:
+    """The row of settings (SETTINGS,) of complete values."""
+    row = np.zeros(bb.SETTINGS)
+    for name, (at, count) in FAST.items():
+        value = np.ravel(np.asarray(values[name], dtype=float))
+        row[at : at + count] = np.repeat(value, 3) if name == "scale" and len(value) == 1 else value
+    return row
+
+
+def times_of(values: Mapping[str, object]) -> np.ndarray:
+    """The row of times (TIMES,) of complete values."""
+    row = np.zeros(bb.TIMES, np.int64)
+    for name, at in TIMES.items():
+        row[at] = max(1, nanoseconds(values[name]))
+    row[bb.TIMEOUT_NS] = nanoseconds(values["wrench_timeout"])
+    row[bb.DEGREE] = degree_for(values["accuracy"])
+    return row
+
+
+def ballast_names(values: Mapping[str, object]) -> list[str]:
+    """Parameters of point masses, in the order in which they are added."""
+    return sorted(name for name in values if name.startswith("ballast."))
+
+
+def ballast_of(values: Mapping[str, object]) -> np.ndarray:
+    """Point masses (k, 4)."""
+    return np.array([values[name] for name in ballast_names(values)], dtype=float).reshape(-1, 4)
+
+
+def constants_of(values: Mapping[str, object], body_mesh: BodyMesh | None) -> np.ndarray:
+    """What of the mesh and the model doesn't change with a row's settings (CONSTANTS,); raises NotCarried, InputError."""
+    row = np.zeros(bb.CONSTANTS)
+    model = values["inertia_model"]
+    row[bb.GYROSCOPIC] = float(values["gyroscopic"])
+    if body_mesh is not None:
+        row[bb.HAS_SURFACE] = 1.0
+        row[bb.EXTENT : bb.EXTENT + 3] = body_mesh.surface.extent
+    if model == "explicit":
+        row[bb.MODEL] = bb.EXPLICIT
+        return row
+    if body_mesh is None:
+        raise NotCarried
+    moments = body_mesh.moments.moments(model)
+    try:
+        row[bb.SOLID_MEASURE] = body_mesh.moments.moments("solid").measure
+    except MeshError:
+        row[bb.SOLID_MEASURE] = np.nan
+    row[bb.MODEL] = bb.SHELL if model == "shell" else bb.ORDINARY
+    row[bb.MEASURE] = moments.measure
+    row[bb.REFERENCE : bb.REFERENCE + 3] = moments.reference
+    row[bb.CENTER : bb.CENTER + 3] = moments.center
+    row[bb.CENTER_LOW : bb.CENTER_LOW + 3] = moments.center_low
+    row[bb.SECOND : bb.SECOND + 6] = moments.second
+    return row
+
+
+def checked_integrator(values: Mapping[str, object], loads: list[Load]) -> Integrator:
+    """The integrator, if it can carry these loads; raises NotCarried."""
+    if values["string.attached"]:
+        raise NotCarried
+    integrator = integrator_named(values["integrator"])
+    needs = set().union(*map(needs_of_load, loads))
+    if not values["gyroscopic"]:
+        needs.add(NO_GYROSCOPIC_TERM)
+    if values["angular_damping"]:
+        needs.add(ANGULAR_DAMPING)
+    try:
+        check_carried(integrator, frozenset(needs))
+    except InputError:
+        raise NotCarried from None
+    return integrator
+
+
+def contacts_of(values: Mapping[str, object]) -> dict[str, tuple]:
+    """Contacts by name, in mesh coordinates."""
+    return {name.removeprefix("contacts."): tuple(v) for name, v in values.items() if name.startswith("contacts.")}
+
+
+class Settler:
+    """Settles the frames of one mesh's commands, each once."""
+
+    def __init__(self, values: Mapping[str, object], body_mesh: BodyMesh | None) -> None:
+        self._contacts = contacts_of(values)
+        self._surface = body_mesh.surface if body_mesh else None
+        self._known: dict[str, tuple] = {}
+
+    def frame(self, text: str):
+        """The frame, and a load of no force settled there; raises InputError, or NotCarried for a ray."""
+        if text not in self._known:
+            frame = parse_frame(text, set(self._contacts))
+            if frame.point[0] == "ray":
+                raise NotCarried
+            nothing = (0.0, 0.0, 0.0)
+            load = settle(frame, nothing, nothing, None, self._surface, self._contacts, None)
+            if len(self._known) > 100_000:
+                self._known.clear()
+            self._known[text] = (frame, load)
+        return self._known[text]
+
+    def numbers(self, command: ScriptCommand) -> tuple[list[int], np.ndarray, Load | None]:
+        """A command's integers, its load's numbers, and what the integrator has to carry of it."""
+        row = np.zeros(bf.LOAD)
+        if command.kind == "clear_wrench":
+            return [command.t_ns, -1, bf.CLEAR], row, None
+        if command.kind not in ("wrench", "poke"):
+            raise NotCarried
+        frame, settled = self.frame(command.frame_id)
+        held = command.kind == "wrench"
+        WrenchCommand(held, frame, command.force, command.torque, command.t_ns, command.frame_id, b"")
+        load = Load(settled.axes, settled.mesh_point, command.force, command.torque, settled.mesh_normal)
+        kind = bf.HELD if held else bf.IMPULSE if frame.impulse else bf.PULSE
+        duration_ns = -1 if frame.duration_s is None else round(frame.duration_s * 1e9)
+        row[bf.LOAD_AXES] = _AXES[load.axes]
+        if load.mesh_point is not None:
+            row[bf.HAS_POINT] = 1.0
+            row[bf.POINT : bf.POINT + 3] = load.mesh_point
+        if load.mesh_normal is not None:
+            row[bf.NORMAL : bf.NORMAL + 3] = load.mesh_normal
+        row[bf.FORCE : bf.FORCE + 3] = command.force
+        row[bf.TORQUE : bf.TORQUE + 3] = command.torque
+        return [command.t_ns, duration_ns, kind], row, None if frame.impulse else load
+
+
+_RANKS = {"clear_wrench": 0, "wrench": 3, "poke": 4}
+
+
+def acting_order(commands: list[ScriptCommand]) -> list[int]:
+    """Indices of commands in the order in which the simulation lets them act."""
+    keys = [(c.t_ns, _RANKS.get(c.kind, 0), c.message(c.t_ns)) for c in commands]
+    return sorted(range(len(commands)), key=keys.__getitem__)
+
+
+def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
+    """Commands as arrays, and the loads that the integrator has to carry; raises NotCarried, InputError."""
+    if len(commands) > MAX_COMMANDS:
+        raise NotCarried
+    ordered = [settler.numbers(commands[k]) for k in acting_order(commands)]
+    integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, 3)
+    loads = np.array([row for _, row, _ in ordered]).reshape(-1, bf.LOAD)
+    return Script(integers, loads), [load for _, _, load in ordered if load is not None]

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""One row of a study as a scene and a script: what the row means, however it is flown."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import yaml
+
+from ..poke_script import ScriptCommand, expand_script
+from ..scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
+from .forms import VERTEX, Draw
+from .study import Study, script_entries
+
+MESHES_KEPT = 16
+"""Meshes with their moments that a process keeps."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """values: every parameter. script: as YAML gives it."""
+
+    values: Mapping[str, object]
+    script: object
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario of the values; raises InputError where no body or flight has them."""
+        return build_scenario(self.values, body_mesh_of(self.values))
+
+    @property
+    def commands(self) -> list[ScriptCommand]:
+        """The script's commands; raises InputError."""
+        return expand_script(self.script, "script", self.values["wrench_timeout"])
+
+    @property
+    def script_text(self) -> str:
+        """The script as a file."""
+        return yaml.safe_dump(self.script, sort_keys=False, default_flow_style=None, width=120)
+
+
+def variation(study: Study, row: int) -> Variation:
+    """Row ``row`` of a study."""
+    return apply(study, [column[0] for column in study.columns(np.array([row], np.int64))])
+
+
+def apply(study: Study, chosen: list) -> Variation:
+    """The variation with these values of what varies."""
+    values, script = dict(study.values), copy.deepcopy(study.script)
+    entries = script_entries(script)
+    if study.density_decides:
+        values["mass"] = 0.0
+    vertices = []
+    for vary, value in zip(study.vary, chosen, strict=True):
+        if isinstance(vary.form, Draw) and vary.form.shape == VERTEX:
+            vertices.append((vary, value))
+        else:
+            vary.target.put(values, entries, plain(value))
+    for vary, value in vertices:
+        vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh_of(values))})
+    return Variation(values, script)
+
+
+def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
+    """Which vertex a uniform number in [0, 1) chooses; 0 without a mesh, which is then refused for want of one."""
+    return int(uniform * len(body_mesh.surface.vertices)) if body_mesh else 0
+
+
+def plain(value) -> object:
+    """A value as YAML has it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    return list(value) if isinstance(value, tuple) else value
+
+
+def body_mesh_of(values: Mapping[str, object]) -> BodyMesh | None:
+    """The mesh that the values name, with its moments; read once in a process."""
+    mesh = values["mesh"]
+    # Only a body without a mesh asks for its model.
+    model = "solid" if mesh else values["inertia_model"]
+    return _body_mesh(mesh, values["mesh_repair"], values["mesh_fallback"], model)
+
+
+@lru_cache(maxsize=MESHES_KEPT)
+def _body_mesh(mesh: str, repair: bool, fallback: str, model: str) -> BodyMesh | None:
+    names = {"mesh": mesh, "mesh_repair": repair, "mesh_fallback": fallback, "inertia_model": model}
+    return load_body_mesh(names)
