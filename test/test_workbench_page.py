@@ -235,14 +235,17 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
 
 
 def test_two_pages_agree(page, ear, bench, browser) -> None:
+    label = "Linear damping [N s/m]"
+    page.tab("Physics")
+    page.write(label, "0.25")
+    ear.until_value("linear_damping", lambda value: value == 0.25)
     other = Page(browser, bench.address)
-    try:
-        page.tab("Physics")
-        other.tab("Physics")
-        page.write("Linear damping [N s/m]", "0.25")
-        other.until(lambda: other.input("Linear damping [N s/m]").input_value() == "0.25", "the other page's value")
-    finally:
-        other.page.close()
+    other.tab("Physics")
+    other.until(lambda: other.input(label).input_value() == "0.25", "the first page's value on the second")
+    other.write(label, "0.5")
+    other.until(lambda: ear.values()["linear_damping"] == 0.5, "the second page's value in the node")
+    other.page.close()
+    page.until(lambda: page.input(label).input_value() == "0.5", "the second page's value on the first")
     ear.set_named({"linear_damping": 0.0})
 
 

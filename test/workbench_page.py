@@ -56,7 +56,10 @@ class Page:
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
         # viser says that WebGL runs in software, and stands before the picture while it does.
-        self.page.locator(".mantine-Notification-closeButton").first.click()
+        see_through = (
+            ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
+        )
+        self.page.add_style_tag(content=see_through)
         self.until(lambda: "is flying" in self.text or "is sleeping" in self.text, "a node on the page")
 
     @property
