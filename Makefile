@@ -34,8 +34,9 @@ lint: setup ## ruff and mypy
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 
-pictures: run ## fly, and draw the README's pictures anew (needs mesa-vulkan-drivers and chromium)
+pictures: run ## fly, and draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
+	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) test/workbench_pictures.py docs/workbench.png
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash

@@ -28,6 +28,8 @@ TEST = [
     *MCAP,
     "mcap-ros2-support>=0.5",
     "playwright>=1.50",
+    "nbclient>=0.10",
+    "ipykernel>=6",
 ]
 
 setup(

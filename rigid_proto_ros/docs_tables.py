@@ -3,7 +3,8 @@
 
     python -m rigid_proto_ros.docs_tables [--check]
 
-A document holds a table between ``<!-- table: NAME -->`` and ``<!-- end -->``; what stands there is replaced. With
+A document holds a table between ``<!-- table: NAME -->`` and ``<!-- end -->``, or what a lesson says to try between ``<!-- lesson:
+SCENE -->`` and the same end; what stands there is replaced. With
 ``--check`` nothing is written and the exit status is 1 when a document is behind.
 """
 
@@ -29,12 +30,13 @@ from .core.integrators.integrator import (
     WORLD_TORQUE,
 )
 from .interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from .lessons import lesson, lessons
 from .parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = ("README.md", "docs/physics.md", "docs/architecture.md")
 
-_MARKED = re.compile(r"(<!-- table: (?P<name>[a-z]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+_MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
 def topics() -> str:
@@ -193,6 +195,16 @@ def _attitude_error(row: dict[str, str]) -> float:
     return math.inf if math.isnan(error) else error
 
 
+def lesson_table() -> str:
+    """Every lesson with its page."""
+    return _table(("scene", "lesson"), ((_code(one.name), f"[{one.title}]({one.name}.md)") for one in lessons()))
+
+
+def lesson_to_try(name: str) -> str:
+    """A lesson's sentences, as the workbench shows them."""
+    return "\n".join(f"{number}. {sentence}" for number, sentence in enumerate(lesson(name).sentences, 1))
+
+
 TABLES = {
     "topics": topics,
     "services": services,
@@ -200,18 +212,24 @@ TABLES = {
     "integrators": integrators,
     "modules": modules,
     "masses": masses,
+    "lessons": lesson_table,
     "motions": motions,
 }
 
 
 def filled(text: str) -> str:
     """A document with its tables written anew."""
-    return _MARKED.sub(lambda m: f"{m[1]}{TABLES[m['name']]()}\n{m[4]}", text)
+
+    def written(found: re.Match) -> str:
+        text = lesson_to_try(found["name"]) if found["kind"] == "lesson" else TABLES[found["name"]]()
+        return f"{found[1]}{text}\n{found[5]}"
+
+    return _MARKED.sub(written, text)
 
 
 def documents() -> list[Path]:
     """The documents that hold tables."""
-    return [ROOT / name for name in DOCUMENTS if (ROOT / name).is_file()]
+    return [ROOT / name for name in DOCUMENTS if (ROOT / name).is_file()] + sorted(ROOT.glob("docs/lessons/*.md"))
 
 
 def main(argv: list[str] | None = None) -> int:

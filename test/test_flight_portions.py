@@ -103,3 +103,22 @@ def test_portions_give_the_same_bits(integrator):
         ticks += 1
     assert portioned.state.sha256() == whole.state.sha256()
     assert (portioned.steps, portioned.force_evaluations) == (whole.steps, whole.force_evaluations)
+
+
+def test_while_commands_come_they_are_taken_once_more_shortly_before_each_publication(monkeypatch):
+    now = [10**12]
+    monkeypatch.setattr("rigid_proto_ros.ros.flight.time.monotonic_ns", lambda: now[0])
+    rig = Rig({"publish_rate": 1000.0})
+    rig.lively = True
+    rig.flight._take_commands = lambda wall_ns: rig.lively
+    wakes = []
+    for _ in range(6):
+        rig.flight.tick()
+        now[0] = max(now[0], rig.flight.next_wake_ns())
+        wakes.append(now[0] - 10**12)
+    assert [round(w / 1e5) for w in wakes] == [8, 10, 18, 20, 28, 30]
+    rig.lively = False
+    for _ in range(2):
+        rig.flight.tick()
+        now[0] = max(now[0], rig.flight.next_wake_ns())
+    assert round((now[0] - 10**12) / 1e6) == 5

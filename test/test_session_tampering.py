@@ -152,7 +152,7 @@ def test_one_bit_of_a_state_is_found(session, topic):
     for _ in range(5):
         rows = session.published[topic].rows.copy()
         k, column = rng.randrange(1, len(rows)), rng.randrange(rows.shape[1])
-        rows.view(np.uint64)[k, column] ^= 1
+        rows.view(np.uint64)[k, column] ^= np.uint64(1)
         published = {**session.published, topic: replace(session.published[topic], rows=rows)}
         difference = verify(replace(session, published=published))
         assert f"{topic} differs" in str(difference)

@@ -11,8 +11,8 @@ from hand_session import random_hand_session
 
 from rigid_proto_ros.bundled import example_names, scene_names
 from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.lessons import lesson, lessons, read_lesson
 from rigid_proto_ros.session_messages import PROJECTIONS
-from rigid_proto_ros.workbench.lessons import lesson, lessons, read_lesson
 from rigid_proto_ros.workbench.readouts import angle_between, gravity_energy, readout
 
 

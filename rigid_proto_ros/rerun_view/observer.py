@@ -11,6 +11,7 @@ reset the one before is kept beside it as FILE.run1.rrd, FILE.run2.rrd and so on
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -50,7 +51,7 @@ class RerunObserver(Observer):
     every warning, ``on_error`` one line when recording has stopped because the file can't be written; both may be
     called from another thread.
 
-    Raises InputError for a file that can't be written, a port that is taken, an unknown viewer.
+    Raises InputError for a file that can't be written, a port that is taken, an unknown viewer, and without rerun-sdk.
     """
 
     def __init__(
@@ -69,6 +70,11 @@ class RerunObserver(Observer):
             raise InputError("viewer", viewer, "one of " + ", ".join(VIEWERS))
         if initial_view not in INITIAL_VIEWS:
             raise InputError("initial_view", initial_view, "one of " + ", ".join(INITIAL_VIEWS))
+        if (record or viewer != "none") and importlib.util.find_spec("rerun") is None:
+            field, received = ("record", record) if record else ("viewer", viewer)
+            raise InputError(
+                field, received, "the package rerun-sdk (pip install rerun-sdk), or an .mcap file to record to"
+            )
         self.live_address = ""
         self.web_address = ""
         self._name = name

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from ..bundled import example_path
 from ..core.errors import InputError
+from ..lessons import Lesson, lessons
 from .history import Rewind
-from .lessons import Lesson, lessons
 from .link import decode, encode
 from .situation import Situation, situation_of
 

@@ -11,8 +11,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..bundled import scene_names, scene_path
-from ..core.errors import InputError
+from .bundled import scene_names, scene_path
+from .core.errors import InputError
 
 SENTENCES = 3
 
