@@ -53,6 +53,10 @@ class Page:
     def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         self.page.set_default_timeout(PATIENCE_S * 1e3)
+        # Software WebGL draws as often as it is let, and leaves the page no time for anything else.
+        self.page.add_init_script(
+            "const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), 50)"
+        )
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
         # viser says that WebGL runs in software, and stands before the picture while it does.
@@ -75,7 +79,7 @@ class Page:
         return found
 
     def tab(self, name: str) -> None:
-        self.page.get_by_role("tab", name=name, exact=True).click()
+        self.page.get_by_role("tab", name=name, exact=True).click(force=True)
 
     def button(self, name: str) -> None:
         self.page.get_by_role("button", name=name, exact=True).click()
