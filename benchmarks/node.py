@@ -9,7 +9,6 @@ Writes node.csv and node_skips.csv, with the machine's load beside each figure; 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
 import statistics
@@ -74,12 +73,13 @@ def main() -> None:
         skipped.write()
 
 
-@contextlib.contextmanager
-def listeners():
-    """One subscriber each on pose and twist."""
-    with client("subscribe", "pose"), client("subscribe", "twist"):
-        time.sleep(2.0)
-        yield
+def listened_to(note, what: str, process: Process, seconds: float) -> None:
+    """Share of a core with one subscriber each on pose and twist, and the rate that is held meanwhile."""
+    with client("subscribe", "pose"), client("subscribe", "twist", str(seconds + 2)) as listener:
+        listener.popen.stdout.readline()
+        time.sleep(1.0)
+        note(what, "cpu", process.cpu_share(seconds), "%")
+        note(what, "rate", result_of(listener)["rate"], "1/s")
 
 
 def start_up(note, seconds: float) -> None:
@@ -98,27 +98,21 @@ def processor(note, seconds: float) -> None:
     """CPU of our node as listeners and motion come and go: what isn't needed isn't done."""
     with node(KILOHERTZ, SPIN) as process:
         note("1 kHz, nobody listens", "cpu", process.cpu_share(seconds), "%")
-        with listeners():
-            note("1 kHz, pose and twist listened to", "cpu", process.cpu_share(seconds), "%")
+        listened_to(note, "1 kHz, pose and twist listened to", process, seconds)
         note("1 kHz, memory after that", "rss", process.memory_mb(), "MB")
     with node(KILOHERTZ) as process:
         note("1 kHz, at rest, nobody listens", "cpu", process.cpu_share(seconds), "%")
-        with listeners():
-            note("1 kHz, at rest, pose and twist listened to", "cpu", process.cpu_share(seconds), "%")
+        listened_to(note, "1 kHz, at rest, pose and twist listened to", process, seconds)
     with node(SPIN) as process:
         note("100 Hz, nobody listens", "cpu", process.cpu_share(seconds), "%")
-        with listeners():
-            note("100 Hz, pose and twist listened to", "cpu", process.cpu_share(seconds), "%")
+        listened_to(note, "100 Hz, pose and twist listened to", process, seconds)
 
 
 def baselines(note, seconds: float) -> None:
     """The same job as a plain rclpy node does it."""
     for engine in ("ours", "mujoco"):
-        with client("plain", engine, "1000") as process, listeners():
-            if process.popen.poll() is None:
-                note(
-                    f"plain rclpy timer and messages, {engine} stepping, 1 kHz", "cpu", process.cpu_share(seconds), "%"
-                )
+        with client("plain", engine, "1000") as process:
+            listened_to(note, f"plain rclpy timer and messages, {engine} stepping, 1 kHz", process, seconds)
 
 
 def rate(note, seconds: float) -> None:
@@ -139,7 +133,7 @@ def latency(note, seconds: float) -> None:
 def result_of(process: Process) -> dict:
     """What a client prints when it is done."""
     process.popen.wait(600)
-    return json.loads(process.end())
+    return json.loads(process.end().splitlines()[-1])
 
 
 def recording(note, seconds: float) -> None:

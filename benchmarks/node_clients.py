@@ -26,16 +26,21 @@ SPIN = (0.05, 0.1, 12.0)
 
 
 def subscribe(topic: str, seconds: str = "0") -> None:
-    """Count messages of ~/pose or ~/twist without reading them; with seconds print their publication times' intervals."""
+    """Count messages of ~/pose or ~/twist without reading them: says ``hearing`` at the first, and at the end, or ``seconds``
+    later, the intervals of their times of publication.
+    """
     node = Node("listener_" + topic)
     times: list[int] = []
     message_type = {"pose": PoseStamped, "twist": TwistStamped}[topic]
     subscription = node.create_subscription(message_type, f"/rigid_body/{topic}", lambda m: None, 100, raw=True)
-    end = time.monotonic() + float(seconds) if float(seconds) else float("inf")
+    end = float("inf")
     while time.monotonic() < end and not STOP.is_set():
         with subscription.handle:
             while (taken := subscription.handle.take_message(message_type, True)) is not None:
                 times.append(taken[1]["source_timestamp"])
+        if times and end == float("inf"):
+            print("hearing", flush=True)
+            end = time.monotonic() + float(seconds) if float(seconds) else sys.float_info.max
         time.sleep(0.02)
     intervals = np.diff(times[len(times) // 10 :]) * 1e-6
     if len(intervals):

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -16,13 +18,29 @@ import psutil
 FOLDER = Path(__file__).parent
 
 
-DOMAIN = str(1 + os.getpid() % 100)
-"""Of this run and its children, so that two benchmarks at once don't hear each other."""
+_held: list[socket.socket] = []
+
+
+@functools.cache
+def domain() -> str:
+    """A ROS domain that no other benchmark or test session on this machine holds."""
+    # An abstract socket is the lock: the kernel frees it with the process, so a crash leaves nothing behind.
+    for k in range(101):
+        number = 1 + (os.getpid() + k) % 101
+        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lock.bind(f"\0rigid_proto_ros.domain.{number}")
+        except OSError:
+            lock.close()
+            continue
+        _held.append(lock)
+        return str(number)
+    raise RuntimeError("all ROS domains 1..101 are held by others")
 
 
 def environment() -> dict[str, str]:
     """A private domain on this machine."""
-    return {**os.environ, "ROS_DOMAIN_ID": DOMAIN, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {**os.environ, "ROS_DOMAIN_ID": domain(), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 class Process:

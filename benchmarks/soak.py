@@ -109,8 +109,8 @@ def _shown_out(guest: tuple[float, Process | subprocess.Popen], now: float) -> b
 def _report(flying: Process, minute: float) -> dict:
     with client("subscribe", "pose", "3") as listener:
         listener.popen.wait(60)
-        heard = listener.end()
-        rate = json.loads(heard)["rate"] if heard else math.nan
+        heard = listener.end().splitlines()[1:]
+        rate = json.loads(heard[0])["rate"] if heard else math.nan
     figures = {
         "rate": rate,
         "rss": flying.memory_mb(),

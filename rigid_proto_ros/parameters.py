@@ -6,6 +6,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -118,6 +119,8 @@ _CONVERSIONS = {
 
 
 def _shown(value):
+    if isinstance(value, array):
+        value = value.tolist()
     text = repr(value)
     return value if len(text) <= 80 else text[:77] + "..."
 

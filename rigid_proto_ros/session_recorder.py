@@ -24,7 +24,7 @@ def make_recorder(
     """An observer that records to ``path``; raises InputError where it can't.
 
     values: the scene's parameters, of which frames' names count. simulated_log: messages are logged at simulated time, as
-    suits a run without a clock; else at the wall's.
+    suits a run without a clock; else at the wall's, for as long as the run may go on.
     """
     if is_mcap(path):
         try:
@@ -35,4 +35,4 @@ def make_recorder(
             raise InputError("record", path, f"mcap to be installed, pip install mcap zstandard ({error})") from None
     from .rerun_view import RerunObserver
 
-    return RerunObserver(record=path, name=node_name, on_error=on_error)
+    return RerunObserver(record=path, name=node_name, on_error=on_error, open_ended=not simulated_log)

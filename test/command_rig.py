@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+from ros_process import RosProcess
 
 TEST_FOLDER = Path(__file__).parent
 TYPES = {
@@ -21,13 +22,15 @@ TYPES = {
     "pose": "PoseStamped",
     "twist": "TwistStamped",
     "odom": "Odometry",
+    "imu": "Imu",
     "inertia": "InertiaStamped",
     "applied": "WrenchStamped",
     "events": "String",
     "scene": "String",
+    "robot_description": "String",
 }
 COMMANDS = ("wrench", "poke", "string/target", "string/attach", "inertia/set", "schedule")
-LATCHED = ("inertia", "scene")
+LATCHED = ("inertia", "scene", "robot_description")
 
 
 def stamped(stamp_ns: int, frame_id: str, **content) -> dict:
@@ -63,44 +66,33 @@ def stamp_ns(message: dict) -> int:
     return stamp["sec"] * 1_000_000_000 + stamp["nanosec"]
 
 
-class Process:
-    """A child process, ended by its pid."""
-
-    def __init__(self, arguments: list[str], environment: dict, **options) -> None:
-        self.process = subprocess.Popen([sys.executable, *arguments], env=environment, text=True, **options)
-
-    def stop(self, number: int = signal.SIGINT) -> int:
-        """Ask it to end; returns the exit status."""
-        if self.process.poll() is None:
-            self.process.send_signal(number)
-        try:
-            return self.process.wait(timeout=30.0)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return self.process.wait()
-
-
-class NodeProcess(Process):
-    """A ``rigid_body_node`` with these parameters; ``log`` is what it says."""
+class NodeProcess(RosProcess):
+    """A ``rigid_body_node`` with these parameters; ``log`` is what it says on stderr."""
 
     def __init__(self, environment: dict, log: Path, values: dict | None = None, *ros_arguments: str) -> None:
-        self.log = log
+        self.log = log.with_suffix(".err")
         given = [part for n, v in (values or {}).items() for part in ("-p", f"{n}:={_text(v)}")]
-        arguments = ["-m", "rigid_proto_ros.ros.main", "--ros-args", *given, *ros_arguments]
-        with log.open("w") as output:
-            super().__init__(arguments, environment, stdout=output, stderr=subprocess.STDOUT)
+        super().__init__("rigid_body_node", "--ros-args", *given, *ros_arguments, environment=environment, log=log)
 
     @property
     def alive(self) -> bool:
         return self.process.poll() is None
 
+    def stop(self) -> int:
+        """Ask it to end; returns the exit status."""
+        return self.end()
 
-class RosClient(Process):
-    """test/ros_client.py and short ways to talk to one node."""
+
+class RosClient:
+    """A process of test/ros_client.py, and short ways to talk to one node through it."""
 
     def __init__(self, environment: dict, node: str = "/rigid_body") -> None:
-        super().__init__(
-            [str(TEST_FOLDER / "ros_client.py")], environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        self.process = subprocess.Popen(
+            [sys.executable, str(TEST_FOLDER / "ros_client.py")],
+            env=environment,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
         )
         self.node = node
 
@@ -254,6 +246,8 @@ class Commanded(RosClient):
         self.node_process = NodeProcess(environment, folder / "node.log", scene)
         try:
             super().__init__(environment, node)
+            # A first start compiles its kernels.
+            self.node_process.wait_for("is flying")
             self.listen("pose", "twist", "odom", "inertia", "applied", "events", "scene")
             self.watch_diagnostics()
             self.advertise(*COMMANDS)
@@ -307,6 +301,10 @@ class Commanded(RosClient):
     def counters(self) -> dict[str, int]:
         """All whole-number counters of a report that has everything sent so far, and its consequences."""
         self.until_received(self.sent)
+        return self.counters_now()
+
+    def counters_now(self) -> dict[str, int]:
+        """All whole-number counters of the next report."""
         report = self.diagnostics(1)
         return {key: int(value) for key, value in report.items() if str(value).lstrip("-").isdigit()}
 

@@ -25,13 +25,24 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 TYPES = {
     t.__name__: t
     for t in (
-        *(DiagnosticArray, InertiaStamped, PointStamped, PoseStamped, TwistStamped, WrenchStamped, Odometry, Clock),
+        *(
+            DiagnosticArray,
+            InertiaStamped,
+            PointStamped,
+            PoseStamped,
+            TwistStamped,
+            WrenchStamped,
+            Odometry,
+            Clock,
+            Imu,
+        ),
         *(String, SetBool, Trigger, DescribeParameters, GetParameters, ListParameters, SetParameters),
         SetParametersAtomically,
     )

@@ -19,7 +19,7 @@ MODULES = {
     "poke_client": "rigid_proto_ros.ros.poke_client",
     "rigid_proto": "rigid_proto_ros.cli.main",
 }
-READY_S = 90.0
+READY_S = 180.0
 """Longer than a first start with all kernels to compile on a loaded machine."""
 
 LOOPBACK = (

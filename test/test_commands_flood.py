@@ -2,6 +2,7 @@
 """Floods of commands: all received, or the loss told."""
 
 import signal
+from contextlib import contextmanager
 
 import pytest
 from command_rig import RosClient, wrench_message
@@ -49,26 +50,93 @@ def test_ten_clients_at_a_thousand_messages_a_second_for_half_a_minute(rig):
     all_arrived_or_told(*flood(rig, 10, 30_000, 1000.0))
 
 
-def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(commanded, rig):
-    """Stopped while 12 000 messages go out, far more than any queue holds: received and gaps add up to what was sent."""
-    # Of all publishers on this topic only the fixture's own is left.
-    count = 12_000
-    before = rig.counters()
-    rig.publish("poke", wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9)))
-    rig.until_received(rig.sent)
+PUSH = wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9))
+
+
+@contextmanager
+def held_up(rig):
+    """The node's process stopped: nothing is taken from its queues."""
     rig.node_process.process.send_signal(signal.SIGSTOP)
     try:
-        rig.do(
-            "repeat", topic=rig.name("poke"), content=wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9)), count=count
-        )
+        yield
     finally:
         rig.node_process.process.send_signal(signal.SIGCONT)
+
+
+def push(client, count: int, rate: float = 0.0) -> None:
+    client.do("repeat", topic=client.name("poke"), content=PUSH, count=count, rate=rate)
+
+
+def told(rig, before: dict[str, int], condition) -> dict[str, int]:
+    """What the counters rose by, once that fulfils the condition."""
+
+    def gained():
+        report = rig.all_diagnostics(last=1)[-1]
+        found = {key: int(report[key]) - before[key] for key in ("poke_received", "sequence_gaps", "queue_full")}
+        return condition(found) and found
+
+    return rig.until(gained, "the counters")
+
+
+def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(rig):
+    """12 000 messages, far more than any queue holds: received and gaps add up to what was sent, and stay so."""
+    before = rig.counters()
+    push(rig, 2)
+    told(rig, before, lambda gained: gained["poke_received"] == 2)
+    with held_up(rig):
+        push(rig, 12_000)
     rig.do("acknowledged", topic=rig.name("poke"))
     # The last one shows what was lost before it.
-    rig.do("repeat", topic=rig.name("poke"), content=wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9)), count=1)
-    rig.do("acknowledged", topic=rig.name("poke"))
+    push(rig, 1)
+    gained = told(rig, before, lambda gained: gained["poke_received"] + gained["sequence_gaps"] >= 12_003)
+    assert gained["poke_received"] + gained["sequence_gaps"] == 12_003
+    assert gained["sequence_gaps"] > 0
+    assert gained["queue_full"] > 0
+    rig.sent += gained["poke_received"]
+
+
+def test_with_several_publishers_a_full_queue_is_told_and_no_number_of_lost_messages(rig):
+    """Whose a sequence number is can't be known then; once the other one has gone, gaps count again."""
+    other = RosClient(rig.environment, rig.node)
+    try:
+        other.advertise("poke")
+        before = rig.counters()
+        push(other, 1)
+        push(rig, 1)
+        told(rig, before, lambda gained: gained["poke_received"] == 2)
+        with held_up(rig):
+            push(other, 3_000)
+            push(rig, 3_000)
+        gained = told(rig, before, lambda gained: gained["poke_received"] > 2 and gained["queue_full"] > 0)
+        assert gained["sequence_gaps"] == 0
+    finally:
+        other.close()
+    rig.until(lambda: len([e for e in rig.do("endpoints", topic=rig.name("poke")) if e[0] == "pub"]) == 1, "one alone")
     rig.diagnostics(2)
-    gained = rig.gained(before, "poke_received")
-    assert gained["poke_received"] + gained.get("sequence_gaps", 0) == count + 2
-    assert gained.get("sequence_gaps", 0) > 0
-    rig.sent += gained["poke_received"] - 1
+    before_alone = rig.counters_now()
+    rig.sent += before_alone["poke_received"] - before["poke_received"]
+    push(rig, 2)
+    told(rig, before_alone, lambda gained: gained["poke_received"] == 2)
+    with held_up(rig):
+        push(rig, 6_000)
+    push(rig, 1)
+    gained = told(rig, before_alone, lambda gained: gained["poke_received"] + gained["sequence_gaps"] >= 6_003)
+    assert gained["poke_received"] + gained["sequence_gaps"] == 6_003
+    assert before_alone["sequence_gaps"] == before["sequence_gaps"]
+    rig.sent += gained["poke_received"]
+
+
+def test_a_publisher_that_comes_and_goes_beside_another_makes_no_gaps(rig):
+    """Two that send a few messages and leave, while a third keeps sending: all are heard, none counted as lost."""
+    before = rig.counters()
+    rig.send("repeat", topic=rig.name("poke"), content=PUSH, count=1500, rate=300.0)
+    for _ in range(2):
+        guest = RosClient(rig.environment, rig.node)
+        guest.advertise("poke")
+        push(guest, 5)
+        guest.do("acknowledged", topic=rig.name("poke"))
+        guest.close()
+    rig.answer()
+    gained = told(rig, before, lambda gained: gained["poke_received"] >= 1510)
+    assert gained == {"poke_received": 1510, "sequence_gaps": 0, "queue_full": 0}
+    rig.sent += 1510

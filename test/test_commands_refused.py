@@ -4,12 +4,15 @@
 import math
 import random
 import struct
+import time
 
 import numpy as np
 import pytest
 from command_rig import COMMANDS, inertia_message, point_message, wrench_message
 
 from rigid_proto_ros import cdr
+from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.scenario import make_scenario
 
 SECOND = 10**9
 HUGE = (1e15, 0.0, 0.0)
@@ -158,6 +161,33 @@ def test_everything_of_a_kind_is_refused_with_its_reason_and_counted_and_the_bod
     assert not rig.heard("applied")
     # Torque-free all the while: not one of them has touched it.
     assert float(report["angular_momentum_drift"]) < 1e-9
+
+
+def test_after_one_refusal_of_each_kind_the_flight_is_that_without_any_command_to_the_bit(rig):
+    rig.start_over(paused=True)
+    for commands in (*REFUSED.values(), stamps_out_of_reach(3600)):
+        rig.publish(*commands[0])
+    rig.schedule("{t: 1", "5", "{t: 1, set: {masse: 1}}", "{t: 1, set: {mass: -1}}", "{t: 1, force: [0, 0, 1]}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    simulation = Simulation(make_scenario(rig.scene).setup)
+    for k in range(1, 101):
+        time_ns = k * SECOND // 100
+        pose = rig.state_at(time_ns)[0]["pose"] if k in (1, 50, 100) else None
+        row = simulation.advance(time_ns).row.tolist()
+        assert pose is None or [*pose["position"].values(), *pose["orientation"].values()] == row[:7]
+
+
+def test_refusals_are_warned_of_at_most_once_a_second(rig):
+    log = rig.node_process.log
+    warned = log.read_text().count("refused:")
+    start = time.monotonic()
+    rig.do("repeat", topic=rig.name("wrench"), content=wrench_message(0, "mars"), count=300, rate=100.0)
+    rig.sent += 300
+    rig.until_received(rig.sent)
+    elapsed_s = time.monotonic() - start
+    # One at once, then one for each full second that has passed: however slow the machine, never more.
+    assert 2 <= log.read_text().count("refused:") - warned <= 1 + elapsed_s
 
 
 def test_a_change_that_the_integrator_cant_carry_is_refused_and_counted_naming_those_that_can(rig):
@@ -403,9 +433,6 @@ def flies_untouched(rig) -> None:
     assert report["state"] == "flying"
     assert float(report["angular_momentum_drift"]) < 1e-8
     energy = float(report["kinetic_energy"])
-    from rigid_proto_ros.core.simulation import Simulation
-    from rigid_proto_ros.scenario import make_scenario
-
     assert energy == pytest.approx(Simulation(make_scenario(rig.scene).setup).kinetic_energy, rel=1e-8)
     assert not rig.heard("applied")
     # And it still obeys.

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: MIT
 """What ROS users expect of any node: names, types, QoS, descriptors, namespaces, several at once."""
 
-import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import yaml
 from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
 from conftest import held_domain
 
-from rigid_proto_ros.parameters import PARAMETERS, READ_ONLY
+from rigid_proto_ros.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scenario import make_scenario
-from rigid_proto_ros.scene_file import read_scene_file
+from rigid_proto_ros.scene_file import read_scene_file, read_scene_text
 
-PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs"}
+PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs", "Imu": "sensor_msgs"}
 KEYS = (
     *(
         "sim_time_ns",
@@ -105,30 +105,64 @@ def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal
             assert later["level"] == 0
 
 
-def test_a_dump_of_the_parameters_is_a_scene_that_starts_the_same_simulation(rig, tmp_path):
+def dumped(rig, folder) -> Path:
     """As ros2 param dump writes it: all parameters of the list and get services, dots as levels, under the node's name."""
-    rig.set(mass=1.5, ballast__nut=[0.1, 0.0, 0.0, 0.07], gravity=[0.0, 0.0, -1.0], string__stiffness=7.0)
     tree: dict = {}
-    names = rig.names()
-    for name, value in rig.get(*names).items():
+    for name, value in rig.get(*rig.names()).items():
         node = tree
         *levels, last = name.split(".")
         for level in levels:
             node = node.setdefault(level, {})
         node[last] = value
-    dump = tmp_path / "dump.yaml"
-    dump.write_text(yaml.dump({"/rigid_body": {"ros__parameters": tree}}, default_flow_style=False))
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(rig.heard("scene", last=1)[0]["data"])
-    run = [sys.executable, "-m", "rigid_proto_ros.cli.main", "simulate"]
-    hashes = []
-    for path in (dump, scene):
-        done = subprocess.run([*run, str(path), "--duration", "1", "--json"], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        hashes.append(json.loads(done.stdout)["state_hash"])
-    assert hashes[0] == hashes[1]
-    values = read_scene_file(scene).values
-    assert make_scenario(values).values == make_scenario({**rig.scene, **{k: values[k] for k in values}}).values
+    path = folder / "dump.yaml"
+    path.write_text(yaml.dump({"/rigid_body": {"ros__parameters": tree}}, default_flow_style=False))
+    return path
+
+
+def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, tmp_path):
+    rig.set(mass=1.5, ballast__nut=[0.1, 0.0, 0.0, 0.07], gravity=[0.0, 0.0, -1.0], string__stiffness=7.0)
+    scene = rig.heard("scene", last=1)[0]["data"]
+    dump = dumped(rig, tmp_path)
+    # Read without ROS it is that scene too.
+    first = make_scenario(read_scene_text(scene).values)
+    again = make_scenario({n: v for n, v in read_scene_file(dump).values.items() if not is_ros_parameter(n)})
+    assert first.values == again.values == make_scenario({**rig.scene, **first.values}).values
+    with held_domain() as domain:
+        environment = {**rig.environment, "ROS_DOMAIN_ID": str(domain)}
+        second = NodeProcess(environment, tmp_path / "second.log", {}, "--params-file", str(dump))
+        client = RosClient(environment)
+        try:
+            client.listen("scene")
+            told = client.until(lambda: client.heard("scene"), "the second node's scene")
+            assert told[-1]["data"] == scene
+        finally:
+            client.close()
+            assert second.stop() == 0
+
+
+def test_a_loaded_file_acts_at_once_in_whatever_order_it_names_its_parameters(rig):
+    """What ros2 param load sends: one set_parameters request with all of a file, a node's own dump in this case."""
+    own = rig.get(*rig.names())
+    own["gravity"] = [0.0, 0.0, -1.0]
+    assert {tuple(result) for result in rig.set_named(own)} == {(True, "")}
+    (event,) = rig.wait_event("set")
+    assert event["content"]["gravity"] == [0.0, 0.0, -1.0]
+    assert rig.set_named({"mesh": "", "inertia_model": "explicit"}) == [[True, ""]] * 2
+    # Alone the first can't be; with one that is no parameter at all they can't be set at once either.
+    results = rig.set_named({"inertia_model": "solid", "masss": 1.0, "mesh": "t_handle", "viewer": "web"})
+    assert [accepted for accepted, _ in results] == [True, False, True, False]
+    assert "did you mean mass" in results[1][1]
+    assert "viewer" in results[3][1]
+    assert rig.get("inertia_model", "mesh") == {"inertia_model": "solid", "mesh": "t_handle"}
+
+
+def test_what_ros_itself_declares_is_refused_together_with_ours_or_not_at_all(rig):
+    before = rig.get("linear_damping", "use_sim_time")
+    for name, value in (("use_sim_time", 3), ("start_type_description_service", False), ("qos_overrides.none", 1)):
+        ((accepted, reason),) = rig.set_named({"linear_damping": 0.5, name: value}, atomically=True)
+        assert not accepted
+        assert name in reason
+    assert rig.get(*before) == before
 
 
 def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_environment, tmp_path):

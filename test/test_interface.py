@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 
 import pytest
+from ros_process import running_node
 
 from rigid_proto_ros.interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros.parameters import PARAMETERS
@@ -37,17 +38,14 @@ OF_RCLPY = {
 
 
 @pytest.fixture(scope="module")
-def graph(ros_environment: dict[str, str]) -> Iterator[dict[str, dict[str, str]]]:
+def graph(ros_environment: dict[str, str], tmp_path_factory) -> Iterator[dict[str, dict[str, str]]]:
     """Names and types by direction of a running node with everything on request switched on."""
     switches = sorted({i.on_request for i in INTERFACES if i.on_request})
     arguments = [word for name in switches for word in ("-p", f"{name}:=true")]
-    command = [sys.executable, "-m", "rigid_proto_ros.ros.main", "--ros-args", "-r", f"__node:={NAME}", *arguments]
-    node = subprocess.Popen(command, env=ros_environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    try:
-        yield _graph_of(node, ros_environment)
-    finally:
-        node.terminate()
-        node.wait(timeout=10.0)
+    log = tmp_path_factory.mktemp("listed") / "node"
+    # A first start compiles its kernels.
+    with running_node("--ros-args", "-r", f"__node:={NAME}", *arguments, environment=ros_environment, log=log) as node:
+        yield _graph_of(node.process, ros_environment)
 
 
 def _graph_of(process: subprocess.Popen, environment: dict[str, str]) -> dict[str, dict[str, str]]:
@@ -72,7 +70,7 @@ node.destroy_node()
 rclpy.shutdown()
 """
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert process.poll() is None, process.stderr.read()
+    assert process.poll() is None
     looked = json.loads(done.stdout)
     return {
         direction: {name: types[0] for name, types in found.items() if name not in OF_RCLPY[direction]}

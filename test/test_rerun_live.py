@@ -9,8 +9,10 @@ import subprocess
 import sys
 import time
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rerun_flight as flight
 
@@ -162,7 +164,23 @@ def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(v
     wait_for(lambda: 39 * flight.PERIOD_NS in shown())
     viewer.take_screenshot()
     assert complaints(viewer) == []
+    # A body ten times as large is looked at from ten times as far.
+    near = camera_distances(viewer)
+    observer.body_changed(400_000_000, replace(flight.BODY, scale=10.0 * flight.SCALE))
+    wait_for(lambda: max(camera_distances(viewer)) > 5.0 * max(near))
+    assert complaints(viewer) == []
     observer.close()
+
+
+def camera_distances(viewer) -> list[float]:
+    """Of the views whose camera goes with the body's size."""
+    blueprint = viewer.get_blueprint(of="recording").blueprint
+    eyes = [
+        node["EyeControls3D"]["position"] for node in blueprint.values() if "position" in node.get("EyeControls3D", {})
+    ]
+    distances = sorted(float(np.linalg.norm(eye)) for eye in eyes)
+    # One is Poinsot's picture, which has the same size for every body.
+    return [distance for distance in distances if abs(distance - np.linalg.norm([2.5, -2.0, 1.0])) > 1e-3]
 
 
 def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, monkeypatch):

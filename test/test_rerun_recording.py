@@ -17,6 +17,7 @@ from rigid_proto_ros.core.observer import BodySnapshot
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
 
 COUNT = 101
 
@@ -210,6 +211,23 @@ def test_a_run_that_never_left_time_zero_is_not_kept_at_a_reset(tmp_path, states
     observer.close()
     assert [p.name for p in tmp_path.iterdir()] == ["session.rrd"]
     assert read_session(path).rows.tobytes() == states[1:2].tobytes()
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_a_recording_of_unknown_length_is_complete_without_an_index_that_would_grow_in_memory(tmp_path):
+    sizes = {}
+    for open_ended in (False, True):
+        path = tmp_path / f"{open_ended}.rrd"
+        observer = RerunObserver(record=str(path), open_ended=open_ended)
+        flight.fly(observer, flight.rows(80))
+        observer.close()
+        session = read_session(path)
+        assert session.complete and session.rows.tobytes() == flight.rows(80).tobytes()
+        sizes[open_ended] = path.stat().st_size
+        assert whole_bytes(path)[1]
+        # What stands behind the last piece: the mark of the end, and the index or nothing.
+        assert (sizes[open_ended] - whole_bytes(path)[0] == FRAME_HEAD.size) == open_ended
+    assert sizes[True] < sizes[False]
 
 
 def test_recording_can_be_switched_on_and_off_in_flight(tmp_path, states):

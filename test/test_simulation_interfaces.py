@@ -22,12 +22,10 @@ MESSAGES = SimpleNamespace(
         STEP_SIMULATION_SINGLE=31,
         STEP_SIMULATION_MULTIPLE=32,
     ),
-    SimulationState=SimpleNamespace(STOPPED=0, PLAYING=1, PAUSED=2, QUITTING=3),
-    Result=SimpleNamespace(
-        RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_INCORRECT_STATE=3, RESULT_OPERATION_FAILED=4
-    ),
+    SimulationState=SimpleNamespace(STATE_STOPPED=0, STATE_PLAYING=1, STATE_PAUSED=2, STATE_QUITTING=3),
+    Result=SimpleNamespace(RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_OPERATION_FAILED=4),
 )
-OK, UNSUPPORTED, INCORRECT_STATE, FAILED, ALREADY = 1, 0, 3, 4, 101
+OK, UNSUPPORTED, FAILED, ALREADY = 1, 0, 4, 101
 SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED": 4, "SCOPE_ALL": 255}
 
 
@@ -84,7 +82,7 @@ def test_steps_are_publications_and_need_a_pause(services):
     assert node.flight.simulation.time_ns == 50_000_000
     assert answer.step_simulation(SimpleNamespace(steps=0), response()).result.result == FAILED
     answer.set_simulation_state(state(1), response())
-    assert answer.step_simulation(SimpleNamespace(steps=1), response()).result.result == INCORRECT_STATE
+    assert answer.step_simulation(SimpleNamespace(steps=1), response()).result.result == FAILED
 
 
 def test_states_play_pause_and_stop(services):
@@ -94,8 +92,15 @@ def test_states_play_pause_and_stop(services):
     assert answer.set_simulation_state(state(1), response()).result.result == OK
     assert answer.get_simulation_state(None, response()).state.state == 1
     assert answer.set_simulation_state(state(0), response()).result.result == OK
-    assert answer.get_simulation_state(None, response()).state.state == 2
+    assert answer.get_simulation_state(None, response()).state.state == 0
     assert node.flight.simulation.time_ns == 0
+    assert answer.set_simulation_state(state(0), response()).result.result == ALREADY
+    # Stopped may be paused: that begins it without a step. Then it is no longer where a stop has put it.
+    assert answer.set_simulation_state(state(2), response()).result.result == OK
+    assert answer.get_simulation_state(None, response()).state.state == 2
+    answer.set_simulation_state(state(0), response())
+    answer.step_simulation(SimpleNamespace(steps=1), response())
+    assert answer.get_simulation_state(None, response()).state.state == 2
     refused = answer.set_simulation_state(state(3), response())
     assert refused.result.result == UNSUPPORTED
     assert "signal" in refused.result.error_message

@@ -132,7 +132,7 @@ def test_a_stamp_ahead_acts_at_exactly_that_nanosecond(rig):
     assert rig.gained(before) == {"refused_total": 1, "refused_stamp": 1}
 
 
-@pytest.mark.parametrize("rate", [3.7, 1000.0 / 3.0, 7.0])
+@pytest.mark.parametrize("rate", [3.0, 3.7, 1000.0 / 3.0])
 def test_publication_k_is_at_the_rounded_kth_period(rig, rate):
     rig.set(publish_rate=rate, real_time_factor=0.0)
     rig.start_over(paused=False)
@@ -252,3 +252,26 @@ def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_
     assert rig.diagnostics()["state"] == "flying"
     offline = Simulation(make_scenario(rig.scene).setup).advance(100 * MS)
     assert position(rig.state_at(100 * MS)[0]) == offline.row[:7].tolist()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"integrator": "rk4", "step": 1e-9}, {"real_time_factor": 0.0, "publish_rate": 1e-4}],
+    ids=["a step of a nanosecond", "ten million steps to a publication"],
+)
+def test_services_and_commands_are_answered_while_the_motion_takes_all_the_time_there_is(rig, values):
+    rig.set_named(values)
+    before = rig.counters()
+    time_ns = int(rig.diagnostics(1)["sim_time_ns"])
+    assert int(rig.diagnostics(1)["sim_time_ns"]) > time_ns
+    # Time goes on when they are asked, and each is answered; what comes by topic is counted.
+    assert rig.set(linear_damping=0.25)[0] == [True, ""]
+    assert rig.get("linear_damping") == {"linear_damping": 0.25}
+    assert rig.trigger("clear_wrench")["success"]
+    rig.publish("wrench", *[wrench_message(0, "nowhere")] * 20)
+    assert rig.gained(before) == {"refused_total": 20, "refused_frame": 20}
+    assert rig.pause(True)["success"]
+    frozen = rig.diagnostics(2)["sim_time_ns"]
+    assert rig.diagnostics(1)["sim_time_ns"] == frozen
+    assert rig.trigger("reset")["success"]
+    assert rig.diagnostics(2)["sim_time_ns"] == "0"

@@ -13,7 +13,8 @@ from rigid_proto_ros.poke_script import parse_script
 from rigid_proto_ros.scenario import make_scenario
 from rigid_proto_ros.scene_file import read_scene_text
 from rigid_proto_ros.workbench import history as history_module
-from rigid_proto_ros.workbench.history import MAX_STATES, History, Rewind, changes_to
+from rigid_proto_ros.workbench.history import MAX_STATES, History
+from rigid_proto_ros.workbench.rewind import Rewind, changes_to
 from rigid_proto_ros.workbench.state_log import StateLog
 
 SECOND = 10**9

@@ -12,7 +12,7 @@ from rigid_proto_ros.offline import OfflineRun
 from rigid_proto_ros.poke_script import ScriptCommand, parse_script
 from rigid_proto_ros.scenario import make_scenario
 from rigid_proto_ros.scene_file import read_scene_text
-from rigid_proto_ros.workbench.save_as_script import SavedScript, save_as_script
+from rigid_proto_ros.workbench.save_as_script import SavedScript, flow, save_as_script
 
 SECOND = 10**9
 
@@ -154,3 +154,10 @@ def test_entries_are_the_commands_of_the_hand() -> None:
         ScriptCommand(third, "wrench", "body@point/0.01,0.02,0.03", (0.1, 0.2, 0.3), (0.0, 0.0, 1e-7)),
         ScriptCommand(third, "poke", "normal@tip", (0.02, 0.0, 0.0)),
     ]
+
+
+@pytest.mark.parametrize(
+    "text", ["tip", "on", "yes", "null", "true", "inf", "nan", "com", "release", "", " a", "1e3", ".inf"]
+)
+def test_text_comes_back_from_yaml_as_text(text: str) -> None:
+    assert yaml.safe_load(flow({"at": text})) == {"at": text}

@@ -30,7 +30,7 @@ class Flusher:
     file is what is being recorded to; error says why a recording stopped, and on_error is called with the same.
     """
 
-    def __init__(self, name: str, initial_view: str, on_error: Callable[[str], None]) -> None:
+    def __init__(self, name: str, initial_view: str, on_error: Callable[[str], None], open_ended: bool = False) -> None:
         self.mailbox = Mailbox(lambda: self._lost("recording stopped: the disk takes nothing any more"))
         self.ghosts = Mailbox()
         self.file: FileStream | None = None
@@ -40,6 +40,7 @@ class Flusher:
         self._name = name
         self._run = 1
         self._on_error = on_error
+        self._open_ended = open_ended
         self._writer = SceneWriter(initial_view)
         self._ghost_block: Block | None = None
         self._ghost_sent = 0
@@ -57,7 +58,7 @@ class Flusher:
     def open_file(self, path: Any) -> None:
         """Record to ``path`` from now on; raises InputError where that can't be written."""
         self.close_file()
-        file = FileStream(path, self.run_id, self.run_name)
+        file = FileStream(path, self.run_id, self.run_name, self._open_ended)
         self.error = ""
         self.file = file
         self.mailbox.mark(-1, "record", file, threading.Event())
@@ -197,7 +198,7 @@ class Flusher:
                     if moved:
                         kept = f"{stream.path.stem}.run{self._run - 1}{stream.path.suffix}"
                         stream.path.rename(stream.path.with_name(kept))
-                    file = FileStream(stream.path, self.run_id, self.run_name)
+                    file = FileStream(stream.path, self.run_id, self.run_name, self._open_ended)
                 except (OSError, InputError) as error:
                     self._lost(str(error))
                     continue

@@ -65,7 +65,7 @@ def lesson(flight: Any, ghost: bool) -> Any:
             plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
             plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
             *([] if ghost else [plot(e.ENERGY, "Energy [J]")]),
-            row_shares=[2, 1, 1, 1],
+            row_shares=[3, 2, 2, 2],
         ),
         column_shares=[3, 2],
         name="Lesson",
@@ -83,7 +83,7 @@ def debugging(flight: Any) -> Any:
                 command_view(),
                 rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
             ),
-            row_shares=[5, 3, 2],
+            row_shares=[9, 9, 4],
         ),
         rrb.Grid(
             plot(e.ENERGY, "Energy [J]"),

@@ -47,7 +47,8 @@ class RerunObserver(Observer):
 
     viewer: ``none``; ``serve`` hosts the live stream on loopback; ``web`` serves the web viewer too; ``native`` opens
     the viewer's window. rerun_port and web_port: None takes the first free port from the default on; a number is used
-    or refused. initial_view: the tab of the layout that is in front. ``report`` gets one line for every address and
+    or refused. initial_view: the tab of the layout that is in front. open_ended: the recording may go on for hours, and
+    memory must not grow; its file then has no index. ``report`` gets one line for every address and
     every warning, ``on_error`` one line when recording has stopped because the file can't be written; both may be
     called from another thread.
 
@@ -65,6 +66,7 @@ class RerunObserver(Observer):
         on_error: Callable[[str], None] | None = None,
         live_memory_limit: str = LIVE_MEMORY_LIMIT,
         initial_view: str = "lesson",
+        open_ended: bool = False,
     ) -> None:
         if viewer not in VIEWERS:
             raise InputError("viewer", viewer, "one of " + ", ".join(VIEWERS))
@@ -79,6 +81,7 @@ class RerunObserver(Observer):
         self.web_address = ""
         self._name = name
         self._initial_view = initial_view
+        self._open_ended = open_ended
         self._report = report or _logger.info
         self._on_error = on_error or _logger.error
         self._flusher: Flusher | None = None
@@ -210,7 +213,7 @@ class RerunObserver(Observer):
         if self._flusher is None:
             from .flusher import Flusher
 
-            self._flusher = Flusher(self._name, self._initial_view, self._on_error)
+            self._flusher = Flusher(self._name, self._initial_view, self._on_error, self._open_ended)
             for remembered in self._remembered:
                 self._flusher.mailbox.mark(*remembered)
             self._remembered.clear()

@@ -75,8 +75,9 @@ class PoinsotPicture:
         tips = self._scale(energy)[:, np.newaxis] * to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
         times = time_columns(times_ns, walls)
         send(e.POINSOT_BODY, times, rr.Transform3D.columns(quaternion=rows[:, 3:7]))
-        send(e.POINSOT_OMEGA, times, rr.Arrows3D.columns(vectors=tips))
-        send(e.POINSOT_HERPOLHODE, times, rr.Points3D.columns(positions=tips))
+        turns = tips.any(axis=1)
+        send(e.POINSOT_OMEGA, times, rr.Arrows3D.columns(vectors=tips[turns]).partition(turns.astype(int)))
+        send(e.POINSOT_HERPOLHODE, times, rr.Points3D.columns(positions=tips[turns]).partition(turns.astype(int)))
 
     def _changes(self, times_ns: np.ndarray, energy: np.ndarray, L: np.ndarray) -> list[int]:
         """Indices of the states at which T and L are no longer those drawn."""

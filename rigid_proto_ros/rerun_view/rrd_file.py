@@ -53,6 +53,12 @@ def whole_bytes(path: Path) -> tuple[int, bool]:
     return at, False
 
 
+def end_without_index(path: Path) -> None:
+    """Mark a stream as ended that the library has written without an index, and so without an end."""
+    with open(path, "ab") as file:
+        file.write(FRAME_HEAD.pack(0, 0))
+
+
 @contextmanager
 def whole_part(path: Path) -> Iterator[Path]:
     """A readable file with the whole frames of ``path``: a temporary copy, removed at the end."""

@@ -21,6 +21,7 @@ import rerun_bindings
 
 from ..core.errors import InputError
 from .ports import LOOPBACK
+from .rrd_file import end_without_index
 from .sent_layout import SentLayout
 
 APPLICATION_ID = "rigid_proto_ros"
@@ -90,14 +91,19 @@ class Stream:
 
 
 class FileStream(Stream):
-    """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``."""
+    """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
 
-    def __init__(self, path: Path, recording_id: str, name: str) -> None:
+    open_ended: nobody knows how long the run will be, so the file gets no index: the library would gather that in memory,
+    3 kB for each piece that it writes, 200 MB an hour.
+    """
+
+    def __init__(self, path: Path, recording_id: str, name: str, open_ended: bool = False) -> None:
         self.path = path
+        self._open_ended = open_ended
         if path.suffix != ".rrd":
             raise InputError("record", str(path), "the path of an .rrd file")
         try:
-            super().__init__(recording_id, rr.FileSink(path), name)
+            super().__init__(recording_id, rr.FileSink(path, write_footer=not open_ended), name)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
             self._inode = path.stat().st_ino
         except (RuntimeError, OSError) as error:
@@ -121,6 +127,8 @@ class FileStream(Stream):
             self.flush()
         finally:
             self.abandon()
+        if self._open_ended:
+            end_without_index(self.path)
 
     def abandon(self) -> None:
         """Let go of a file that can't be written."""

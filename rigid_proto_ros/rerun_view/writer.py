@@ -354,7 +354,10 @@ class SceneWriter:
             (e.ANGULAR_VELOCITY, w, MIDDLING_SPIN),
             (e.MOMENTUM, L, spin_of_middling),
         ):
-            self._send_rows(entity, times, rr.Arrows3D.columns(vectors=_drawn(vectors, reference, self._size)))
+            # None at rest: one of no length would still have its name written beside it.
+            turns = vectors.any(axis=1)
+            drawn = rr.Arrows3D.columns(vectors=_drawn(vectors[turns], reference, self._size))
+            self._send_rows(entity, times, drawn.partition(turns.astype(int)))
         if self._tip is not None:
             spacing = 1.5 * TRAIL_RADIUS * self._size
             points, counts = self._trail.between(times_ns, rows, self._tip, spacing)

@@ -32,6 +32,7 @@ from ..poke_script import (
 from ..scenario import check_inertia, nanoseconds
 from . import qos
 from .message_bytes import read_message, read_wrench_stamped, whole_stamp
+from .sequence_gaps import SequenceGaps
 from .stamps import effective_time
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
@@ -39,6 +40,9 @@ TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
 
 QUIET_NS = 4_000_000
 """How often topics are looked at that carried nothing lately [ns of wall time]."""
+
+PUBLISHERS_NS = 250_000_000
+"""How often it is noted who publishes on a topic that carries nothing [ns of wall time]."""
 
 MOST_FRAMES = 1000
 """Frames of wrenches that are kept as read."""
@@ -86,7 +90,7 @@ class CommandIntake:
         self.queue_full = 0
         self.sequence_gaps = 0
         self._next_quiet_look_ns = 0
-        self._last_sequence: dict[int, int] = {}
+        self._next_publishers_look_ns = 0
         self._read_frames: dict[str, Frame] = {}
         self._on_refusal = on_refusal
         group = _TakenByHand()
@@ -111,6 +115,8 @@ class CommandIntake:
             ("schedule", subscribe(String, "schedule"), String, self._schedule),
         )
         self._lively_until_ns = [0] * len(self._sources)
+        self._depths = [subscription.qos_profile.depth for _, subscription, _, _ in self._sources]
+        self._gaps = [SequenceGaps(subscription) for _, subscription, _, _ in self._sources]
 
     def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None]) -> bool:
         """Submit everything that has arrived; what is refused is counted and told, and the rest goes on. Returns whether
@@ -122,40 +128,35 @@ class CommandIntake:
         look_at_quiet = wall_ns >= self._next_quiet_look_ns
         if look_at_quiet:
             self._next_quiet_look_ns = wall_ns + QUIET_NS
+        look_at_publishers = look_at_quiet and wall_ns >= self._next_publishers_look_ns
+        if look_at_publishers:
+            self._next_publishers_look_ns = wall_ns + PUBLISHERS_NS
         for source, (topic, subscription, message_type, read) in enumerate(self._sources):
             if not look_at_quiet and wall_ns > self._lively_until_ns[source]:
                 continue
+            gaps = self._gaps[source]
             with subscription.handle:
                 # Bounded, so that a flood can't hold up the motion for ever.
                 for count in range(qos.COMMAND_DEPTH):
                     taken = subscription.handle.take_message(message_type, True)
                     if taken is None:
+                        if look_at_publishers or (count and look_at_quiet):
+                            gaps.emptied()
                         break
-                    if count == qos.COMMAND_DEPTH - 1:
+                    if count == self._depths[source] - 1:
                         self.queue_full += 1
                     if not caught_up:
                         caught_up = True
                         catch_up()
                     self.received[topic] += 1
                     self._lively_until_ns[source] = wall_ns + LIVELY_NS
-                    self._count_gap(subscription, taken[1].get("publication_sequence_number"))
+                    self.sequence_gaps += gaps.before(taken[1].get("publication_sequence_number"))
                     try:
                         read(taken[0], simulation, scenario)
                     except CommandRefused as refusal:
                         simulation.refuse(refusal)
                         self._on_refusal(refusal)
         return wall_ns < max(self._lively_until_ns)
-
-    def _count_gap(self, subscription, number: int | None) -> None:
-        """Messages that a publisher sent and we never saw. Numbers are each publisher's own, so with several of them
-        nothing can be said.
-        """
-        if number is None:
-            return
-        last = self._last_sequence.get(id(subscription))
-        self._last_sequence[id(subscription)] = number
-        if last is not None and number > last + 1 and subscription.get_publisher_count() == 1:
-            self.sequence_gaps += number - last - 1
 
     @property
     def commands_received(self) -> int:

@@ -19,14 +19,14 @@ from ..core.commands import Change, ClearWrench, ReleaseString
 from ..core.errors import CommandRefused, InputError
 from ..core.observer import Observer, Observers
 from ..offline import tell_start
-from ..parameters import READ_ONLY, is_ros_parameter, parameter_named
+from ..parameters import is_ros_parameter, parameter_named
 from ..scenario import Scenario, check_inertia, make_scenario
 from .command_intake import TOPICS, CommandIntake
 from .diagnostics import REFUSAL_REASONS, Diagnostics
 from .event_publisher import EventPublisher
 from .flight import Flight
 from .node_name import NODE_NAME
-from .parameter_server import converted, declare_parameters, descriptor, ros_parameter
+from .parameter_server import ParametersTogether, converted, declare_parameters, descriptor, is_read_only, ros_parameter
 from .physics_thread import PhysicsThread, step_over
 from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
@@ -46,7 +46,7 @@ class RigidBodyNode(Node):
         node_name: str = NODE_NAME,
         **node_options,
     ) -> None:
-        super().__init__(node_name, **node_options)
+        super().__init__(node_name, start_parameter_services=False, **node_options)
         self.thread: PhysicsThread | None = None
         scenario = make_scenario(declare_parameters(self))
         for warning in scenario.warnings:
@@ -82,6 +82,7 @@ class RigidBodyNode(Node):
         self.create_service(Trigger, "~/clear_wrench", _answering(self._on_clear_wrench))
         self.create_service(SetBool, "~/pause", _answering(self._on_pause))
         self.create_service(Trigger, "~/string/release", _answering(self._on_string_release))
+        self._parameter_services = ParametersTogether(self)
         offer_simulation_interfaces(self)
         self._diagnostics = Diagnostics(self, self._diagnostic_values)
         tell_start(self.observer, scenario)
@@ -183,27 +184,46 @@ class RigidBodyNode(Node):
 
     def set_parameters_atomically(self, parameter_list) -> SetParametersResult:
         """Convert, check together, and hand over to the physics thread; a refusal leaves all as it was."""
+        return self._set(parameter_list)
+
+    def set_several(self, parameter_list) -> list[SetParametersResult]:
+        """What one ``set_parameters`` request brings, as ``ros2 param load`` sends a whole file: at once where all fit
+        together. Otherwise one by one, and the refused ones again after the others, so that their order doesn't matter.
+        """
+        if len(parameter_list) > 1 and self._set(parameter_list, counted=False).successful:
+            return [SetParametersResult(successful=True) for _ in parameter_list]
+        refused, before = list(range(len(parameter_list))), len(parameter_list) + 1
+        while 1 < len(refused) < before:
+            before = len(refused)
+            refused = [k for k in refused if not self._set([parameter_list[k]], counted=False).successful]
+        results = [SetParametersResult(successful=True) for _ in parameter_list]
+        for k in refused:
+            results[k] = self._set([parameter_list[k]])
+        return results
+
+    def _set(self, parameter_list, counted: bool = True) -> SetParametersResult:
+        """counted: a refusal goes to the counters."""
         try:
             parameter_list = converted(parameter_list)
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        read_only = [p.name for p in parameter_list if self._is_read_only(p.name)]
-        if read_only:
-            return SetParametersResult(successful=False, reason=f"{', '.join(read_only)}: can be set at start only")
+        # A dump of this very node is no change of what can't change.
+        fixed = [p for p in parameter_list if is_read_only(p.name)]
+        other = [p.name for p in fixed if not self.has_parameter(p.name) or not _same(self.get_parameter(p.name), p)]
+        if other:
+            return SetParametersResult(successful=False, reason=f"{', '.join(other)}: can be set at start only")
+        parameter_list = [p for p in parameter_list if p not in fixed]
         changes = {p.name: p.value for p in parameter_list if not is_ros_parameter(p.name)}
         if "density" in changes and "mass" not in changes:
             changes["mass"] = 0.0
             parameter_list = [*parameter_list, *self._as_ros({"mass": 0.0})]
         try:
             if changes:
-                self._change(changes)
+                self._change(changes, counted)
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._declare_new(changes)
         return super().set_parameters_atomically(parameter_list)
-
-    def _is_read_only(self, name: str) -> bool:
-        return not is_ros_parameter(name) and parameter_named(name).changes == READ_ONLY
 
     def _declare_new(self, changes: dict) -> None:
         """A ballast that comes along in flight."""
@@ -211,7 +231,7 @@ class RigidBodyNode(Node):
             if not self.has_parameter(name):
                 self.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
 
-    def _change(self, changes: dict) -> None:
+    def _change(self, changes: dict, counted: bool) -> None:
         # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
         present = self.flight.scenario
         planned = present.with_changes(changes)
@@ -229,7 +249,8 @@ class RigidBodyNode(Node):
             try:
                 self.flight.simulation.check_change(scenario.setup)
             except CommandRefused as refusal:
-                self.flight.simulation.refuse(refusal)
+                if counted:
+                    self.flight.simulation.refuse(refusal)
                 raise
             self.flight.change(scenario)
             self.flight.simulation.submit(Change(changes, lambda: scenario.setup))
@@ -316,6 +337,11 @@ class RigidBodyNode(Node):
             "recording": "" if getattr(self._recorder, "error", "") else flight.scenario.values["record"],
             "warning": simulation.failure or simulation.too_coarse,
         }
+
+
+def _same(one, other) -> bool:
+    """Whether two ROS parameters have the same value."""
+    return _plain(one.value) == _plain(other.value)
 
 
 def _plain(value):

@@ -6,6 +6,7 @@ from __future__ import annotations
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter_service import ParameterService
 
 from .. import parameters
 from ..core.errors import InputError
@@ -19,6 +20,15 @@ _TYPES = {
     "string": ParameterType.PARAMETER_STRING,
 }
 _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
+
+
+class ParametersTogether(ParameterService):
+    """rclpy's parameter services, but for ``set_parameters``: what one request brings goes to the node's ``set_several``."""
+
+    def _set_parameters_callback(self, request, response):
+        given = [RosParameter.from_parameter_msg(message) for message in request.parameters]
+        response.results = self._get_node().set_several(given)
+        return response
 
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
@@ -83,8 +93,15 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
     result = []
     for change in changes:
         if is_ros_parameter(change.name):
+            if change.name == "use_sim_time" and not isinstance(change.value, bool):
+                raise InputError(change.name, change.value, "true or false")
             result.append(change)
             continue
         parameter = parameter_named(change.name)
         result.append(ros_parameter(parameter, parameter.convert(change.value)))
     return result
+
+
+def is_read_only(name: str) -> bool:
+    """Whether a parameter counts at start only, ours or one that every rclpy node has."""
+    return name != "use_sim_time" if is_ros_parameter(name) else parameter_named(name).changes == READ_ONLY

@@ -16,6 +16,7 @@ import signal
 import sys
 
 from ..core.errors import InputError
+from ..parameters import PARAMETERS
 from ..poke_script import MAX_TIME_S, ScriptCommand, parse_script, read_script
 
 _ONE_LINE_COMMANDS = ("poke", "wrench")
@@ -29,7 +30,10 @@ def main(argv: list[str] | None = None) -> int:
     own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
     try:
         args = _arguments(own)
-        script = _script(args)
+        # Read before a node is looked for: a mistake in it is told at once.
+        script = _script(
+            args, PARAMETERS["wrench_timeout"].default if args.wrench_timeout is None else args.wrench_timeout
+        )
         if args.dry_run:
             _print_plan(script)
             return 0
@@ -62,7 +66,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
     parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="added to every t (default 0.2)")
     parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
-    parser.add_argument("--wrench-timeout", type=float, default=1.5, metavar="S", help="as the node has it (1.5)")
+    parser.add_argument("--wrench-timeout", type=float, metavar="S", help="of held wrenches, if not the node's own")
     parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node")
     line = parser.add_argument_group("one command from the line")
     line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
@@ -80,14 +84,14 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         ("--wrench-timeout", args.wrench_timeout, MAX_TIME_S),
     )
     for name, value, upper in limits:
-        if not 0.0 <= value <= upper:
+        if value is not None and not 0.0 <= value <= upper:
             raise InputError(name, value, f"seconds from 0 to {upper:g}")
     return args
 
 
-def _script(args: argparse.Namespace) -> list[ScriptCommand]:
+def _script(args: argparse.Namespace, wrench_timeout: float) -> list[ScriptCommand]:
     if args.what not in _ONE_LINE_COMMANDS:
-        return read_script(args.what, args.wrench_timeout)
+        return read_script(args.what, wrench_timeout)
     import yaml
 
     given = {
@@ -97,7 +101,7 @@ def _script(args: argparse.Namespace) -> list[ScriptCommand]:
     }
     given["at"] = _point(args.at)
     entry = {"t": 0.0, **given} if args.what == "poke" else {"t": 0.0, "wrench": given}
-    return parse_script(yaml.safe_dump([entry]), args.what, args.wrench_timeout)
+    return parse_script(yaml.safe_dump([entry]), args.what, wrench_timeout)
 
 
 def _point(text: str):
@@ -143,6 +147,9 @@ def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]
     sender = None
     try:
         sender = ScriptSender(args.node, args.timeout)
+        if args.wrench_timeout is None and any(command.kind == "wrench" for command in script):
+            # Held wrenches are repeated as often as the node needs it.
+            script = _script(args, sender.parameter("wrench_timeout"))
         report = sender.send(script, reset=args.reset, lead_s=args.lead)
     finally:
         if sender is not None:

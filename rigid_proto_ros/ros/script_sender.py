@@ -11,7 +11,9 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, WrenchStamped
 from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
 from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -58,7 +60,7 @@ class ScriptSender(Node):
         self.target = node_name if node_name.startswith("/") else f"/{node_name}"
         self._counters: dict[str, str] = {}
         self._simulated_ns: int | None = None
-        self._expected = 0
+        self._get_parameters: Client | None = None
         publisher = self.create_publisher
         self._topics = {
             "wrench": publisher(WrenchStamped, f"{self.target}/wrench", qos.COMMAND),
@@ -105,19 +107,19 @@ class ScriptSender(Node):
 
     def _contacts(self, script: list[ScriptCommand]) -> dict[str, tuple]:
         """The contacts that the script ties strings to, as the node has them."""
-        names = sorted({command.contact for command in script if command.contact})
-        if not names:
-            return {}
-        client = self.create_client(GetParameters, f"{self.target}/get_parameters")
+        names = {command.contact for command in script if command.contact}
+        return {name: tuple(point) for name in names if len(point := self.parameter(f"contacts.{name}") or ()) == 3}
+
+    def parameter(self, name: str):
+        """The node's value of a parameter; None where it has none of that name."""
+        if self._get_parameters is None:
+            self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
+        client = self._get_parameters
         self._spin_until(client.service_is_ready, f"the service {client.srv_name}")
-        found = {}
-        for name in names:
-            future = client.call_async(GetParameters.Request(names=[f"contacts.{name}"]))
-            self._spin_until(future.done, f"an answer of {client.srv_name}")
-            values = future.result().values
-            if values and len(values[0].double_array_value) == 3:
-                found[name] = tuple(values[0].double_array_value)
-        return found
+        future = client.call_async(GetParameters.Request(names=[name]))
+        self._spin_until(future.done, f"an answer of {client.srv_name}")
+        values = future.result().values
+        return parameter_value_to_python(values[0]) if values else None
 
     def _wait_for_node(self, timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s

@@ -30,6 +30,7 @@ class SimulationInterfaces:
     def __init__(self, node, messages: Any) -> None:
         self._node = node
         self._messages = messages
+        self._stopped = False
 
     @property
     def _flight(self) -> Flight:
@@ -67,35 +68,41 @@ class SimulationInterfaces:
         self._node.call(self._flight.reset)
         return self._done(response)
 
+    def _state(self) -> int:
+        """Stopped is paused at time 0 after a request to stop: nothing else tells the two apart."""
+        states, flight = self._messages.SimulationState, self._flight
+        if not flight.timekeeping.paused:
+            return states.STATE_PLAYING
+        stopped = self._stopped and flight.simulation.time_ns == 0
+        return states.STATE_STOPPED if stopped else states.STATE_PAUSED
+
     def get_simulation_state(self, request, response):
-        """Playing or paused."""
-        states = self._messages.SimulationState
-        response.state.state = states.PAUSED if self._flight.timekeeping.paused else states.PLAYING
+        """Playing, paused or stopped."""
+        response.state.state = self._state()
         return self._done(response)
 
     def set_simulation_state(self, request, response):
         """Play, pause, or stop, which is to pause and reset."""
-        states = self._messages.SimulationState
-        wanted, flight = request.state.state, self._flight
-        if wanted == states.STOPPED:
+        states, flight = self._messages.SimulationState, self._flight
+        wanted = request.state.state
+        if wanted not in (states.STATE_STOPPED, states.STATE_PLAYING, states.STATE_PAUSED):
+            accepted = "0 stopped, 1 playing or 2 paused; end the node by a signal"
+            return self._unsupported(response, f"state {wanted}: {accepted}")
+        if wanted == self._state():
+            response.result.result = response.ALREADY_IN_TARGET_STATE
+            return response
+        self._stopped = wanted == states.STATE_STOPPED
+        if self._stopped:
             self._node.call(lambda: (flight.pause(True), flight.reset()))
-        elif wanted in (states.PLAYING, states.PAUSED):
-            paused = wanted == states.PAUSED
-            if flight.timekeeping.paused == paused:
-                response.result.result = response.ALREADY_IN_TARGET_STATE
-                return response
-            self._node.call(lambda: flight.pause(paused))
         else:
-            return self._unsupported(
-                response, f"state {wanted}: 0 stopped, 1 playing or 2 paused; end the node by a signal"
-            )
+            self._node.call(lambda: flight.pause(wanted == states.STATE_PAUSED))
         return self._done(response)
 
     def step_simulation(self, request, response):
         """Step over publications, while paused."""
         flight, results = self._flight, self._messages.Result
         if not flight.timekeeping.paused:
-            response.result.result = results.RESULT_INCORRECT_STATE
+            response.result.result = results.RESULT_OPERATION_FAILED
             response.result.error_message = "the simulation is running; pause it first"
         elif not 1 <= request.steps <= MAX_STEPS:
             response.result.result = results.RESULT_OPERATION_FAILED

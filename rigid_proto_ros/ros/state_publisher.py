@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
@@ -44,6 +45,7 @@ class StatePublisher:
         self._tf: Publisher | None = None
         self._made_clock: Publisher | None = None
         self._made_tf: Publisher | None = None
+        self._tf_message: Any = None
         self._wanted: list = []
 
     def configure(self, values: Mapping[str, object]) -> None:
@@ -62,6 +64,7 @@ class StatePublisher:
         except ImportError:
             self._node.get_logger().warning("publish_tf: tf2_msgs isn't installed (ros-jazzy-tf2-msgs); no /tf")
             return None
+        self._tf_message = TFMessage
         return self._node.create_publisher(TFMessage, "/tf", qos.TF)
 
     def look_for_subscribers(self) -> bool:
@@ -114,10 +117,10 @@ class StatePublisher:
         felt.x, felt.y, felt.z = self._specific_force().tolist()
         return message
 
-    def _transform(self, message_type, time_ns: int, row: list[float]):
+    def _transform(self, time_ns: int, row: list[float]):
         transform = TransformStamped()
         transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
         transform.header.frame_id, transform.child_frame_id = self._frames
         t, r = transform.transform.translation, transform.transform.rotation
         t.x, t.y, t.z, r.x, r.y, r.z, r.w = row[:7]
-        return message_type(transforms=[transform])
+        return self._tf_message(transforms=[transform])

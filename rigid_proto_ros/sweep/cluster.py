@@ -38,7 +38,7 @@ def cluster_chunks(
     try:
         content = client.scatter(study, broadcast=False, hash=False)
         waiting = iter(todo)
-        pending = distributed.as_completed(with_results=True)
+        pending = distributed.as_completed(with_results=True, loop=client.loop)
         numbers: dict[str, int] = {}
 
         def submit() -> bool:

@@ -93,6 +93,9 @@ def plot_table(plot: Plot, table: Path) -> None:
 
 def _groups_of_points(axes, x: np.ndarray, y: np.ndarray, color: np.ndarray | None) -> None:
     """Points in one colour, or one for each text."""
+    by_text = color is not None and x.dtype == object and np.array_equal(x, color)
+    if x.dtype == object:
+        x = _spread(axes, x)
     x, y = _drawable(x, y)
     if color is None:
         axes.scatter(x, y, s=6, rasterized=len(x) > 5000)
@@ -100,7 +103,20 @@ def _groups_of_points(axes, x: np.ndarray, y: np.ndarray, color: np.ndarray | No
     for name in sorted({str(c) for c in color}):
         own = np.array([str(c) == name for c in color])
         axes.scatter(x[own], y[own], s=6, label=name, rasterized=len(x) > 5000)
-    axes.legend(fontsize="small")
+    if not by_text:
+        axes.legend(fontsize="small")
+
+
+def _spread(axes, text: np.ndarray) -> np.ndarray:
+    """Places (n,) for text: a column for each, its points beside one another in their order."""
+    names = sorted({str(t) for t in text})
+    number = np.array([names.index(str(t)) for t in text])
+    places = number.astype(float)
+    for k in range(len(names)):
+        own = np.flatnonzero(number == k)
+        places[own] += 0.6 * (np.arange(len(own)) + 0.5) / len(own) - 0.3
+    axes.set_xticks(range(len(names)), names, rotation=25 if len(names) > 6 else 0)
+    return places
 
 
 def _drawable(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,23 +10,17 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, MeshError
-from ..core.rotation import rotate_inverse
-from ..parameters import READ_ONLY, parameter_named
-from ..poke_script import ScriptCommand, expand_script
+from ..core.errors import InputError
 from ..recorded_session import RecordedSession
 from ..replay import MARKS
-from ..scenario import scene_text
-from ..scene_file import read_scene_text
-from ..session_branch import Branch, branch_at
 from ..session_mesh import scene_sha256
 from ..session_runs import decode_event
+from .rewind import Rewind, core_row, make_rewind
 from .save_as_script import SavedScript, save_as_script
 from .state_log import StateLog
 
@@ -51,46 +45,6 @@ SCENE_GRACE_S = 0.1
 
 STALE_STATES = 20
 """States from before a reset that may still come after its event; when more come, they are of the new run after all."""
-
-KEPT = frozenset(
-    {
-        *(
-            "record",
-            "real_time_factor",
-            "publish_rate",
-            "publish_clock",
-            "publish_tf",
-            "imu_contact",
-            "schedule_horizon",
-        ),
-        *("ghost.inertia_model", "ghost.integrator"),
-    }
-)
-"""Parameters that a rewind leaves as they are: how one looks at the motion, not the motion."""
-
-
-@dataclass(frozen=True)
-class Rewind:
-    """A moment to go on from, and all that the node must be told for it.
-
-    While paused: set ``changes`` atomically, call ``~/reset``, tell the history ``rewinding``, publish each of ``commands``
-    on its topic with its ``t_ns`` as the stamp, wait until ``commands_received`` covers them, resume. Where the node refuses
-    the changes because of what acts now, reset once before.
-
-    moment_ns on the history's time, time_ns on the node's clock of that run. row (13,): the state there, as published.
-    scene, script: the same as texts, for files and links. notes: what differs from what was. exact: computed anew from the
-    events to the bit; else taken from the recorded state.
-    """
-
-    moment_ns: int
-    time_ns: int
-    row: np.ndarray
-    changes: dict[str, object]
-    commands: list[ScriptCommand]
-    scene: str
-    script: str
-    notes: list[str]
-    exact: bool
 
 
 @dataclass(frozen=True)
@@ -262,7 +216,7 @@ class History:
             run = self._run_at(moment_ns)
             session = self._session(run, moment_ns - run.offset_ns, row)
             whole, present = run.whole, self._scene
-        return _rewind(session, moment_ns, row, whole, present)
+        return make_rewind(session, moment_ns, row, whole, present)
 
     def rewinding(self, rewind: Rewind | None) -> None:
         """Say before ``~/reset`` is called that the next reset goes back to there; None takes it back."""
@@ -339,84 +293,3 @@ class History:
             scenes=[run.scene, *run.scenes],
             attachments=list(self._attachments()),
         )
-
-
-def core_row(row: np.ndarray) -> np.ndarray:
-    """A published state (13,) in the order of ``core.observer.STATE_FIELDS``: the angular velocity in body axes."""
-    values = row.tolist()
-    return np.array([*values[:10], *rotate_inverse(*values[3:7], *values[10:13])])
-
-
-def _rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole: bool, present: str) -> Rewind:
-    time_ns = session.end_ns
-    reason = f"over {MAX_EVENTS} events"
-    branch: Branch | None = None
-    values: Mapping[str, Any] = {}
-    exact = False
-    if whole:
-        try:
-            branch = branch_at(session, time_ns)
-            values = read_scene_text(branch.scene).values
-            exact = np.array_equal(_start(values), row)
-            reason = "not all that acted before was heard"
-        except MeshError:
-            raise
-        except InputError as error:
-            reason = str(error)
-    if branch is None or not exact:
-        values = _recorded_values(session, row)
-        note = f"what acted then is left out, the state is the recorded one ({reason})"
-        branch = Branch(scene_text(values, session.mesh_sha256), [], [note])
-    script = branch.pokes_text if branch.pokes else ""
-    return Rewind(
-        moment_ns=moment_ns,
-        time_ns=time_ns,
-        row=row,
-        changes=changes_to(values, read_scene_text(present).values),
-        commands=expand_script(branch.pokes, wrench_timeout=float(values.get("wrench_timeout", 1.5))),
-        scene=branch.scene,
-        script=script,
-        notes=branch.notes,
-        exact=exact,
-    )
-
-
-_START = ("initial.position", "initial.orientation_xyzw", "initial.linear_velocity", "initial.angular_velocity")
-
-
-def _start(values: Mapping[str, Any]) -> np.ndarray:
-    return np.array([number for name in _START for number in values[name]])
-
-
-def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, object]:
-    """Parameters in force at the session's end, as far as its events say, with the recorded state as the initial one."""
-    values = dict(read_scene_text(session.scene).values)
-    for number, line in enumerate(session.lines, 1):
-        _, kind, content = decode_event(line, number)
-        if kind == "set":
-            values |= content
-    numbers = row.tolist()
-    cuts = ((0, 3), (3, 7), (7, 10), (10, 13))
-    return {**values, **{name: numbers[i:j] for name, (i, j) in zip(_START, cuts, strict=True)}}
-
-
-def changes_to(values: Mapping[str, object], present: Mapping[str, object]) -> dict[str, object]:
-    """What takes a node from its present parameters to those of a moment or a scene, to be set in one call.
-
-    What can't change in flight and what belongs to looking (KEPT) is left out; a ballast that isn't there yet weighs
-    nothing.
-    """
-    changes = {
-        name: value
-        for name, value in values.items()
-        if name not in KEPT
-        and parameter_named(name).changes != READ_ONLY
-        and (value != present.get(name) or name in _START)
-    }
-    for name, value in present.items():
-        if name.startswith("ballast.") and name not in values and value[0] != 0.0:
-            changes[name] = [0.0, *value[1:]]
-    if changes.keys() & {"mass", "density"}:
-        # Setting a density alone would take the mass away.
-        changes |= {name: values[name] for name in ("mass", "density") if name in values}
-    return changes

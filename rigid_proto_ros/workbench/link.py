@@ -46,6 +46,9 @@ def encode(scene: str, script: str = "") -> str:
         for name, value in convert_all(read_scene_text(scene).values).items()
         if name not in NOT_OF_THE_MOTION and (name not in PARAMETERS or value != PARAMETERS[name].default)
     }
+    if len(zlib.compress(script.encode(), 1)) > MAX_LINK:
+        # It won't fit, and reading it takes a second for every thousand entries.
+        raise _too_long(f"a script of {len(script)} characters")
     entries = script_entries(script)
     _check(values, entries)
     text = json.dumps({"scene": values, "script": entries or []}, separators=(",", ":"), allow_nan=False).encode()
@@ -55,8 +58,12 @@ def encode(scene: str, script: str = "") -> str:
     packed = packer.compress(text) + packer.flush()
     link = f"{VERSION}.{base64.urlsafe_b64encode(packed).decode().rstrip('=')}"
     if len(link) > MAX_LINK:
-        raise InputError("link", f"{len(link)} characters", f"at most {MAX_LINK}: save so long a script as a file")
+        raise _too_long(f"{len(link)} characters")
     return link
+
+
+def _too_long(received: str) -> InputError:
+    return InputError("link", received, f"at most {MAX_LINK} characters of link: save so long a script as a file")
 
 
 def decode(link: str) -> tuple[str, str]:

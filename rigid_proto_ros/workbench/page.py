@@ -24,10 +24,11 @@ from ..scene_file import read_scene_text
 from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
-from .history import History, Rewind, core_row
+from .history import History
 from .panel import Panel, show_tab
 from .pointer import Pointer, Tools
 from .readout_panel import ReadoutPanel
+from .rewind import Rewind, core_row
 from .ros_link import RosLink
 from .scene_view import SceneView
 from .session_tab import SessionTab

@@ -8,6 +8,7 @@ as it acts. An entry acts in a script at its own stamp, so what happened at one 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -22,11 +23,15 @@ from ..parameters import PARAMETERS, READ_ONLY, parameter_named
 from ..recorded_session import RecordedSession
 from ..replay import Resimulation, mesh_finder, session_scenario
 from ..scenario import Scenario, scene_text, yaml_double, yaml_value
+from ..scene_file import scalar
 from ..session_runs import decode_event
 from .script_order import Entry, in_order
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
 """Parameters of a running node that a scene to keep or to send doesn't carry."""
+
+_WORD = re.compile(r"[a-z_]{3,}\Z")
+"""Text that stands in YAML without quotes, unless it reads as true, false or null."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,7 @@ def flow(value: object) -> str:
         return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(flow(item) for item in value) + "]"
-    if isinstance(value, str) and value in ("com", "origin", "world", "body", "release", "clear_wrench"):
+    if isinstance(value, str) and _WORD.match(value) and value != "null" and isinstance(scalar(value), str):
         return value
     return yaml_double(value) if isinstance(value, float) else yaml_value(value)
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from ..bundled import example_path
 from ..core.errors import InputError
 from ..lessons import Lesson, lessons
-from .history import Rewind
 from .link import decode, encode
+from .rewind import Rewind
 from .situation import Situation, situation_of
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from ..core.errors import InputError
 from ..core.frames import parse_frame
 from ..poke_script import ScriptCommand, parse_script, with_contacts
 from ..scene_file import read_scene_text
-from .history import changes_to
+from .rewind import changes_to
 from .ros_link import RosLink
 
 MAX_UNCONFIRMED = 400

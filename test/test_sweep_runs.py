@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""A sweep as it is run: whole, stopped, killed and resumed, one row alone, and pictures of the table."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from sweep_studies import POKES, PULLED, study
+
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.sweep.chunk import run_chunk
+from rigid_proto_ros.sweep.local import chunk_rows
+from rigid_proto_ros.sweep.run import run_study
+
+pq = pytest.importorskip("pyarrow.parquet")
+
+
+def content(file: Path) -> dict[str, list]:
+    """Columns of a table as lists."""
+    return pq.read_table(file).to_pydict()
+
+
+def expected(own) -> dict[str, list]:
+    """The same of one call over all rows."""
+    columns = run_chunk(own, 0, own.rows).columns
+    return {name: [None if value != value else value for value in column.tolist()] for name, column in columns.items()}
+
+
+@pytest.fixture
+def long_run(tmp_path):
+    """The command of a run of many small chunks, its files, and the study."""
+    spec = {**PULLED, "samples": 320, "duration": 0.3}
+    file = tmp_path / "long.yaml"
+    file.write_text(yaml.safe_dump(spec, sort_keys=False))
+    out = tmp_path / "long.parquet"
+    command = [sys.executable, "-m", "rigid_proto_ros.cli.main", "sweep", str(file), "-o", str(out), "--threads", "1"]
+    return command, out, study(spec)
+
+
+def started(command: list[str], out: Path, parts: int) -> subprocess.Popen:
+    """The run, once so many parts are there."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    folder = out.with_name(out.name + ".parts")
+    while len(list(folder.glob("*.parquet"))) < parts:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.005)
+    return process
+
+
+def test_a_killed_run_is_resumed_without_a_row_lost_or_done_twice(long_run) -> None:
+    command, out, own = long_run
+    process = started(command, out, 2)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    folder = out.with_name(out.name + ".parts")
+    kept = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.parquet")}
+    assert kept and not out.exists()
+    # Without --resume the finished parts are not thrown away, with another study they are not taken.
+    assert main(["sweep", command[4], "-o", str(out)]) == 2
+    # The workers of the killed run may still end a chunk, but nobody writes it.
+    assert main(["sweep", command[4], "-o", str(out), "--resume"]) == 0
+    assert content(out) == expected(own)
+    assert not folder.exists()
+    metadata = json.loads(pq.read_schema(out).metadata[b"rigid_proto_ros"])
+    assert metadata["complete"] and metadata["rows_by_simulation"] == own.rows
+    assert metadata["cpu"] and metadata["numba"] and metadata["seed"] == own.seed
+    before = out.stat().st_mtime_ns
+    assert main(["sweep", command[4], "-o", str(out), "--resume"]) == 0
+    assert out.stat().st_mtime_ns == before
+
+
+def test_ctrl_c_leaves_a_readable_table_and_a_run_to_resume(long_run) -> None:
+    command, out, own = long_run
+    process = started(command, out, 1)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 0 and "--resume" in said
+    done = content(out)["row"]
+    assert 0 < len(done) < own.rows and sorted(set(done)) == done
+    other = study(PULLED, samples=330, duration=0.3)
+    with pytest.raises(Exception, match="rows of another study"):
+        run_study(other, out, resume=True, progress=False)
+    run_study(own, out, resume=True, progress=False, workers=1)
+    assert content(out) == expected(own)
+
+
+def test_one_core_and_many_write_the_same_table(tmp_path) -> None:
+    own = study(POKES)
+    assert chunk_rows(own, 1) != chunk_rows(own, 5)
+    for workers in (1, 5):
+        run_study(own, tmp_path / f"{workers}.parquet", workers=workers, progress=False)
+    assert content(tmp_path / "1.parquet") == content(tmp_path / "5.parquet") == expected(own)
+
+
+@pytest.mark.parametrize("spec", [POKES, PULLED], ids=["pokes", "string"])
+def test_a_row_written_as_a_scene_flies_to_the_same_bits(spec, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(yaml.safe_dump(spec, sort_keys=False))
+    assert main(["sweep", "s.yaml", "--row", "2", "--as-scene", "row.yaml", "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    words = row["fly"].split()
+    assert words[:2] == ["rigid_proto", "simulate"]
+    assert main([*words[1:], "--json"]) == 0
+    flown = json.loads(capsys.readouterr().out)
+    assert flown["position"] == [row[f"position.{axis}"] for axis in "xyz"]
+    if spec is POKES:
+        assert flown["orientation_xyzw"] == [row[f"orientation.{axis}"] for axis in "xyzw"]
+        assert flown["linear_velocity"] == [row[f"velocity.{axis}"] for axis in "xyz"]
+        assert flown["angular_velocity_body"] == [row[f"spin.{axis}"] for axis in "xyz"]
+
+
+def test_a_study_that_is_refused_is_one_line_and_exit_2(tmp_path, capsys) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text("scene: t_handle\nduration: 1\nvary: {mass: {uniform: [2, 1]}}\nsamples: 2\n")
+    assert main(["sweep", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "vary.mass.uniform" in said and "a < b" in said
+    assert main(["sweep", "flip_map", "--row", "4653"]) == 2
+    assert "0 to 4652" in capsys.readouterr().err
+
+
+def test_pictures_of_a_table_are_the_same_file_again(tmp_path, monkeypatch) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    vary = {"mass": {"grid": [0.1, 0.2, 0.3]}, "initial.angular_velocity.z": {"grid": [1.0, 2.0]}}
+    spec = {"scene": "t_handle", "duration": 0.1, "vary": vary, "measure": {"max": ["kinetic_energy"]}}
+    Path("s.yaml").write_text(yaml.safe_dump(spec, sort_keys=False))
+    plot = "x=mass,y=initial.angular_velocity.z,color=max.kinetic_energy"
+    for name in ("a.svg", "b.svg"):
+        assert main(["sweep", "s.yaml", "-o", "t.parquet", "--resume", "--plot", f"{plot},to={name}"]) == 0
+    assert Path("a.svg").read_bytes() == Path("b.svg").read_bytes()
+    assert "max.kinetic_energy" in Path("a.svg").read_text() or "<path" in Path("a.svg").read_text()
+    assert main(["sweep", "s.yaml", "-o", "t.parquet", "--resume", "--plot", "x=mass,y=nothing"]) == 2
+
+
+def test_rows_are_recorded_side_by_side(tmp_path) -> None:
+    chunk = pytest.importorskip("rerun.chunk")
+    file = tmp_path / "ghosts.rrd"
+    assert main(["sweep", "box_tensor", "--ghosts", "0,600,1999", "--record", str(file)]) == 0
+    entities = {str(c.entity_path) for c in chunk.RrdReader(file).stream()}
+    for row in (0, 600, 1999):
+        assert {f"/world/row_{row}", f"/world/row_{row}/mesh"} <= entities
+    assert main(["sweep", "box_tensor", "--ghosts", ",".join(map(str, range(13))), "--record", str(file)]) == 2
+
+
+def test_one_row_is_recorded_with_all_that_a_flight_shows(tmp_path, capsys) -> None:
+    chunk = pytest.importorskip("rerun.chunk")
+    file = tmp_path / "row.rrd"
+    assert main(["sweep", "box_tensor", "--row", "7", "--record", str(file), "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    assert row["row"] == 7 and row["failure"] is None and np.isfinite(row["difference.attitude"])
+    entities = {str(c.entity_path) for c in chunk.RrdReader(file).stream()}
+    assert "/world/body" in entities and any("angular_momentum" in entity for entity in entities)
