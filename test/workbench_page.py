@@ -31,6 +31,7 @@ class Bench:
             log=folder / "workbench",
         )
         self.process.wait_for("The workbench is at")
+        self.process.wait_for("is flying")
 
     @property
     def address(self) -> str:
