@@ -234,21 +234,6 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     ear.set_named({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 1.0]})
 
 
-def test_two_pages_agree(page, ear, bench, browser) -> None:
-    label = "Duration [s]"
-    other = Page(browser, bench.address)
-    try:
-        # A browser draws the page in front alone.
-        other.page.bring_to_front()
-        other.write(label, "0.25")
-        assert ear.until_value("poke_duration", lambda value: value != 0.05) == 0.25
-        page.page.bring_to_front()
-        page.until(lambda: page.input(label).input_value() == "0.25", "the second page's value on the first")
-    finally:
-        other.page.close()
-    ear.set_named({"poke_duration": 0.05})
-
-
 def test_what_was_done_by_hand_is_saved_as_scene_and_script(page, ear) -> None:
     before = len(ear.events())
     page.click(*page.middle)

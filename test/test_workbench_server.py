@@ -13,6 +13,7 @@ import pytest
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
 from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
+from rigid_proto_ros.workbench.controls import Controls  # noqa: E402
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server  # noqa: E402
 from rigid_proto_ros.workbench.upload import MAX_BYTES  # noqa: E402
 from rigid_proto_ros.workbench.upload_button import MAX_TRANSFERS, PART_BYTES, guard_uploads  # noqa: E402
@@ -65,6 +66,26 @@ def test_nobody_can_ask_for_a_public_tunnel(server) -> None:
 
     handlers = server._websock_server._incoming_handlers
     assert _messages.ShareUrlRequest not in handlers
+
+
+def test_what_one_page_sets_another_one_shows(server) -> None:
+    """The panel's inputs belong to the server: its parameters' controls, that all pages share."""
+    import msgspec.msgpack
+    from websockets.sync.client import connect
+
+    sent: list[dict] = []
+    with server.gui.add_folder("Two pages"):
+        controls = Controls(server.gui, sent.append)
+        field = controls.number("mass", "Mass")
+    address, protocol = f"ws://{LOOPBACK}:{server.get_port()}", f"viser-v{viser.__version__}"
+    with connect(address, subprotocols=[protocol]) as one, connect(address, subprotocols=[protocol]) as other:
+        update = {"type": "GuiUpdateMessage", "uuid": field._impl.uuid, "updates": {"value": "0.28125"}}
+        one.send(msgspec.msgpack.encode(update))
+        while b"0.28125" not in other.recv(timeout=20):
+            pass
+    # What the node has in force is shown on all of them, whoever set it.
+    controls.update({"mass": 0.5}, at_once=True)
+    assert field.value == "0.5"
 
 
 class Transfers:
