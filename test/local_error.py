@@ -14,6 +14,7 @@ from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
 from rigid_proto_ros.core import problem as of
+from rigid_proto_ros.core.motion import LOW
 from rigid_proto_ros.core.simulation import Simulation
 
 FLOOR = 32.0 * 2.0**-52
@@ -75,8 +76,12 @@ def committed_steps(
 def local_error(step: CommittedStep, digits: int = 22) -> float:
     """Largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s) of a step."""
     p, length = step.problem, step.problem[of.LENGTH]
-    row = [*step.before[7:10], *step.before[0:4], *step.before[10:13], *step.before[4:7]]
     with mp.workdps(digits + 10):
+        # Attitude and displacement have low words beside them.
+        y = [mpf(float(c)) for c in step.before]
+        for k in range(7):
+            y[k if k < 4 else k + 3] += y[LOW + k]
+        row = [*y[7:10], *y[0:4], *y[10:13], *y[4:7]]
         span = mpf(step.end_ns - step.begin_ns) / 10**9
         (exact,) = reference_motion(reference_problem(p), row, [span], digits)
         angle = angle_between(step.after[0:4], rotation_of(exact[3:7]))

@@ -58,8 +58,8 @@ class ReferenceState:
 
     @classmethod
     def of(cls, row) -> ReferenceState:
-        """From the 13 numbers x, q, v, ω; the quaternion is normalized in high precision."""
-        x = [mpf(float(c)) for c in row]
+        """From the 13 numbers x, q, v, ω, doubles or mpf; the quaternion is normalized in high precision."""
+        x = [c if isinstance(c, mpf) else mpf(float(c)) for c in row]
         size = mpmath.sqrt(sum(c * c for c in x[3:7]))
         return cls(x[0:3], [c / size for c in x[3:7]], x[7:10], x[10:13])
 

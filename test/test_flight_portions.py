@@ -65,6 +65,18 @@ def test_commands_and_requests_get_in_meanwhile():
     assert rig.flight.simulation.time_ns == reached_ns
 
 
+def test_the_way_to_a_command_that_was_not_finished_in_its_tick_goes_on_in_the_next():
+    rig = Rig({**ENDLESS, "real_time_factor": 1000.0})
+    rig.flight.tick()
+    rig.commands.append(wrench("world", (1e-3, 0.0, 0.0)))
+    rig.flight.tick()
+    assert rig.flight.next_wake_ns() == 0
+    reached_ns = rig.flight.simulation.time_ns
+    rig.flight.tick()
+    assert rig.flight.simulation.time_ns > reached_ns
+    assert rig.published == [0]
+
+
 def test_a_step_that_takes_years_is_begun_and_given_up_by_resuming():
     rig = Rig({**ENDLESS, "start_paused": True})
     rig.flight.tick()

@@ -108,7 +108,7 @@ def total_energy(y, string, gravity):
     return kinetic, kinetic - float(gravity @ position) + 0.5 * string.stiffness * stretch**2
 
 
-@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e9])
+@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
 def test_discrete_gradient_keeps_energy_through_slack_and_taut_at_any_stiffness(stiffness):
     h = 1e-3
     problem, y, string, gravity = pendulum(stiffness, h)
@@ -119,8 +119,7 @@ def test_discrete_gradient_keeps_energy_through_slack_and_taut_at_any_stiffness(
         assert kernel(y, problem, h, 10) == 10
         kinetic, energy = total_energy(y, string, gravity)
         largest, worst = max(largest, kinetic), max(worst, abs(energy - start))
-    # ω_s h from 0.01 to 35; one rounding of the knot's place weighs √(2 k E) ε.
-    # Measured MEASURED of the largest kinetic energy.
+    # ω_s h from 0.01 to 1000; one rounding of the knot's place, in the energy as measured here, weighs √(2 k E) ε.
     assert worst <= 1e-9 * largest
 
 

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: MIT
 """When anybody asks never changes the motion: one advance and a thousand random portions give the same bits."""
 
+import os
 import random
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,3 +82,19 @@ def test_a_command_yet_to_come_changes_nothing_before_it():
         simulation.submit(wrench("body@point/.1,.2,.3", (1.0, 2.0, 3.0)), 0)
     with_it.submit(wrench("body", (5.0, 0.0, 0.0)), 3 * SECOND)
     assert with_it.advance(3 * SECOND - 1).sha256() == without.advance(3 * SECOND - 1).sha256()
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_another_process_with_one_or_two_threads_gives_the_same_bits(threads):
+    names = ("auto", "rk4", "discrete_gradient")
+    code = f"from test_integrator_portions import flown\nfor n in {names}: print(flown(n, 1, ()).state.sha256())"
+    settings = {"NUMBA_NUM_THREADS": threads, "OMP_NUM_THREADS": threads, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parent,
+        env={**os.environ, **settings},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == [flown(name, 1, ()).state.sha256() for name in names]

@@ -112,9 +112,9 @@ def check_step(name, load, step_s):
     for part in (0.1, 0.35, 0.9, 1.0):
         simulation.advance(round(span_ns * part))
         if sane_end(simulation):
-            # A blow-up is only for steps of which the integrator warns. The stiff string starts stretched by a metre, with
-            # gigajoules that spin the body within a step, and there a solver may say that it found none.
-            assert simulation.too_coarse or load == "stiff string", (name, load, step_s)
+            # A blow-up, or a solver that finds nothing, is only for steps of which the integrator warns. The stiff string
+            # starts stretched by a metre, with gigajoules that spin the body at 1e4 rad/s and more.
+            assert simulation.too_coarse, (name, load, step_s)
             return
 
 

@@ -125,6 +125,18 @@ def test_a_change_that_only_a_later_scene_allows_flies_again() -> None:
     assert yaml.safe_load(saved.script)[1]["set"]["mesh"] == "t_handle"
 
 
+def test_a_script_that_its_own_scene_refuses_says_so() -> None:
+    hand = HandSession({**SCENE, "integrator": "free_body"})
+    hand.wait(SECOND // 10)
+    hand.set(integrator="auto")
+    hand.wait(SECOND // 10)
+    hand.load(False, "world@tip", [0.01, 0.0, 0.0])
+    hand.wait(SECOND // 10)
+    (note,) = save_as_script(hand.session()).notes
+    assert "refuses the script" in note
+    assert "free_body" in note
+
+
 def test_a_log_with_a_line_missing_is_refused() -> None:
     hand = random_hand_session(1, seconds=2.0)
     session = hand.session()

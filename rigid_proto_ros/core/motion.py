@@ -34,6 +34,9 @@ VELOCITY = 10  # (3,)
 HAND_WORK = 13
 HEAT = 14
 VARIABLES = 15
+"""How many integrators step."""
+LOW = 15  # (7,) low words of attitude and displacement, kept by those integrators that need more digits than a double's
+STORED = 22
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,7 +54,7 @@ def damping_functions(z):
 
 @njit(cache=True, error_model="numpy")
 def to_variables(row, p, y):
-    """State row (13,) to variables y (15,) at the start of the segment with problem p."""
+    """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
     P, Q = PRINCIPAL_AXES, PRINCIPAL_QUATERNION
     y[0], y[1], y[2], y[3] = multiply(row[3], row[4], row[5], row[6], p[Q], p[Q + 1], p[Q + 2], p[Q + 3])
     for k in range(3):
@@ -64,7 +67,7 @@ def to_variables(row, p, y):
 
 @njit(cache=True, error_model="numpy")
 def to_row(y, p, elapsed, row):
-    """Variables y (15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
+    """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = PRINCIPAL_AXES, PRINCIPAL_QUATERNION
     c = p[REFERENCE_DAMPING]
     phi1, phi2 = damping_functions(c * elapsed)
@@ -88,7 +91,7 @@ def to_good_row(y, p, elapsed, row, limit):
 
 
 def new_variables(row: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Variables (15,) of a state row at a segment's start."""
-    y = np.empty(VARIABLES)
+    """Variables (STORED,) of a state row at a segment's start."""
+    y = np.zeros(STORED)
     to_variables(row, p, y)
     return y

@@ -33,8 +33,9 @@ INITIAL_VIEWS = ("lesson", "debugging", "plain")
 
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
-LIVE_MEMORY_LIMIT = "64MiB"
-"""What the server keeps for viewers that come late; the oldest is dropped first."""
+LIVE_MEMORY_LIMIT = "32MiB"
+"""What the server keeps for viewers that come late, a minute at 1 kHz; the oldest is dropped first. It takes about twice
+that of this process's memory."""
 
 _REMEMBERED = ("started", "mesh_changed", "body_changed", "scene_changed", "string_changed", "ghost_began")
 """What a recording that is switched on later must know."""

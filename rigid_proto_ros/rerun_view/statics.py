@@ -25,6 +25,9 @@ AXIS_LENGTH = 0.25
 INVISIBLE = 1e-9
 """A scale that nobody sees; the viewer refuses 0, which has no inverse."""
 
+LIVE_NUMBERS_MAX = 4_000_000
+"""[bytes] of a mesh's exact numbers that viewers are sent too; larger ones would push the flight out of the live server."""
+
 VIEW_PER_REACH = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
 
@@ -115,6 +118,8 @@ def send_mesh(stream: Stream, scene: Scene, number: int) -> None:
     if scene.surface is None:
         return
     stream.log_static(mesh_entity(number), drawn_mesh(scene.surface, (*e.MESH_COLOUR, 255)))
+    if stream.may_skip and scene.vertices.nbytes + scene.triangles.nbytes > LIVE_NUMBERS_MAX:
+        return
     stream.log_static(
         numbered(e.SESSION_MESH, number),
         rr.AnyValues(

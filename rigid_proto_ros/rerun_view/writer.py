@@ -40,7 +40,7 @@ PICTURES_WAITING = 1000
 """As many of them go out at once."""
 
 REPEATED_ROWS = 16384
-"""After as many states viewers are told again what holds since long: a seventh of what the live server keeps."""
+"""After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
 
 MOTION_ARROWS = 0.7
 """Length of the arrows of ω and L against those of loads."""

@@ -197,7 +197,7 @@ class Flight:
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
         self._lively = self._take_commands(wall_ns)
-        if not self._listeners or self._followed_clock:
+        if not self._listeners or self._followed_clock or not self._caught_up:
             self.catch_up()
 
     def _pass_over(self, present_ns: int) -> None:

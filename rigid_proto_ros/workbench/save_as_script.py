@@ -19,7 +19,9 @@ from ..core.frames import Frame
 from ..core.loads import Load
 from ..core.observer import Observer
 from ..core.string_control import mesh_point
+from ..offline import OfflineRun
 from ..parameters import PARAMETERS, READ_ONLY, parameter_named
+from ..poke_script import expand_script
 from ..recorded_session import RecordedSession
 from ..replay import Resimulation, mesh_finder, session_scenario
 from ..scenario import Scenario, scene_text, yaml_double, yaml_value
@@ -64,6 +66,11 @@ def save_as_script(session: RecordedSession) -> SavedScript:
     scene = kept_scene(scenario)
     head = "# Done by hand. Again: rigid_proto simulate SCENE --script THIS, or poke_client THIS --reset\n"
     script = head + "".join(f"- {flow(entry.content(time_ns))}\n" for time_ns, entry in entries)
+    try:
+        OfflineRun(scenario, expand_script([entry.content(time_ns) for time_ns, entry in entries]))
+    except InputError as error:
+        # What the first integrator can't carry is refused at the start, though a later one carried it.
+        notes.append(f"the scene as it begins refuses the script: {error}")
     mesh = scenario.values["mesh"]
     if scenario.body_mesh is not None and scenario.body_mesh.mesh.path == mesh:
         notes.append(f"the scene names the mesh file {mesh}: keep it with the scene")

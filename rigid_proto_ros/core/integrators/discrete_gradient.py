@@ -12,7 +12,11 @@ free end exact too. Attitude and spin: integrators/midpoint_spin.py.
 
 Order 2 while ω_s h is small, bounded energy at any ω_s h: a stiff string becomes an inextensible one, its unresolved swing
 along its length wrong in phase. Given μ, what remains is one equation for the mean spin (Newton); μ itself is the root of a
-monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺.
+monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺. Where the spin turns by so much in
+a step that none is found, the step is halved until one is: energy allows a solution at any length, not every guess leads to it.
+
+Attitude and displacement carry low words, and everything else about the string is computed as a change (integrators/knot.py):
+otherwise roundings of the knot's place, weighed by the tension, add up to 1e-8 of the energy at 1e5 rad/s.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..motion import HAND_WORK, HEAT
+from ..motion import HAND_WORK, HEAT, LOW
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
@@ -36,17 +40,16 @@ from ..problem import (
     REST_LENGTH,
     STIFFNESS,
     STRING_DAMPING,
-    STRING_START,
     TRANSLATES,
 )
-from ..rotation import rotate, rotate_inverse
+from ..rotation import multiply, rotate, rotate_inverse
 from ..string import NO_DIRECTION
 from .equations import torque
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
+from .knot import knot_and_stretch, moved_pair, unit_attitude
 from .midpoint_spin import (
     MAX_ITERATIONS,
     ROUNDING,
-    cayley_turned,
     gyroscopic_torque,
     half_turned,
     mean_torque,
@@ -58,13 +61,17 @@ from .stepping import FixedSteps
 _PULL_TRIALS = 100
 """Secant steps on the pull; about 5 are used, more only where the string turns slack or taut."""
 
-# Of the scratch array: mean spin, then what the force came to.
-_O, _FORCE, _A0, _A1 = 0, 3, 6, 9
+_MOST_HALVINGS = 12
+"""Of a step for which no solution is found: a string that turns the body about within the step."""
+
+# Of the scratch array: mean spin, the force it came to, the vector from free end to knot at the start and its change; its
+# length and stretch at the start.
+_O, _FORCE, _A, _CHANGE, _LENGTH, _STRETCH, _SIZE = 0, 3, 6, 9, 12, 13, 14
 
 
 @njit(cache=True, error_model="numpy")
 def _momentum(y, p, h, mu, rho, s):
-    """I(ω⁺ − ω) from the mean spin s[0:3] under the pull F = −μ(a + a⁺) + ρ a; keeps F, a and a⁺ in s."""
+    """I(ω⁺ − ω) from the mean spin s[0:3] under the pull F = −μ(a + a⁺) + ρ a; keeps F and a⁺ − a in s."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
     qx, qy, qz, qw = y[0], y[1], y[2], y[3]
     mx, my, mz, mw = half_turned(qx, qy, qz, qw, ox, oy, oz, h)
@@ -74,23 +81,24 @@ def _momentum(y, p, h, mu, rho, s):
     tx, ty, tz = tx + gx, ty + gy, tz + gz
     if p[HAS_STRING] != 0.0:
         R, F, G = ATTACH, ACCELERATION_BODY, ACCELERATION_ADDED
-        nx, ny, nz, nw = cayley_turned(qx, qy, qz, qw, ox, oy, oz, h)
-        arm0 = rotate(qx, qy, qz, qw, p[R], p[R + 1], p[R + 2])
-        arm1 = rotate(nx, ny, nz, nw, p[R], p[R + 1], p[R + 2])
+        # What the Cayley turn adds to the arm, in the axes of the step's start: 2(v × r + v × (v × r))/(1 + v²), v = ½hω̄.
+        vx, vy, vz = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
+        f = 2.0 / (1.0 + (vx * vx + vy * vy + vz * vz))
+        cx, cy, cz = vy * p[R + 2] - vz * p[R + 1], vz * p[R] - vx * p[R + 2], vx * p[R + 1] - vy * p[R]
+        dx, dy, dz = f * (cx + (vy * cz - vz * cy)), f * (cy + (vz * cx - vx * cz)), f * (cz + (vx * cy - vy * cx))
+        turned = rotate(qx, qy, qz, qw, dx, dy, dz)
         push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
         # The mean velocity is (u + ½h(push + F/m))/(1 + ½hc).
         soft = 1.0 / (1.0 + 0.5 * h * p[DAMPING_LINEAR])
         give = 0.5 * h * h * soft / p[MASS]
         for k in range(3):
-            a = p[STRING_START + k] + y[7 + k] + arm0[k]
-            free = a + h * soft * (y[10 + k] + 0.5 * h * (push[k] + p[G + k])) + (arm1[k] - arm0[k])
-            total = (a + free + give * rho * a) / (1.0 + give * mu)
-            s[_A0 + k] = a
-            s[_A1 + k] = total - a
-            s[_FORCE + k] = rho * a - mu * total
+            a = s[_A + k]
+            free = h * soft * (y[10 + k] + 0.5 * h * (push[k] + p[G + k])) + turned[k]
+            change = (free + give * (rho - 2.0 * mu) * a) / (1.0 + give * mu)
+            s[_CHANGE + k] = change
+            s[_FORCE + k] = rho * a - mu * (2.0 * a + change)
         # The arm's mean in the axes of the step's start; the torque there, and its ½h ω̄ × t.
-        bx, by, bz = rotate_inverse(qx, qy, qz, qw, arm1[0], arm1[1], arm1[2])
-        bx, by, bz = 0.5 * (bx + p[R]), 0.5 * (by + p[R + 1]), 0.5 * (bz + p[R + 2])
+        bx, by, bz = p[R] + 0.5 * dx, p[R + 1] + 0.5 * dy, p[R + 2] + 0.5 * dz
         fx, fy, fz = rotate_inverse(qx, qy, qz, qw, s[_FORCE], s[_FORCE + 1], s[_FORCE + 2])
         sx, sy, sz = by * fz - bz * fy, bz * fx - bx * fz, bx * fy - by * fx
         tx += sx - 0.5 * h * (oy * sz - oz * sy)
@@ -122,17 +130,25 @@ def _solve_spin(y, p, h, mu, rho, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _length(s, at):
-    return math.sqrt(s[at] * s[at] + s[at + 1] * s[at + 1] + s[at + 2] * s[at + 2])
+def _length_after(s):
+    """l⁺, and l⁺ − l = (a⁺ − a)·(a⁺ + a)/(l⁺ + l) without cancellation."""
+    square, change = 0.0, 0.0
+    for k in range(3):
+        after = s[_A + k] + s[_CHANGE + k]
+        square += after * after
+        change += s[_CHANGE + k] * (s[_A + k] + after)
+    length = math.sqrt(square)
+    total = length + s[_LENGTH]
+    return length, change / total if total > 0.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def _tension(l0, l1, h, p):
-    """T over a step from length l0 to l1, and the part of the way θ in which the damper works."""
-    k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
-    x0, x1 = l0 - rest, l1 - rest
+def _tension(x0, change, h, p):
+    """T over a step in which the stretch x0 changes, and the part of the way θ in which the damper works."""
+    k, c = p[STIFFNESS], p[STRING_DAMPING]
+    x1 = x0 + change
     if p[BILATERAL] != 0.0:
-        return 0.5 * k * (x0 + x1) + c * (x1 - x0) / h, 1.0
+        return 0.5 * k * (x0 + x1) + c * change / h, 1.0
     if x0 <= 0.0 and x1 <= 0.0:
         return 0.0, 0.0
     if x0 >= 0.0 and x1 >= 0.0:
@@ -140,28 +156,29 @@ def _tension(l0, l1, h, p):
     else:
         # Part of the way is slack: ½k x²/|x₁ − x₀| with the stretched end's x.
         inside = max(x0, x1)
-        part = inside / abs(x1 - x0)
+        part = inside / abs(change)
         spring = 0.5 * k * inside * part
-    return max(0.0, spring + part * c * (x1 - x0) / h), part
+    return max(0.0, spring + part * c * change / h), part
 
 
 @njit(cache=True, error_model="numpy")
 def _excess(y, p, h, mu, s):
-    """μ(l + l⁺) − T(l⁺): rises with μ. NaN where the spin was not found."""
+    """μ(l + l⁺) − T(l⁺), which rises with μ, and l + l⁺. NaN where the spin was not found."""
     if not _solve_spin(y, p, h, mu, 0.0, s):
-        return math.nan
-    l0, l1 = _length(s, _A0), _length(s, _A1)
-    tension, _ = _tension(l0, l1, h, p)
-    return mu * (l0 + l1) - tension
+        return math.nan, math.nan
+    length, change = _length_after(s)
+    tension, _ = _tension(s[_STRETCH], change, h, p)
+    total = s[_LENGTH] + length
+    return mu * total - tension, total
 
 
 @njit(cache=True, error_model="numpy")
 def _lightness(y, p, s):
     """1/m + (r × n)ᵀ I⁻¹ (r × n) with n along a: what the knot yields to a pull."""
-    length = _length(s, _A0)
+    length = s[_LENGTH]
     if length == 0.0:
         return 1.0 / p[MASS]
-    x, z, w = s[_A0] / length, s[_A0 + 1] / length, s[_A0 + 2] / length
+    x, z, w = s[_A] / length, s[_A + 1] / length, s[_A + 2] / length
     nx, ny, nz = rotate_inverse(y[0], y[1], y[2], y[3], x, z, w)
     rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
     a, b, c = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
@@ -173,8 +190,7 @@ def _solve_pull(y, p, h, s):
     """μ, the spin with it left in s; NaN when there is none."""
     lower, upper = -math.inf, math.inf
     mu = 0.0
-    f = _excess(y, p, h, mu, s)
-    l0, l1 = _length(s, _A0), _length(s, _A1)
+    f, total = _excess(y, p, h, mu, s)
     if not math.isfinite(f) or f == 0.0:
         return f
     if p[BILATERAL] != 0.0:
@@ -183,7 +199,7 @@ def _solve_pull(y, p, h, s):
     # The slope of μ(l + l⁺) − T by the mass that the knot shows along the string.
     give = 0.5 * h * h * _lightness(y, p, s)
     stiff = 0.5 * p[STIFFNESS] + p[STRING_DAMPING] / h
-    slope = (l0 + l1) * (1.0 + give * stiff)
+    slope = total * (1.0 + give * stiff)
     old_mu, old_f = mu, f
     for _ in range(_PULL_TRIALS):
         lower, upper = (lower, mu) if f > 0.0 else (mu, upper)
@@ -194,19 +210,19 @@ def _solve_pull(y, p, h, s):
         if new == mu:
             return mu
         old_mu, old_f, mu = mu, f, new
-        f = _excess(y, p, h, mu, s)
+        f, total = _excess(y, p, h, mu, s)
         if not math.isfinite(f):
             return math.nan
-        l0, l1 = _length(s, _A0), _length(s, _A1)
-        # What rounding of the lengths does to T: below it f has no sign.
-        if abs(f) <= 8.0 * ROUNDING * (stiff + abs(mu)) * (l0 + l1):
+        # What rounding of the knot's way does to T: below it f has no sign.
+        way = abs(s[_STRETCH]) + abs(s[_CHANGE]) + abs(s[_CHANGE + 1]) + abs(s[_CHANGE + 2])
+        if abs(f) <= 8.0 * ROUNDING * (2.0 * stiff * way + abs(mu) * total):
             return mu
         slope = (f - old_f) / (mu - old_mu)
         if abs(f) > 0.5 * abs(old_f) and bracketed:
             # The secant stalls at a kink: halve the bracket next.
             slope = math.nan
         elif not slope > 0.0:
-            slope = (l0 + l1) * (1.0 + give * stiff)
+            slope = total * (1.0 + give * stiff)
     return mu
 
 
@@ -214,6 +230,8 @@ def _solve_pull(y, p, h, s):
 def _step(y, p, h, out, s):
     """One step from y into out; returns whether a solution was found."""
     s[_O], s[_O + 1], s[_O + 2] = y[4], y[5], y[6]
+    if p[HAS_STRING] != 0.0:
+        s[_A], s[_A + 1], s[_A + 2], s[_LENGTH], s[_STRETCH] = knot_and_stretch(y, p)
     mu, rho = 0.0, 0.0
     found = True
     if p[HAS_STRING] == 0.0 or p[REST_LENGTH] == 0.0:
@@ -224,7 +242,7 @@ def _step(y, p, h, out, s):
     else:
         mu = _solve_pull(y, p, h, s)
         found = math.isfinite(mu)
-        if found and max(_length(s, _A0), _length(s, _A1)) < NO_DIRECTION * p[REST_LENGTH]:
+        if found and max(s[_LENGTH], _length_after(s)[0]) < NO_DIRECTION * p[REST_LENGTH]:
             mu = 0.0
             found = _solve_spin(y, p, h, mu, rho, s)
     if not found:
@@ -232,7 +250,14 @@ def _step(y, p, h, out, s):
     kx, ky, kz = _momentum(y, p, h, mu, rho, s)
     out[4], out[5], out[6] = y[4] + kx / p[MOMENTS], y[5] + ky / p[MOMENTS + 1], y[6] + kz / p[MOMENTS + 2]
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
-    out[0], out[1], out[2], out[3] = cayley_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
+    # q ⊗ (v, 1)/n as q and what is added to it, n² = 1 + v².
+    vx, vy, vz = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
+    vv = vx * vx + vy * vy + vz * vz
+    n = math.sqrt(1.0 + vv)
+    turn = multiply(y[0], y[1], y[2], y[3], vx, vy, vz, -vv / (1.0 + n))
+    for k in range(4):
+        moved_pair(y, out, k, LOW + k, turn[k] / n)
+    unit_attitude(out)
     out[13], out[14] = y[13], y[14]
     if p[TRANSLATES] != 0.0:
         _translate(y, p, h, out, s)
@@ -251,32 +276,51 @@ def _translate(y, p, h, out, s):
         force = s[_FORCE + k] if p[HAS_STRING] != 0.0 else 0.0
         a = push[k] + p[G + k] + force / p[MASS]
         mean = (y[10 + k] + 0.5 * h * a) / (1.0 + 0.5 * h * c)
-        out[7 + k] = y[7 + k] + h * mean
+        moved_pair(y, out, 7 + k, LOW + 4 + k, h * mean)
         out[10 + k] = y[10 + k] + h * (a - c * mean)
         work += force * p[HAND_VELOCITY + k]
     if p[HAS_STRING] == 0.0:
         return
     out[HAND_WORK] = y[HAND_WORK] + h * work
     if p[REST_LENGTH] == 0.0:
-        d0, d1, d2 = s[_A1] - s[_A0], s[_A1 + 1] - s[_A0 + 1], s[_A1 + 2] - s[_A0 + 2]
+        d0, d1, d2 = s[_CHANGE], s[_CHANGE + 1], s[_CHANGE + 2]
         out[HEAT] = y[HEAT] + p[STRING_DAMPING] / h * (d0 * d0 + d1 * d1 + d2 * d2)
         return
     # What the pull took beyond the change of potential.
-    l0, l1 = _length(s, _A0), _length(s, _A1)
-    tension, _ = _tension(l0, l1, h, p)
-    x0, x1 = l0 - p[REST_LENGTH], l1 - p[REST_LENGTH]
+    _, change = _length_after(s)
+    tension, _ = _tension(s[_STRETCH], change, h, p)
+    x0, x1 = s[_STRETCH], s[_STRETCH] + change
     if p[BILATERAL] == 0.0:
         x0, x1 = max(x0, 0.0), max(x1, 0.0)
     if p[STRING_DAMPING] != 0.0:
-        out[HEAT] = y[HEAT] + (tension * (l1 - l0) - 0.5 * p[STIFFNESS] * (x1 - x0) * (x1 + x0))
+        out[HEAT] = y[HEAT] + (tension * change - 0.5 * p[STIFFNESS] * (x1 - x0) * (x1 + x0))
+
+
+@njit(cache=True, error_model="numpy")
+def _step_in_parts(y, p, h, out, part, s):
+    """A step as a chain of shorter ones, halved until a solution is found and doubled again where they meet."""
+    part[:] = y
+    halvings, done, whole = 1, 0, 1 << _MOST_HALVINGS
+    while done < whole:
+        size = whole >> halvings
+        if _step(part, p, h * size / whole, out, s) and is_good(out):
+            part[:] = out
+            done += size
+            while halvings > 0 and done % (2 * (whole >> halvings)) == 0:
+                halvings -= 1
+        else:
+            halvings += 1
+            if halvings > _MOST_HALVINGS:
+                return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")
 def discrete_gradient_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    new, scratch = y.copy(), np.zeros(12)
+    new, part, scratch = y.copy(), y.copy(), np.zeros(_SIZE)
     for done in range(n):
-        if not _step(y, p, h, new, scratch) or not is_good(new):
+        if not (_step(y, p, h, new, scratch) and is_good(new)) and not _step_in_parts(y, p, h, new, part, scratch):
             return done
         y[:] = new
     return n

@@ -20,7 +20,7 @@ from .stepping import FixedSteps
 @njit(cache=True, error_model="numpy")
 def dop853_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    k, z, new = np.zeros((12, 15)), np.empty(15), np.empty(15)
+    k, z, new = np.zeros((12, 15)), np.empty(15), y.copy()
     for done in range(n):
         rates(y, p, False, k[0])
         stages(y, p, h, False, STAGES, 12, k, z)
@@ -34,7 +34,7 @@ def dop853_steps(y, p, h, n):
 @njit(cache=True, error_model="numpy")
 def dop853_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
-    k, z, new, trial = np.zeros((12, 15)), np.empty(15), np.empty(15), np.empty(15)
+    k, z, new, trial = np.zeros((12, 15)), np.empty(15), y.copy(), y.copy()
     search = slack.new_search()
     for done in range(n):
         new[:] = y

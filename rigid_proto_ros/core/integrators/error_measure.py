@@ -2,7 +2,7 @@
 """How large an error is: attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s), the largest of them.
 
 ``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε a
-step. Where a stiff string turns rounding of a position into a jerk, the floor is what that jerk does in one step.
+step.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ from ..problem import (
     REFERENCE_ACCELERATION,
     REFERENCE_DAMPING,
     REFERENCE_VELOCITY,
-    REST_LENGTH,
-    STIFFNESS,
     STRING_DAMPING,
     TRANSLATES,
 )
@@ -69,39 +67,11 @@ def size(e, attitude, spin, place, speed):
 
 
 @njit(cache=True, error_model="numpy")
-def _response(p, spin, speed):
-    """What a force at the knot does to the measured velocities, per newton and second."""
-    A = ATTACH
-    arm = math.sqrt(p[A] * p[A] + p[A + 1] * p[A + 1] + p[A + 2] * p[A + 2])
-    return max(speed / p[MASS], spin * arm / p[MOMENTS])
-
-
-@njit(cache=True, error_model="numpy")
-def _rounding_of_place(p):
-    A = ATTACH
-    arm = math.sqrt(p[A] * p[A] + p[A + 1] * p[A + 1] + p[A + 2] * p[A + 2])
-    return FLOOR * (arm + p[REST_LENGTH])
-
-
-@njit(cache=True, error_model="numpy")
-def jerk_of_rounding(p, spin, speed):
-    """Error rate [1/s] that one rounding of the knot's place causes through the spring; times h it is a floor too."""
-    if p[HAS_STRING] == 0.0:
-        return 0.0
-    return p[STIFFNESS] * _rounding_of_place(p) * _response(p, spin, speed)
-
-
-@njit(cache=True, error_model="numpy")
-def jump_of_rounding(p, spin, speed):
-    """Error that one rounding of the knot's place causes when a damped string jerks taut that much too early or late."""
-    if p[HAS_STRING] == 0.0:
-        return 0.0
-    return p[STRING_DAMPING] * _rounding_of_place(p) * _response(p, spin, speed)
-
-
-@njit(cache=True, error_model="numpy")
 def jump_of_displacement(p, spin, speed):
-    """The same for a displacement of one unit of the measure."""
+    """Error that a displacement by one unit of the measure causes when a damped string jerks taut that much too early or late."""
     if p[HAS_STRING] == 0.0:
         return 0.0
-    return p[STRING_DAMPING] * p[LENGTH] * _response(p, spin, speed)
+    arm = math.sqrt(p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2)
+    # What a force at the knot does to the measured velocities, per newton and second.
+    response = max(speed / p[MASS], spin * arm / p[MOMENTS])
+    return p[STRING_DAMPING] * p[LENGTH] * response

@@ -8,7 +8,6 @@ section II.1. Energy grows steadily; with ``gyroscopic: false`` it is the paper'
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from . import slack
@@ -50,7 +49,7 @@ def euler_steps(y, p, h, n):
 @njit(cache=True, error_model="numpy")
 def euler_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
-    new, trial = np.empty(15), np.empty(15)
+    new, trial = y.copy(), y.copy()
     search = slack.new_search()
     for done in range(n):
         new[:] = y

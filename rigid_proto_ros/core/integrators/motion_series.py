@@ -13,6 +13,7 @@ import math
 
 from numba import njit
 
+from ..motion import LOW
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
@@ -29,17 +30,16 @@ from ..problem import (
     REST_LENGTH,
     STIFFNESS,
     STRING_DAMPING,
-    STRING_START,
     TORQUE_BODY,
     TORQUE_WORLD,
     TRANSLATES,
 )
-from ..rotation import normalize
 from ..string import NO_DIRECTION
+from .knot import knot_and_stretch, moved_pair, unit_attitude
 
 # Columns of the coefficient array c (degree + 2, COLUMNS); the first 15 are the variables of core/motion.py.
-_Q, _W, _D, _U, _WORK, _HEAT, _R, A_KNOT, _N, _L, _T, _F = 0, 4, 7, 10, 13, 14, 15, 24, 27, 30, 31, 32
-COLUMNS = 35
+_Q, _W, _D, _U, _WORK, _HEAT, _R, A_KNOT, _N, _L, _T, _F, _STRETCH = 0, 4, 7, 10, 13, 14, 15, 24, 27, 30, 31, 32, 35
+COLUMNS = 36
 
 
 @njit(cache=True, error_model="numpy")
@@ -66,23 +66,23 @@ def _rotation(c, k):
 
 @njit(cache=True, error_model="numpy")
 def _knot(c, p, k):
-    """Coefficient k of the vector from free end to knot."""
+    """Coefficient k > 0 of the vector from free end to knot."""
     r = ATTACH
     for j in range(3):
-        a = c[k, _D + j] + (c[k, _R + 3 * j] * p[r] + c[k, _R + 3 * j + 1] * p[r + 1] + c[k, _R + 3 * j + 2] * p[r + 2])
-        c[k, A_KNOT + j] = a + p[STRING_START + j] if k == 0 else a
+        a = c[k, _R + 3 * j] * p[r] + c[k, _R + 3 * j + 1] * p[r + 1] + c[k, _R + 3 * j + 2] * p[r + 2]
+        c[k, A_KNOT + j] = c[k, _D + j] + a
 
 
 @njit(cache=True, error_model="numpy")
 def _length(c, k):
-    """Coefficient k of the knot's distance from the free end."""
+    """Coefficient k > 0 of the knot's distance from the free end."""
     square, rest = 0.0, 0.0
     for i in range(k + 1):
         j = k - i
         square += c[i, 24] * c[j, 24] + c[i, 25] * c[j, 25] + c[i, 26] * c[j, 26]
         if 0 < i < k:
             rest += c[i, _L] * c[j, _L]
-    c[k, _L] = math.sqrt(square) if k == 0 else (square - rest) / (2.0 * c[0, _L])
+    c[k, _L] = (square - rest) / (2.0 * c[0, _L])
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,7 +105,7 @@ def _pull(c, p, k):
         z -= length * c[k - i, 29]
     inverse = 1.0 / c[0, _L]
     c[k, 27], c[k, 28], c[k, 29] = x * inverse, y * inverse, z * inverse
-    c[k, _T] = stiffness * (c[k, _L] - (rest if k == 0 else 0.0)) + damping * (k + 1) * c[k + 1, _L]
+    c[k, _T] = stiffness * (c[k, _L] if k > 0 else c[0, _STRETCH]) + damping * (k + 1) * c[k + 1, _L]
     x, y, z, heat = 0.0, 0.0, 0.0, 0.0
     for i in range(k + 1):
         tension = c[i, _T]
@@ -131,8 +131,7 @@ def motion_series(y, p, degree, taut, c):
     _rotation(c, 0)
     pulls = False
     if tied:
-        _knot(c, p, 0)
-        _length(c, 0)
+        c[0, 24], c[0, 25], c[0, 26], c[0, _L], c[0, _STRETCH] = knot_and_stretch(y, p)
         pulls = p[REST_LENGTH] == 0.0 or (taut and c[0, _L] >= NO_DIRECTION * p[REST_LENGTH])
     for k in range(degree):
         f = 1.0 / (k + 1.0)
@@ -198,17 +197,20 @@ def motion_series(y, p, degree, taut, c):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_at(c, p, degree, h, out):
-    """The variables h seconds on, summed from the smallest term (Horner), with a unit quaternion."""
+def motion_at(c, p, degree, h, y):
+    """Take the variables y, those that c is the series of, h seconds on; summed from the smallest term (Horner)."""
     columns = 15 if p[HAS_STRING] != 0.0 else 13 if p[TRANSLATES] != 0.0 else 7
     for j in range(columns):
-        out[j] = c[degree, j]
-    for k in range(degree - 1, 0, -1):
-        for j in range(columns):
-            out[j] = out[j] * h + c[k, j]
-    for j in range(columns):
-        out[j] = c[0, j] + h * out[j]
-    out[0], out[1], out[2], out[3] = normalize(out[0], out[1], out[2], out[3])
+        change = c[degree, j]
+        for k in range(degree - 1, 0, -1):
+            change = change * h + c[k, j]
+        if j < _W:
+            moved_pair(y, y, j, LOW + j, h * change)
+        elif _D <= j < _U:
+            moved_pair(y, y, j, LOW + 4 + j - _D, h * change)
+        else:
+            y[j] += h * change
+    unit_attitude(y)
 
 
 @njit(cache=True, error_model="numpy")
@@ -218,8 +220,11 @@ def stretch_at(c, p, degree, h):
     for k in range(degree, 0, -1):
         bx, by, bz = bx * h + k * c[k, 24], by * h + k * c[k, 25], bz * h + k * c[k, 26]
         ax, ay, az = ax * h + c[k, 24], ay * h + c[k, 25], az * h + c[k, 26]
-    ax, ay, az = ax * h + c[0, 24], ay * h + c[0, 25], az * h + c[0, 26]
+    dx, dy, dz = ax * h, ay * h, az * h
+    ax, ay, az = c[0, 24] + dx, c[0, 25] + dy, c[0, 26] + dz
     length = math.sqrt(ax * ax + ay * ay + az * az)
     if length == 0.0:
         return -p[REST_LENGTH], 0.0
-    return length - p[REST_LENGTH], (ax * bx + ay * by + az * bz) / length
+    # The change of length without cancellation: l⁺² − l² = (a⁺ − a)·(a⁺ + a).
+    change = (dx * (ax + c[0, 24]) + dy * (ay + c[0, 25]) + dz * (az + c[0, 26])) / (length + c[0, _L])
+    return c[0, _STRETCH] + change, (ax * bx + ay * by + az * bz) / length

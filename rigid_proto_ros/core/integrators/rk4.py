@@ -160,7 +160,7 @@ def _turning_steps(y, p, h, n):
 @njit(cache=True, error_model="numpy")
 def rk4_string_steps(y, p, h, n):
     """The same by the tableau, each step cut where the string turns slack or taut."""
-    k, z, new, trial = np.zeros((4, 15)), np.empty(15), np.empty(15), np.empty(15)
+    k, z, new, trial = np.zeros((4, 15)), np.empty(15), y.copy(), y.copy()
     search = slack.new_search()
     for done in range(n):
         new[:] = y

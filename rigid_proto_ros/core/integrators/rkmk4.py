@@ -8,7 +8,6 @@ the attitude by construction; energy still drifts with h⁵ per step.
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from ..rotation import multiply, normalize
@@ -70,7 +69,7 @@ def rkmk4_steps(y, p, h, n):
 @njit(cache=True, error_model="numpy")
 def rkmk4_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
-    new, trial = np.empty(15), np.empty(15)
+    new, trial = y.copy(), y.copy()
     search = slack.new_search()
     for done in range(n):
         new[:] = y

@@ -8,7 +8,6 @@ gyroscopic term is taken explicitly, so a spinning body gains energy.
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from ..rotation import multiply, normalize
@@ -52,7 +51,7 @@ def semi_implicit_euler_steps(y, p, h, n):
 @njit(cache=True, error_model="numpy")
 def semi_implicit_euler_string_steps(y, p, h, n):
     """The same, each step cut where the string turns slack or taut."""
-    new, trial = np.empty(15), np.empty(15)
+    new, trial = y.copy(), y.copy()
     search = slack.new_search()
     for done in range(n):
         new[:] = y

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..motion import HEAT
+from ..motion import HEAT, STORED
 from ..problem import BILATERAL, HAS_STRING, STIFFNESS
 from . import control as ctl
 from .equations import stretch, tension_margin
@@ -21,9 +21,7 @@ from .error_measure import (
     FLOOR,
     WEIGHINGS,
     heavier,
-    jerk_of_rounding,
     jump_of_displacement,
-    jump_of_rounding,
     scales,
     size,
 )
@@ -98,7 +96,6 @@ def _walk(y, p, control, longest_ns, look, weights, c, out):
     """
     degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
     longest = longest_ns * 1e-9
-    rate_of_error = max(accuracy, jerk_of_rounding(p, weights[1], weights[3]))
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
     part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
     one_sided = p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
@@ -116,10 +113,10 @@ def _walk(y, p, control, longest_ns, look, weights, c, out):
         control[ctl.PENDING] += 1.0
         # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much better.
         allowance = part if taut else part / (1.0 + jerk_of_place)
-        h = step_length(_growth(c, degree, weights), rate_of_error, degree, allowance)
+        h = step_length(_growth(c, degree, weights), accuracy, degree, allowance)
         if not h * 1e9 >= 1.0 or not is_good(c[1]):
             return 0
-        if accuracy * h < FLOOR or rate_of_error > accuracy:
+        if accuracy * h < FLOOR:
             control[ctl.FLOOR_BINDS] = 1.0
         arrives = h >= longest - gone
         h = min(h, longest - gone)
@@ -142,8 +139,6 @@ def _walk(y, p, control, longest_ns, look, weights, c, out):
         if length_ns * 1e-9 <= gone:
             length_ns += 1
     _move(c, p, degree, length_ns * 1e-9 - gone, one_sided and not taut, out)
-    if gone > 0.0 and jump_of_rounding(p, weights[1], weights[3]) > accuracy * length_ns * 1e-9:
-        control[ctl.FLOOR_BINDS] = 1.0
     return length_ns
 
 
@@ -172,7 +167,7 @@ def steps(y, p, control, following, c, span_ns, look):
     while True:
         if look or control[ctl.ACCEPTED_NS] == 0.0:
             spent = control[ctl.PENDING]
-            out = np.zeros(15) if look else following
+            out = np.zeros(STORED) if look else following
             elapsed = control[ctl.ELAPSED_NS]
             weights = scales(y, p, elapsed * 1e-9)
             length, good = 0, False

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..motion import VARIABLES
+from ..motion import STORED
 from . import control as ctl
 from .integrator import Integrator
 
@@ -109,7 +109,7 @@ class AdaptiveSteps:
     def __init__(self, choice: str, control: np.ndarray, kernel, workspace: np.ndarray):
         self.choice = choice
         self._control = control
-        self._following = np.empty(VARIABLES)
+        self._following = np.empty(STORED)
         self._workspace = workspace
         self._kernel = kernel
         self._cuts = 0
