@@ -91,7 +91,6 @@ def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(rig)
     gained = told(rig, before, lambda gained: gained["poke_received"] + gained["sequence_gaps"] >= 12_003)
     assert gained["poke_received"] + gained["sequence_gaps"] == 12_003
     assert gained["sequence_gaps"] > 0
-    assert gained["queue_full"] > 0
     rig.sent += gained["poke_received"]
 
 
@@ -105,8 +104,9 @@ def test_with_several_publishers_a_full_queue_is_told_and_no_number_of_lost_mess
         push(rig, 1)
         told(rig, before, lambda gained: gained["poke_received"] == 2)
         with held_up(rig):
-            push(other, 3_000)
-            push(rig, 3_000)
+            # Each more than a writer keeps for a reader that doesn't answer.
+            push(other, 6_000)
+            push(rig, 6_000)
         gained = told(rig, before, lambda gained: gained["poke_received"] > 2 and gained["queue_full"] > 0)
         assert gained["sequence_gaps"] == 0
     finally:
@@ -127,14 +127,18 @@ def test_with_several_publishers_a_full_queue_is_told_and_no_number_of_lost_mess
 
 
 def test_a_publisher_that_comes_and_goes_beside_another_makes_no_gaps(rig):
-    """Two that send a few messages and leave, while a third keeps sending: all are heard, none counted as lost."""
+    """Two that send a few messages, one leaves and one is killed, while a third keeps sending: all are heard, none
+    counted as lost.
+    """
     before = rig.counters()
     rig.send("repeat", topic=rig.name("poke"), content=PUSH, count=1500, rate=300.0)
-    for _ in range(2):
+    for leaves in (True, False):
         guest = RosClient(rig.environment, rig.node)
         guest.advertise("poke")
         push(guest, 5)
         guest.do("acknowledged", topic=rig.name("poke"))
+        if not leaves:
+            guest.process.kill()
         guest.close()
     rig.answer()
     gained = told(rig, before, lambda gained: gained["poke_received"] >= 1510)

@@ -43,6 +43,7 @@ ALLOWED = {
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
     "viser": (f"{PACKAGE}.workbench",),
+    "websockets": (f"{PACKAGE}.workbench",),  # comes with viser
     "mcap": (f"{PACKAGE}.session_mcap",),
     "zstandard": (f"{PACKAGE}.session_mcap",),  # comes with mcap
 }

@@ -33,7 +33,7 @@ DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if READ
 OWN = ("rigid_proto", "poke_client")
 # Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
 NOT_RUN = {"sudo", "source", "cd", "rosdep", "colcon", "pip", "git", "ros2", "python", "rerun", "rigid_body_node"}
-STAYS_UP = ("rigid_proto up", "rigid_body_node --bodies")
+STAYS_UP = ("rigid_proto up", "rigid_proto workbench", "rigid_body_node --bodies")
 
 
 def blocks(path: Path, *languages: str) -> list[str]:
@@ -126,19 +126,24 @@ def test_command_that_stays_up_gets_ready_and_ends_cleanly(command: str, ros_env
     pytest.importorskip("rclpy")
     module = {"rigid_proto": "rigid_proto_ros.cli.main", "rigid_body_node": "rigid_proto_ros.ros.main"}
     program, *arguments = words(command)
-    if program == "rigid_proto":
+    ready_when = "is flying"
+    if arguments[0] == "workbench":
+        pytest.importorskip("viser")
+        arguments += ["--no-browser"]
+        ready_when = "The workbench is at"
+    elif program == "rigid_proto":
         arguments += ["--viewer", "none"]  # the last one counts: no window, no port
     process = subprocess.Popen(
         [sys.executable, "-m", module[program], *arguments],
         env=ros_environment,
         cwd=SOURCE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
     )
     try:
         # Ends with the process, which the suite's own timeout would end too.
-        ready = any("is flying" in line for line in process.stderr)
+        ready = any(ready_when in line for line in process.stdout)
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=10.0) == 0
         assert ready

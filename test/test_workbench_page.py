@@ -234,18 +234,6 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     ear.set_named({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 1.0]})
 
 
-def test_two_pages_agree(page, ear, bench, browser) -> None:
-    other = Page(browser, bench.address)
-    try:
-        page.tab("Physics")
-        other.tab("Physics")
-        page.write("Linear damping [N s/m]", "0.25")
-        other.until(lambda: other.input("Linear damping [N s/m]").input_value() == "0.25", "the other page's value")
-    finally:
-        other.page.close()
-    ear.set_named({"linear_damping": 0.0})
-
-
 def test_what_was_done_by_hand_is_saved_as_scene_and_script(page, ear) -> None:
     before = len(ear.events())
     page.click(*page.middle)

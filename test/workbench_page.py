@@ -31,6 +31,7 @@ class Bench:
             log=folder / "workbench",
         )
         self.process.wait_for("The workbench is at")
+        self.process.wait_for("is flying")
 
     @property
     def address(self) -> str:
@@ -53,10 +54,17 @@ class Page:
     def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         self.page.set_default_timeout(PATIENCE_S * 1e3)
+        # Software WebGL draws as often as it is let, and leaves the page no time for anything else.
+        self.page.add_init_script(
+            "const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), 50)"
+        )
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
         # viser says that WebGL runs in software, and stands before the picture while it does.
-        self.page.locator(".mantine-Notification-closeButton").first.click()
+        see_through = (
+            ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
+        )
+        self.page.add_style_tag(content=see_through)
         self.until(lambda: "is flying" in self.text or "is sleeping" in self.text, "a node on the page")
 
     @property
@@ -72,7 +80,7 @@ class Page:
         return found
 
     def tab(self, name: str) -> None:
-        self.page.get_by_role("tab", name=name, exact=True).click()
+        self.page.get_by_role("tab", name=name, exact=True).click(force=True)
 
     def button(self, name: str) -> None:
         self.page.get_by_role("button", name=name, exact=True).click()

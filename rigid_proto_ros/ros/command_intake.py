@@ -140,8 +140,8 @@ class CommandIntake:
                 for count in range(qos.COMMAND_DEPTH):
                     taken = subscription.handle.take_message(message_type, True)
                     if taken is None:
-                        if look_at_publishers or (count and look_at_quiet):
-                            gaps.emptied()
+                        if (look_at_publishers or (count and look_at_quiet)) and gaps.emptied():
+                            self.queue_full += 1
                         break
                     if count == self._depths[source] - 1:
                         self.queue_full += 1

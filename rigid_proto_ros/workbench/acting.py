@@ -99,10 +99,14 @@ class Acting:
             tied = None
         if tied is None:
             return None
-        # A target may be heard before the first state after it.
-        state = State(max(state.time_ns, tied.begin_ns), state.row)
+        state = _not_before(tied, state)
         hand = tied.free_end(state.time_ns)
         return hand + tied.span(setup.body, state), hand
+
+    def string_energy(self, setup: Setup, state: State) -> float:
+        """What the string holds [J]."""
+        tied = self.string
+        return 0.0 if tied is None else tied.potential_energy(setup.body, _not_before(tied, state))
 
     def arrows(self, setup: Setup, state: State, size: float) -> list[tuple[np.ndarray, np.ndarray]]:
         """Point of attack and drawn vector (3,) [m, world] of each force; ``size`` is the body's.
@@ -123,3 +127,8 @@ class Acting:
                 vector = force * (length / strength)
                 arrows.append((point - vector, vector))
         return arrows
+
+
+def _not_before(tied: Tied, state: State) -> State:
+    """A target may be heard before the first state after it."""
+    return State(max(state.time_ns, tied.begin_ns), state.row)

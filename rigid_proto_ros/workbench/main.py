@@ -45,10 +45,17 @@ def serve(args: argparse.Namespace, stop: threading.Event) -> int:
 
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     address = f"http://{args.host}:{args.port}"
-    server = make_server(args.host, args.port)
+    pages: list[Page] = []
+
+    def on_link(link: str) -> None:
+        for page in pages:
+            page.deliver(page.follow_link, link)
+
+    server = make_server(args.host, args.port, on_link)
     page = Page(server, args.node, address, args.lesson)
+    pages.append(page)
     if args.link:
-        asyncio.run_coroutine_threadsafe(page.open_link(args.link), server.get_event_loop())
+        page.deliver(page.follow_link, args.link)
     running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
     print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
     if args.open and has_display():

@@ -32,6 +32,7 @@ from .rewind import Rewind, core_row
 from .ros_link import RosLink
 from .scene_view import SceneView
 from .session_tab import SessionTab
+from .shadow import Shadow
 from .sighting import DrawnPose, Sightings
 from .situation import Situation, bring_about
 from .upload_button import UploadButton
@@ -77,6 +78,7 @@ class Page:
         self.view = SceneView(server)
         self.sightings = Sightings()
         self.acting = Acting()
+        self.shadow = Shadow()
         self.pointer = Pointer(self.link, self, self.sightings, self.tools)
         self._setter = ParameterSetter(self.link.set_parameters, self._refused)
         self._controls = Controls(server.gui, self._setter.set)
@@ -197,9 +199,9 @@ class Page:
             raise
         self.paused = paused
 
-    async def open_link(self, text: str) -> None:
+    def follow_link(self, link: str) -> None:
         """Bring the node where a link leads, once a page is open."""
-        await self._session.open_link(text)
+        self._following = self.loop.create_task(self._session.open_link(link))
 
     def say(self, text: str) -> None:
         """A line to all pages."""
@@ -273,6 +275,7 @@ class Page:
             self._another_body = True
         if old is not None and self.state is not None:
             self.acting.changed(old, scenario, self.state)
+            self.shadow.changed(scenario, self.state)
         self.body_tab.changed(scenario, self._another_body)
         self._upload.flies(str(scenario.values["mesh"]))
         self._controls.update(scenario.values)
@@ -310,6 +313,7 @@ class Page:
                 self.state = State(time_ns, core_row(row))
                 if first:
                     self.acting.begin(self.scenario.setup, self.state)
+                    self.shadow.begin(self.scenario, self.state)
             if self.state is not None:
                 self._draw(now_s)
         self.pointer.hold()
@@ -322,6 +326,7 @@ class Page:
         if kind == "reset":
             setup = self.scenario.setup
             self.acting.begin(setup, State(0, setup.initial))
+            self.shadow.begin(self.scenario, State(0, setup.initial))
             self._readouts.restart()
             if self.looking_at is None:
                 self.view.origin = np.zeros(3)
@@ -332,6 +337,7 @@ class Page:
             self.pointer.knot_moved()
         if self.state is not None:
             self.acting.event(event, self.scenario, self.state)
+            self.shadow.event(event, self.scenario)
 
     def _draw(self, now_s: float) -> None:
         state, setup, view = self._shown_state(), self.scenario.setup, self.view
@@ -339,7 +345,7 @@ class Page:
         if self.follow and not self.pointer.dragging:
             self._lead_back(state.position, LEASH * size)
         looking = self.looking_at is not None
-        ghost, moment = self.history.ghost, self.looking_at or self.history.span[1]
+        ghost, com = self._ghost_row(looking)
         with self.server.atomic():
             view.place(state.row)
             view.place_grid()
@@ -347,11 +353,19 @@ class Page:
             view.show_loads([] if looking else self.acting.arrows(setup, state, size))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
             view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.7 * size))
-            view.show_ghost(None if ghost is None else ghost.at(moment))
+            view.show_ghost(ghost, com)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
-        tied = self.acting.string
-        stretched = 0.0 if tied is None or looking else tied.potential_energy(setup.body, state)
-        self._readouts.show(now_s, self.scenario, state, stretched, [])
+        stretched = 0.0 if looking else self.acting.string_energy(setup, state)
+        self._readouts.show(now_s, self.scenario, state, stretched)
+
+    def _ghost_row(self, looking: bool) -> tuple[np.ndarray | None, np.ndarray]:
+        """The ghost's state, and its COM in scaled mesh coordinates: the future that was left, or the scene's own ghost."""
+        own = self.scenario.setup.body.center_of_mass
+        shadow = None if looking else self.shadow.row(self.state.time_ns)
+        left = self.history.ghost
+        if left is not None:
+            return left.at(self.looking_at or self.history.span[1]), own
+        return (None, own) if shadow is None else (shadow, self.shadow.center_of_mass)
 
     def _shown_state(self) -> State:
         if self.looking_at is not None:

@@ -152,7 +152,7 @@ class Panel:
         controls.choice("integrator", "Integrator", tuple(INTEGRATORS))
         controls.number("step", "Step [s]")
         controls.number("accuracy", "Accuracy [1/s]")
-        with gui.add_folder("Ghost in Rerun", expand_by_default=False):
+        with gui.add_folder("Ghost beside it", expand_by_default=False):
             controls.choice("ghost.inertia_model", "Its tensor")
             controls.choice("ghost.integrator", "Its integrator")
 

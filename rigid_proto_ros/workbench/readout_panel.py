@@ -57,8 +57,8 @@ class ReadoutPanel:
         self._samples.clear()
         self._start = None
 
-    def show(self, now_s: float, scenario: Scenario, state: State, string_energy: float, words: list[str]) -> None:
-        """Take a state; draw where that is due. words: lines about what the node does."""
+    def show(self, now_s: float, scenario: Scenario, state: State, string_energy: float) -> None:
+        """Take a state; draw where that is due."""
         if now_s < self._sample_due_s and now_s < self._numbers_due_s:
             return
         body = scenario.setup.body
@@ -91,7 +91,7 @@ class ReadoutPanel:
                 ("ω₁ ω₂ ω₃", " ".join(f"{x:.3g}" for x in w)),
             )
             table = "\n".join(f"| {name} | {value} |" for name, value in rows)
-            self._numbers.content = "|  |  |\n| --- | --- |\n" + table + "\n\n" + "\n".join(f"{w}  " for w in words)
+            self._numbers.content = "|  |  |\n| --- | --- |\n" + table
         if now_s >= self._plots_due_s and len(self._samples) > 1:
             self._plots_due_s = now_s + PLOTS_S
             columns = np.array(self._samples).T

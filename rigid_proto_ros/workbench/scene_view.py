@@ -57,6 +57,8 @@ class SceneView:
         self._shown = dict(SWITCHES)
         self._radius = 0.5
         self._drawn_body: tuple = ()
+        self._scale = np.ones(3)
+        self._middle = np.zeros(3)
         self._handles: dict[str, list] = {name: [] for name in SWITCHES}
         self._surface: Surface | None = None
         scene = self._scene
@@ -118,15 +120,19 @@ class SceneView:
         unit = self.unit
         if replaced:
             self._surface = surface
+            if surface is not None:
+                # Drawn vertices are relative to it: single precision is enough then, however far out the mesh lies.
+                self._middle = 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
             self._make_body(surface)
         if surface is not None:
-            offset = (surface_reference(surface) * body.scale - body.center_of_mass) / unit
+            offset = (self._middle * body.scale - body.center_of_mass) / unit
             scale = tuple((body.scale / unit).tolist())
         else:
             offset, scale = np.zeros(3), tuple((ellipsoid / unit).tolist())
         turned = (1.0, 0.0, 0.0, 0.0) if surface is not None else _wxyz(body.principal_quaternion)
         for mesh in (self.body, self._ghost):
             mesh.scale, mesh.position, mesh.wxyz = scale, offset, turned
+        self._scale = body.scale
         drawn = (body.inertia.tobytes(), body.center_of_mass.tobytes(), *scale)
         if replaced or drawn != self._drawn_body:
             self._drawn_body = drawn
@@ -139,7 +145,7 @@ class SceneView:
             drawn = self._scene.add_icosphere("/body/mesh", 1.0, BODY_COLOUR, subdivisions=4)
             ghost = self._scene.add_icosphere("/ghost/mesh", 1.0, GHOST_COLOUR, opacity=0.35)
         else:
-            vertices, triangles, _ = shaded_surface(surface.vertices - surface_reference(surface), surface.triangles)
+            vertices, triangles, _ = shaded_surface(surface.vertices - self._middle, surface.triangles)
             drawn = self._scene.add_mesh_simple("/body/mesh", vertices, triangles, color=BODY_COLOUR, side="double")
             ghost = self._scene.add_mesh_simple(
                 "/ghost/mesh", vertices, triangles, color=GHOST_COLOUR, opacity=0.35, side="double"
@@ -153,7 +159,7 @@ class SceneView:
         axes[:, 1] = np.diag(1.25 * self._radius / unit * np.sqrt(body.principal_moments / body.principal_moments[2]))
         see_through = {"opacity": 0.3, "cast_shadow": False, "receive_shadow": False}
         made = {
-            "COM": scene.add_icosphere("/body/com", 0.035, (30, 30, 30), opacity=0.8),
+            "COM": scene.add_icosphere("/body/com", 0.02, (30, 30, 30)),
             "Principal axes": scene.add_arrows(
                 "/body/axes", axes, AXES_COLOURS, wxyz=turned, shaft_radius=0.008, head_radius=0.022, head_length=0.06
             ),
@@ -218,12 +224,14 @@ class SceneView:
             handle.points = np.array([[self._drawn(p), self._drawn(p + v)] for p, v in arrows])
         _set_visible(handle, shown)
 
-    def show_ghost(self, row: np.ndarray | None) -> None:
-        """The ghost at a state's pose, or nowhere."""
+    def show_ghost(self, row: np.ndarray | None, center_of_mass: np.ndarray) -> None:
+        """The ghost at a state's pose, or nowhere; its COM (3,) in scaled mesh coordinates."""
         shown = row is not None and self._shown["Ghost"]
         if shown:
             self._ghost_frame.position = self._drawn(row[0:3])
             self._ghost_frame.wxyz = _wxyz(row[3:7])
+            if self._surface is not None:
+                self._ghost.position = (self._middle * self._scale - center_of_mass) / self.unit
         _set_visible(self._ghost_frame, shown)
 
     def _drawn(self, world_point) -> np.ndarray:
@@ -234,11 +242,6 @@ def nice_length(length: float) -> float:
     """1, 2 or 5 times a power of ten, the next above a length [m]."""
     power = 10.0 ** math.floor(math.log10(length))
     return next(nice for nice in (power, 2.0 * power, 5.0 * power, 10.0 * power) if nice >= length)
-
-
-def surface_reference(surface) -> np.ndarray:
-    """Middle of the bounding box (3,) in mesh coordinates: drawn vertices are relative to it."""
-    return 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
 
 
 def _box_corners(surface, scale) -> np.ndarray:

@@ -1,25 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""viser's server as the workbench needs it: quiet, on this machine only, and with nothing that leads beyond it."""
+"""viser's server as the workbench needs it: quiet, for pages of its own alone, and with nothing that leads beyond it."""
 
 from __future__ import annotations
 
 import contextlib
+import http
 import io
 import logging
+from collections.abc import Callable, Iterator
+from typing import Any
+from urllib.parse import unquote, urlsplit
 
 import viser
+import websockets.asyncio.server
 from viser import _messages
 
 PANEL_PIXELS = 380
 TITLE = "rigid_proto workbench"
+LOOPBACK_NAMES = ("127.0.0.1", "localhost", "::1")
 
 
-def make_server(host: str, port: int) -> viser.ViserServer:
-    """A server that listens on exactly this port."""
+def make_server(host: str, port: int, on_link: Callable[[str], None]) -> viser.ViserServer:
+    """A server that listens on exactly this port. on_link(text) is called when a page is opened with ``/?<link>``."""
     # Whoever knocks and goes, a port scan or a browser that thought better of it, is no error of ours.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     # Its greeting would stand between the lines that the command prints.
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), _requests_go_through(_gate(host, on_link)):
         server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
     # A browser could ask for a public tunnel to this server: nobody asked us for that.
     for request in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
@@ -34,3 +40,53 @@ def stop_server(server: viser.ViserServer) -> None:
     """Stop it, as quietly as it began."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
+
+
+def _gate(host: str, on_link: Callable[[str], None]) -> Callable:
+    """What is asked of each request before viser sees it: an answer that turns it away, or None."""
+
+    def answer(connection, request):
+        reason = refusal(host, request.headers.get("Host", ""), request.headers.get("Origin"))
+        if reason:
+            return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
+        path, _, query = request.path.partition("?")
+        # Only a page that is opened: an image of another site's page must not set anything.
+        opened = request.headers.get("Sec-Fetch-Dest", "document") == "document"
+        if path == "/" and query and opened and request.headers.get("Upgrade") != "websocket":
+            on_link(unquote(query))
+        return None
+
+    return answer
+
+
+def refusal(served_on: str, host: str, origin: str | None) -> str:
+    """Why a request isn't from a page of this server, or empty.
+
+    A page of any site may open a socket to this machine, and a name that somebody else owns may point here: the first shows
+    in ``Origin``, the second in ``Host``.
+    """
+    name = urlsplit(f"//{host}").hostname or ""
+    if served_on in LOOPBACK_NAMES and name not in LOOPBACK_NAMES:
+        return f"host {host[:80]!r}; accepted: {', '.join(LOOPBACK_NAMES)}"
+    if origin is not None and urlsplit(origin).netloc != host:
+        return f"a page of {origin[:80]!r}; accepted: pages of {host}"
+    return ""
+
+
+@contextlib.contextmanager
+def _requests_go_through(gate: Callable) -> Iterator[None]:
+    """While this lasts, a server that is started asks ``gate`` first; viser has no way of its own to be told so."""
+    module: Any = websockets.asyncio.server
+    serve = module.serve
+
+    def guarded(*arguments, process_request=None, **options):
+        def process(connection, request):
+            return gate(connection, request) or process_request(connection, request)
+
+        return serve(*arguments, process_request=process, **options)
+
+    module.serve = guarded
+    try:
+        yield
+    finally:
+        module.serve = serve

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of the interactive page in headless Chromium: ``python test/workbench_pictures.py PICTURE.png`` draws the README's,
+``--lessons FOLDER`` one of each lesson.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from pathlib import Path
+
+from conftest import held_domain
+from playwright.sync_api import sync_playwright
+from workbench_page import CHROMIUM, FLAGS, Bench, Page
+
+from rigid_proto_ros.rerun_view.ports import any_free_port
+from rigid_proto_ros.workbench.lessons import lessons
+
+SIZE = (1400, 800)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("picture", nargs="?", type=Path)
+    parser.add_argument("--lessons", type=Path, metavar="FOLDER")
+    args = parser.parse_args()
+    with held_domain() as domain, tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        bench = Bench(environment, Path(folder), any_free_port(), "t_handle")
+        try:
+            browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            page = Page(browser, bench.address, SIZE)
+            if args.picture:
+                draw_pull(page, args.picture)
+            if args.lessons:
+                args.lessons.mkdir(parents=True, exist_ok=True)
+                for lesson in lessons():
+                    page.choose("Lesson", lesson.title)
+                    time.sleep(6.0)
+                    page.page.screenshot(path=args.lessons / f"{lesson.name}.png")
+            browser.close()
+        finally:
+            bench.process.end()
+
+
+def draw_pull(page: Page, picture: Path) -> None:
+    """The T-handle some flips on, pulled at by a string."""
+    time.sleep(8.0)
+    x, y = page.middle
+    page.drag(x, y, -220.0, -120.0, steps=4)
+    page.page.screenshot(path=picture)
+    page.release()
+
+
+if __name__ == "__main__":
+    main()
