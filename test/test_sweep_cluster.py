@@ -24,7 +24,7 @@ def test_a_worker_killed_in_mid_run_costs_no_row(tmp_path) -> None:
         killed = []
 
         def kill_one() -> None:
-            while len(list(folder.glob("*.parquet"))) < 1:
+            while len(list(folder.glob("*.arrow"))) < 1:
                 time.sleep(0.005)
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)

@@ -17,6 +17,7 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.sweep.chunk import run_chunk
 from rigid_proto_ros.sweep.local import chunk_rows
 from rigid_proto_ros.sweep.run import run_study
+from rigid_proto_ros.sweep.table import metadata_of
 
 pq = pytest.importorskip("pyarrow.parquet")
 
@@ -47,7 +48,7 @@ def started(command: list[str], out: Path, parts: int) -> subprocess.Popen:
     """The run, once so many parts are there."""
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     folder = out.with_name(out.name + ".parts")
-    while len(list(folder.glob("*.parquet"))) < parts:
+    while len(list(folder.glob("*.arrow"))) < parts:
         assert process.poll() is None, process.communicate()
         time.sleep(0.005)
     return process
@@ -59,15 +60,15 @@ def test_a_killed_run_is_resumed_without_a_row_lost_or_done_twice(long_run) -> N
     process.send_signal(signal.SIGKILL)
     process.communicate()
     folder = out.with_name(out.name + ".parts")
-    kept = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.parquet")}
+    kept = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.arrow")}
     assert kept and not out.exists()
     # Without --resume the finished parts are not thrown away, with another study they are not taken.
     assert main(["sweep", command[4], "-o", str(out)]) == 2
     # The workers of the killed run may still end a chunk, but nobody writes it.
-    assert main(["sweep", command[4], "-o", str(out), "--resume"]) == 0
+    assert main([*command[3:], "--resume"]) == 0
     assert content(out) == expected(own)
     assert not folder.exists()
-    metadata = json.loads(pq.read_schema(out).metadata[b"rigid_proto_ros"])
+    metadata = metadata_of(out)
     assert metadata["complete"] and metadata["rows_by_simulation"] == own.rows
     assert metadata["cpu"] and metadata["numba"] and metadata["seed"] == own.seed
     before = out.stat().st_mtime_ns

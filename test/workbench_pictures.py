@@ -13,10 +13,10 @@ from pathlib import Path
 
 from conftest import held_domain
 from playwright.sync_api import sync_playwright
+from rigid_proto_ros.workbench.lessons import lessons
 from workbench_page import CHROMIUM, FLAGS, Bench, Page
 
 from rigid_proto_ros.rerun_view.ports import any_free_port
-from rigid_proto_ros.workbench.lessons import lessons
 
 SIZE = (1400, 800)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numba import boolean, float64, int64, njit, types
+from numba.core.types.function_type import CompileResultWAP
 
 from .batch_body import BODY, GYROSCOPIC, make_body_row
 from .batch_flight import AUTO, FIXED_STEPS, KERNELS, ONE_EXACT_STEP, fly
@@ -165,7 +166,11 @@ def _kernels(integrator: Integrator) -> tuple:
         kernels[2] = integrator.kernel
     for kernel, taken in zip(kernels, KERNELS, strict=True):
         kernel.compile(taken.signature)
-    return tuple(kernels)
+    # The compiled results themselves: dispatchers would be looked through again at every call.
+    return tuple(
+        CompileResultWAP(kernel.get_compile_result(taken.signature))
+        for kernel, taken in zip(kernels, KERNELS, strict=True)
+    )
 
 
 def fly_variants(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The table of a sweep as a Parquet file, made from parts, so that a run that was killed loses no finished part.
 
-FILE.parts/ holds a manifest and one Parquet file for each finished chunk of rows, whole from the moment it has its name. When
+FILE.parts/ holds a manifest and one Arrow file for each finished chunk of rows, whole from the moment it has its name. When
 all are there, or on Ctrl-C, they are joined to FILE in order of rows, one row group after another, and never held at once.
 """
 
@@ -102,11 +102,11 @@ class Parts:
         return k * self.chunk_rows, min((k + 1) * self.chunk_rows, self.study.rows)
 
     def _path(self, k: int) -> Path:
-        return self.folder / f"{k:012d}.parquet"
+        return self.folder / f"{k:012d}.arrow"
 
     def finished(self) -> list[int]:
         """Chunks that are there, in order."""
-        return sorted(int(path.stem) for path in self.folder.glob("*.parquet"))
+        return sorted(int(path.stem) for path in self.folder.glob("*.arrow"))
 
     def missing(self) -> Iterator[int]:
         """Chunks that aren't, in order."""
@@ -115,34 +115,40 @@ class Parts:
 
     def write(self, k: int, chunk: Chunk) -> None:
         """Keep a finished chunk."""
-        _, pq = arrow()
+        pa, _ = arrow()
         table = as_arrow(chunk).replace_schema_metadata({KEY: json.dumps({"simulated": chunk.simulated}).encode()})
         beside = self._path(k).with_suffix(".tmp")
-        pq.write_table(table, beside)
+        with pa.OSFile(str(beside), "wb") as sink, pa.ipc.new_file(sink, table.schema) as writer:
+            writer.write_table(table)
         os.replace(beside, self._path(k))
+
+    def _read(self, k: int) -> pa.Table:
+        pa, _ = arrow()
+        with pa.OSFile(str(self._path(k)), "rb") as source:
+            return pa.ipc.open_file(source).read_all()
 
     def join(self) -> dict:
         """Write FILE from the parts there are, and remove them once all were there; returns the file's metadata."""
         pa, pq = arrow()
         finished = self.finished()
-        described = [pq.ParquetFile(self._path(k)) for k in finished[:1]]
-        if not described:
+        if not finished:
             return self._metadata(0, 0)
         rows = sum(last - first for first, last in map(self.bounds, finished))
-        simulated = 0
-        for k in finished:
-            simulated += json.loads(pq.read_schema(self._path(k)).metadata[KEY])["simulated"]
-        metadata = self._metadata(rows, simulated)
-        schema = described[0].schema_arrow.with_metadata({KEY: json.dumps(metadata).encode()})
         beside = self.file.with_name(self.file.name + ".tmp")
-        with pq.ParquetWriter(beside, schema) as writer:
-            gathered, held = [], 0
+        gathered: list = []
+        simulated = 0
+        schema = self._read(finished[0]).schema.remove_metadata()
+        text = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.string()]
+        with pq.ParquetWriter(beside, schema, use_dictionary=text) as writer:
             for k in finished:
-                gathered.append(pq.read_table(self._path(k)).replace_schema_metadata(schema.metadata))
-                held += gathered[-1].num_rows
-                if held >= GROUP_ROWS or k == finished[-1]:
+                part = self._read(k)
+                simulated += json.loads(part.schema.metadata[KEY])["simulated"]
+                gathered.append(part.replace_schema_metadata(None))
+                if sum(map(len, gathered)) >= GROUP_ROWS or k == finished[-1]:
                     writer.write_table(pa.concat_tables(gathered))
-                    gathered, held = [], 0
+                    gathered = []
+            metadata = self._metadata(rows, simulated)
+            writer.add_key_value_metadata({KEY: json.dumps(metadata).encode()})
         os.replace(beside, self.file)
         if metadata["complete"]:
             shutil.rmtree(self.folder)
@@ -170,7 +176,7 @@ def metadata_of(file: Path) -> dict:
     """What a table says of itself; empty for a file that no sweep wrote."""
     _, pq = arrow()
     try:
-        return json.loads((pq.read_schema(file).metadata or {}).get(KEY, b"{}"))
+        return json.loads((pq.read_metadata(file).metadata or {}).get(KEY, b"{}"))
     except (OSError, ValueError):
         return {}
 
