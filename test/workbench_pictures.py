@@ -15,8 +15,8 @@ from conftest import held_domain
 from playwright.sync_api import sync_playwright
 from workbench_page import CHROMIUM, FLAGS, Bench, Page
 
+from rigid_proto_ros.lessons import lessons
 from rigid_proto_ros.rerun_view.ports import any_free_port
-from rigid_proto_ros.workbench.lessons import lessons
 
 SIZE = (1400, 800)
 
