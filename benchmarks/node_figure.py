@@ -40,7 +40,10 @@ def draw_shares(axes, rows: list[dict]) -> None:
     names, values = [str(r["what"]) for r in shares], [r["value"] for r in shares]
     colours = ["tab:red" if "mujoco" in name else "tab:orange" if "plain" in name else "tab:blue" for name in names]
     bars = axes.barh(range(len(names)), values, color=colours)
-    axes.bar_label(bars, fmt="%.1f", padding=2)
+    # A lower share at a lower rate is no merit, so the rate that was held is said.
+    held = {str(r["what"]): f" at {r['value']:.0f}/s" for r in rows if r["figure"] == "rate"}
+    axes.bar_label(bars, [f"{r['value']:.1f}{held.get(str(r['what']), '')}" for r in shares], padding=2)
+    axes.margins(x=0.25)
     axes.set_yticks(range(len(names)), names, fontsize=7)
     axes.invert_yaxis()
     axes.set_xlabel("% of a core")

@@ -81,7 +81,7 @@ class Process:
         if self.popen.poll() is None:
             self.popen.send_signal(signal.SIGINT)
         try:
-            self.popen.wait(10)
+            self.popen.wait(60)
         except subprocess.TimeoutExpired:
             self.popen.kill()
         return self.popen.stdout.read()

@@ -52,6 +52,10 @@ def main() -> int:
                 print("".join(flying.errors[-20:]), file=sys.stderr)
                 print("the node ended", file=sys.stderr)
                 return 1
+            if commander.popen.poll() is not None:
+                print("".join(commander.errors[-20:]), file=sys.stderr)
+                print("who sends the commands ended", file=sys.stderr)
+                return 1
             if now >= next_guest:
                 next_guest = now + random.uniform(2.0, 8.0)
                 guests.append((now + random.uniform(2.0, 20.0), _guest(flying)))
@@ -67,7 +71,11 @@ def main() -> int:
         for guest in guests:
             _shown_out(guest, float("inf"))
         time.sleep(2.0)
-        sent = json.loads(commander.end().splitlines()[-1])
+        said = commander.end().splitlines()
+        if not said:
+            print("".join(commander.errors[-20:]), file=sys.stderr)
+            print("who sends the commands didn't say what it sent", file=sys.stderr)
+        sent = json.loads(said[-1]) if said else {"messages": -1, "bad": 0}
         time.sleep(2.0)
         counters = _counters()
         history.append(_report(flying, args.minutes))

@@ -15,7 +15,9 @@ from ros_process import RosProcess, descendants
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
-PATIENCE_S = 60.0
+PATIENCE_S = 150.0
+"""[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
+
 CAMERA, FIELD_OF_VIEW = np.array([1.3, -2.2, 1.1]), math.radians(40.0)
 """Where a page looks from at first, to its middle, in units of the picture."""
 
@@ -60,6 +62,7 @@ class Page:
         )
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
+        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         # viser says that WebGL runs in software, and stands before the picture while it does.
         see_through = (
             ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"

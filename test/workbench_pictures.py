@@ -13,9 +13,9 @@ from pathlib import Path
 
 from conftest import held_domain
 from playwright.sync_api import sync_playwright
-from rigid_proto_ros.workbench.lessons import lessons
 from workbench_page import CHROMIUM, FLAGS, Bench, Page
 
+from rigid_proto_ros.lessons import lessons
 from rigid_proto_ros.rerun_view.ports import any_free_port
 
 SIZE = (1400, 800)
