@@ -56,7 +56,13 @@ def test_a_row_is_the_same_whatever_chunk_it_is_in(spec, sampler: str) -> None:
         assert all(same(part[name], whole[name][first:last]) for name in whole)
 
 
-@pytest.mark.parametrize("integrator", sorted(INTEGRATORS))
+OFTEN = ("free_body", "rk4", "semi_implicit_euler")
+"""One of each way to step, beside auto; the others are stepped in the same way and flown under stress."""
+
+
+@pytest.mark.parametrize(
+    "integrator", [pytest.param(n, marks=() if n in OFTEN else pytest.mark.stress) for n in sorted(INTEGRATORS)]
+)
 def test_every_integrator_has_its_own_bits_in_a_batch(integrator: str) -> None:
     # Free flight is all that each of them carries; `taylor` and the rest get what more they can.
     free = not INTEGRATORS[integrator].carries

@@ -23,7 +23,7 @@ from .integrators.integrator import MAX_SPEED
 from .integrators.motion_series import COLUMNS
 from .integrators.taylor import ROWS
 from .loads import FORCE_BODY, FORCE_WORLD, LOADS_SIZE, MAX_ACCELERATION, MOMENT, TORQUE_BODY, TORQUE_WORLD
-from .motion import VARIABLES, to_good_row, to_variables
+from .motion import STORED, to_good_row, to_variables
 from .quantities import STATE, begin, which_is_met
 
 # Integers of a command.
@@ -261,8 +261,8 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
     if not b.initial_row(settings, row):
         return 0, -1
     begin(body[b.MASS], body[b.INERTIA : b.INERTIA + 9], settings[b.GRAVITY : b.GRAVITY + 3], row, context)
-    p, y, trial = np.zeros(pr.SIZE), np.zeros(VARIABLES), np.zeros(VARIABLES)
-    control, following = np.zeros(ctl.SIZE), np.zeros(VARIABLES)
+    p, y, trial = np.zeros(pr.SIZE), np.zeros(STORED), np.zeros(STORED)
+    control, following = np.zeros(ctl.SIZE), np.zeros(STORED)
     degree = times[b.DEGREE]
     room = (np.zeros((ROWS, degree + 1)), np.zeros((degree + 2, COLUMNS)))
     common = np.zeros(pr.SIZE)
@@ -283,6 +283,7 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
                 start[:] = row
                 p[:] = common
                 pr.begin_problem(p, sums, row)
+                y[:] = 0.0
                 to_variables(row, p, y)
                 method = _method(stepping, p, y)
                 control[:] = 0.0
