@@ -14,6 +14,12 @@ NEEDED = {"rerun": ["test_demo.py", "test_rerun_*.py", "test_snapshot.py"]}
 """Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""
 
 MISSING = {package: files for package, files in NEEDED.items() if importlib.util.find_spec(package) is None}
+needs_rerun = pytest.mark.skipif("rerun" in MISSING, reason="rerun-sdk is not installed")
+"""For single tests that record to .rrd."""
+
+ENDINGS = [".mcap", pytest.param(".rrd", marks=needs_rerun)]
+"""Of the files that a session is recorded to."""
+
 collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 

@@ -5,6 +5,7 @@ import json
 import signal
 
 import pytest
+from conftest import needs_rerun
 from node_client import NodeClient, published
 from ros_process import RosProcess, dds_client, run, running_node
 
@@ -69,6 +70,7 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
     assert abs(offline.simulation.state.linear_velocity).max() > 1e-3
 
 
+@needs_rerun
 def test_poke_client_and_simulate_give_one_motion_and_the_recording_verifies(ros_environment, tmp_path):
     scene, session = scene_path("t_handle"), tmp_path / "session.rrd"
     scripts = [example_path(n) for n in ("flip_and_poke", "same_force_three_ways", "heavier_in_flight")]
@@ -101,6 +103,7 @@ def test_poke_client_and_simulate_give_one_motion_and_the_recording_verifies(ros
     assert run("rigid_proto", "replay", session, "--verify", environment=ros_environment).returncode == 0
 
 
+@needs_rerun
 def test_a_changed_event_fails_the_verification(ros_environment, tmp_path):
     from rigid_proto_ros.session_check import verify
 
@@ -131,6 +134,7 @@ def test_a_changed_event_fails_the_verification(ros_environment, tmp_path):
     assert len(changed.stderr.splitlines()) == 1
 
 
+@needs_rerun
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_recording_of_a_node_ended_by_a_signal_is_complete(ros_environment, tmp_path, number):
     session = tmp_path / "session.rrd"

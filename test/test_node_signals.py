@@ -4,6 +4,7 @@
 import signal
 
 import pytest
+from conftest import needs_rerun
 from ros_process import RosProcess, alive, descendants, running_node
 
 from rigid_proto_ros.rerun_view.reader import read_session
@@ -11,6 +12,7 @@ from rigid_proto_ros.rerun_view.reader import read_session
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 
 
+@needs_rerun
 @BOTH
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
     demo = RosProcess("rigid_proto", "demo", "--out", tmp_path, environment=ros_environment, log=tmp_path / "demo")
@@ -32,6 +34,7 @@ def test_up_without_a_viewer_ends(ros_environment, tmp_path, number):
     assert not [pid for pid in children if alive(pid)]
 
 
+@needs_rerun
 @BOTH
 def test_a_waiting_client_and_an_offline_run_end(ros_environment, tmp_path, number):
     script = tmp_path / "late.yaml"

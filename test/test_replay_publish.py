@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from conftest import ENDINGS, MISSING
 
 pytest.importorskip("rclpy")
 pytest.importorskip("mcap")
@@ -38,7 +39,8 @@ def session(tmp_path_factory):
     (folder / "script.yaml").write_text(SCRIPT)
     bag = folder / "s.mcap"
     arguments = ["simulate", "t_handle", "--script", str(folder / "script.yaml"), "--duration", "2"]
-    assert main([*arguments, "--bag", str(bag), "--record", str(folder / "s.rrd")]) == 0
+    recorded = [] if "rerun" in MISSING else ["--record", str(folder / "s.rrd")]
+    assert main([*arguments, "--bag", str(bag), *recorded]) == 0
     return bag
 
 
@@ -47,7 +49,7 @@ def states_of(messages, name: str) -> tuple[list[int], list[list[float]]]:
     return [stamp for stamp, _ in read], [row for _, row in read]
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tmp_path, ending):
     recorder = BagRecorder(ros_environment)
     done = run(
@@ -117,7 +119,7 @@ def test_speed_without_states_to_publish_is_refused(session, capsys):
     assert "real_time_factor" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_environment, tmp_path, ending):
     path = tmp_path / f"session{ending}"
     arguments = ["--params-file", scene_path("hammer"), "-p", f"record:={path}", "-r", "__node:=flyer"]
@@ -144,7 +146,7 @@ def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_
     assert any("flyer@com" in line for line in runs[0].lines)
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
     ros_environment, tmp_path, ending
 ):

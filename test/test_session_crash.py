@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from conftest import ENDINGS
 
 pytest.importorskip("mcap")
 
@@ -188,14 +189,14 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
         subprocess.run([viewer_program(), "rrd", "verify", str(repaired)], capture_output=True, check=True)
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+@pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment, tmp_path, ending, seed):
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.3, 3.0))
 
 
 @pytest.mark.stress
-@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+@pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("seed", range(3, 20))
 def test_a_node_killed_at_more_random_moments(ros_environment, tmp_path, ending, seed):
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.0, 6.0))
