@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import signal
 import sys
-import threading
 import webbrowser
 
 from ..core.errors import InputError
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
+from ..ros.ending import Ending
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -25,18 +24,16 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--lesson", default="")
     parser.add_argument("--link", default="")
     args = parser.parse_args(argv)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     try:
-        return serve(args, stop)
+        with Ending() as ending:
+            return serve(args, ending)
     except InputError as error:
         print(f"rigid_proto workbench: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 
 
-def serve(args: argparse.Namespace, stop: threading.Event) -> int:
-    """Run the page until ``stop`` is set; open it in a browser where there is a display."""
+def serve(args: argparse.Namespace, ending: Ending) -> int:
+    """Run the page until its end is asked for; open it in a browser where there is a display."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
@@ -61,7 +58,7 @@ def serve(args: argparse.Namespace, stop: threading.Event) -> int:
     if args.open and has_display():
         webbrowser.open(address)
     try:
-        stop.wait()
+        ending.wait()
     finally:
         running.cancel()
         stop_server(server)
