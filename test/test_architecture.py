@@ -36,7 +36,7 @@ WEIGHTS = np.array([0.5, 0.5])
 
 @njit(cache=True, error_model="numpy")
 def heun_steps(y, p, h, n):
-    k, z, new = np.zeros((2, 15)), np.empty(15), np.empty(15)
+    k, z, new = np.zeros((2, 15)), np.empty(15), y.copy()
     for done in range(n):
         rates(y, p, False, k[0])
         stages(y, p, h, False, TABLEAU, 2, k, z)

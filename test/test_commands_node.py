@@ -168,7 +168,7 @@ def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_sinc
         "string_attach": 1,
         "string_target": 1,
         "inertia": 1,
-        "set": 3,
+        "set": 2,
         "string_release": 2,
         "clear_wrench": 2,
         "pause": 2,

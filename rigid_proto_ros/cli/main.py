@@ -47,8 +47,10 @@ def main(argv: list[str] | None = None) -> int:
         else:
             subparsers.add_parser(name, help=summary)
     args = parser.parse_args(argv)
-    # SIGTERM ends a command as Ctrl-C does, through every finally.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in the
+    # background had it ignored.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     try:
         return args.run(args)
     except InputError as error:

@@ -26,7 +26,8 @@ def main(argv: list[str] | None = None) -> int:
     """Send what the arguments say; returns the exit status."""
     argv = sys.argv[1:] if argv is None else argv
     # Python's own handler: the middleware's would end the context under the clean-up.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
     try:
         args = _arguments(own)

@@ -36,7 +36,8 @@ def cluster_chunks(
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError("--dask", address, f"the address of a scheduler, such as tcp://host:8786 ({error})") from None
     try:
-        content = client.scatter(study, broadcast=False, hash=False)
+        # A task and not scattered data, which would be lost with the worker that holds it.
+        content = client.submit(_same, study, pure=False)
         waiting = iter(todo)
         pending = distributed.as_completed(with_results=True, loop=client.loop)
         numbers: dict[str, int] = {}
@@ -54,9 +55,16 @@ def cluster_chunks(
             if not submit():
                 break
         for future, chunk in pending:
+            if not isinstance(chunk, Chunk):
+                raise chunk
             k = numbers.pop(future.key)
             future.release()
             submit()
             yield k, chunk
     finally:
         client.close()
+
+
+def _same(study: Study) -> Study:
+    """What the scheduler keeps of the study, so that any worker can have it again."""
+    return study
