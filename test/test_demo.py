@@ -57,6 +57,7 @@ def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_
     assert "same to the bit" in verified.stdout
 
 
+@pytest.mark.stress
 def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, tmp_path, meshes):
     session, recorded, batches = fly(
         ros_environment, tmp_path / "out", "--duration", "7", "--mesh", meshes / "spot.obj"

@@ -33,6 +33,7 @@ DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if READ
 OWN = ("rigid_proto", "poke_client")
 # Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
 NOT_RUN = {"sudo", "source", "cd", "rosdep", "colcon", "pip", "git", "ros2", "python", "rerun", "rigid_body_node"}
+SWEEP = "rigid_proto sweep"
 STAYS_UP = ("rigid_proto up", "rigid_proto workbench", "rigid_body_node --bodies")
 
 
@@ -95,14 +96,16 @@ def test_make_target_exists(command: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("sweeps", [False, pytest.param(True, marks=pytest.mark.stress)])
 def test_rigid_proto_commands_run(
-    in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture
+    in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture, sweeps: bool
 ) -> None:
+    """Sweeps fly thousands of rows, so they are for the long run."""
     pytest.importorskip("rerun")
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):
-        if command.startswith(STAYS_UP) or " demo" in command:
+        if command.startswith(STAYS_UP) or " demo" in command or command.startswith(SWEEP) != sweeps:
             continue
         if "--publish" in command:
             sent = subprocess.run(

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import ENDINGS
+from conftest import ENDINGS, needs_rerun
 
 pytest.importorskip("mcap")
 
@@ -189,14 +189,16 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
         subprocess.run([viewer_program(), "rrd", "verify", str(repaired)], capture_output=True, check=True)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed, ending",
+    [(0, ".mcap"), *(pytest.param(seed, ".rrd", marks=needs_rerun) for seed in (0, 1))],
+)
 def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment, tmp_path, ending, seed):
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.3, 3.0))
 
 
 @pytest.mark.stress
 @pytest.mark.parametrize("ending", ENDINGS)
-@pytest.mark.parametrize("seed", range(3, 20))
+@pytest.mark.parametrize("seed", range(1, 21))
 def test_a_node_killed_at_more_random_moments(ros_environment, tmp_path, ending, seed):
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.0, 6.0))

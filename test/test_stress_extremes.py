@@ -14,6 +14,7 @@ TENSOR = np.array([[1.3, 0.2, -0.1], [0.2, 2.0, 0.3], [-0.1, 0.3, 2.9]])
 ROW = np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3, 0.9, 0.4, 0.1, -0.3, 0.9, 1.3, -0.6])
 ROW[3:7] /= np.linalg.norm(ROW[3:7])
 EXPONENTS = (-308, -300, -200, -100, -30, 0, 15, 16, 30, 100, 200, 300, 308)
+FEW_EXPONENTS = (-308, -30, 0, 16, 308)
 MORE_EXPONENTS = (*EXPONENTS, -16, -8, 3, 6, 8, 12, 14)
 """Forces that auto resolves at up to 1e7 rad/s take it seconds."""
 STEPS_S = (1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.3, 1.0, 10.0, 100.0, 1000.0)
@@ -68,7 +69,7 @@ def check_forces(name, steps_s, exponents=EXPONENTS):
 
 @pytest.mark.parametrize("name", sorted(INTEGRATORS))
 def test_any_force_ends_right_or_refused_or_stopped(name):
-    check_forces(name, (1e-3,))
+    check_forces(name, (1e-3,), FEW_EXPONENTS)
 
 
 @pytest.mark.stress

@@ -256,7 +256,10 @@ def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_
 
 @pytest.mark.parametrize(
     "values",
-    [{"integrator": "rk4", "step": 1e-9}, {"real_time_factor": 0.0, "publish_rate": 1e-4}],
+    [
+        pytest.param({"integrator": "rk4", "step": 1e-9}, marks=pytest.mark.stress),
+        {"real_time_factor": 0.0, "publish_rate": 1e-4},
+    ],
     ids=["a step of a nanosecond", "ten million steps to a publication"],
 )
 def test_services_and_commands_are_answered_while_the_motion_takes_all_the_time_there_is(rig, values):
