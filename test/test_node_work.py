@@ -59,3 +59,21 @@ def test_the_steady_state_makes_no_message_objects(counted):
     assert published["/rigid_body/imu"] == 0
     assert work["wrenches"] >= 30
     assert work["message_objects"] == {}
+
+
+def test_a_page_that_came_and_went_leaves_as_many_publish_calls_as_before(ros_environment):
+    run = [sys.executable, str(WORK.with_name("page_work.py"))]
+    done = subprocess.run(run, env=from_source(ros_environment), capture_output=True, text=True, timeout=180)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+
+    def calls_a_period(when: str) -> dict[str, float]:
+        """By topic; a publication period is 2 ms of simulated time."""
+        return {t: n / (found[when]["simulated_ns"] / 2e6) for t, n in found[when]["publications"].items()}
+
+    before, during, after = (calls_a_period(when) for when in ("before", "open", "after"))
+    # Measured 1.000 +- 0.003: a call or two at the ends.
+    assert before == {"/rigid_body/pose": pytest.approx(1.0, abs=0.02)}
+    assert after == {"/rigid_body/pose": pytest.approx(1.0, abs=0.02)}
+    assert during["/rigid_body/twist"] == pytest.approx(1.0, abs=0.02)
+    assert "/diagnostics" in during

@@ -352,7 +352,8 @@ class Page:
             view.show_string(None if looking else self.acting.string_ends(setup, state))
             view.show_loads([] if looking else self.acting.arrows(setup, state, size))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
-            view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.7 * size))
+            # ω reaches beyond L, for they are parallel where the body turns about a principal axis.
+            view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.85 * size))
             view.show_ghost(ghost, com)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else self.acting.string_energy(setup, state)

@@ -26,6 +26,7 @@ LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (235, 85, 85), (190, 120, 245), (60
 AXES_COLOURS = np.array([(235, 85, 85), (90, 200, 110), (85, 150, 250)])
 
 SWITCHES = {
+    "See through the body": False,
     "COM": True,
     "Principal axes": False,
     "Inertia ellipsoid": False,
@@ -39,6 +40,12 @@ SWITCHES = {
     "Grid": True,
 }
 """What can be shown beside the body, and whether it is at first."""
+
+COM_SIZE = 0.015
+"""Radius of the centre of mass as drawn, in body sizes."""
+
+SEE_THROUGH = 0.45
+"""Opacity of a body that one can look into."""
 
 GRID_CELLS = 40
 CAMERA = (1.3, -2.2, 1.1)
@@ -100,8 +107,14 @@ class SceneView:
     def switch(self, name: str, shown: bool) -> None:
         """Show or hide one of SWITCHES."""
         self._shown[name] = shown
+        if name == "See through the body":
+            self._body_opacity()
         for handle in self._handles[name]:
             handle.visible = shown
+
+    def _body_opacity(self) -> None:
+        if self.body is not None:
+            self.body.opacity = SEE_THROUGH if self._shown["See through the body"] else None
 
     # The body
 
@@ -151,15 +164,19 @@ class SceneView:
                 "/ghost/mesh", vertices, triangles, color=GHOST_COLOUR, opacity=0.35, side="double"
             )
         self.body, self._ghost = drawn, ghost
+        self._body_opacity()
 
     def _draw_inertia(self, scenario: Scenario, box, ellipsoid, corners) -> None:
         body, unit, scene = scenario.setup.body, self.unit, self._scene
+        size = 2.0 * self._radius / unit
         turned = _wxyz(quaternion_from_matrix(body.principal_axes))
         axes = np.zeros((3, 2, 3))
-        axes[:, 1] = np.diag(1.25 * self._radius / unit * np.sqrt(body.principal_moments / body.principal_moments[2]))
+        # All end outside the body, or the shortest would lie inside a rod.
+        lengths = 1.0 + 0.35 * np.sqrt(body.principal_moments / body.principal_moments[2])
+        axes[:, 1] = np.diag(self._radius / unit * lengths)
         see_through = {"opacity": 0.3, "cast_shadow": False, "receive_shadow": False}
         made = {
-            "COM": scene.add_icosphere("/body/com", 0.02, (30, 30, 30)),
+            "COM": scene.add_icosphere("/body/com", COM_SIZE * size, (30, 30, 30)),
             "Principal axes": scene.add_arrows(
                 "/body/axes", axes, AXES_COLOURS, wxyz=turned, shaft_radius=0.008, head_radius=0.022, head_length=0.06
             ),
