@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import held_domain
+from ros_process import RosProcess, descendants
 from workbench_page import CHROMIUM, FLAGS, Bench, Ear, Page
 
 from rigid_proto_ros.offline import read_scene
@@ -134,6 +135,20 @@ def test_a_drag_ties_the_string_where_it_grabbed_and_moves_the_body_that_way(pag
     assert tail[-1] == "string_release"
 
 
+def test_with_the_switch_at_the_centre_of_mass_a_drag_ties_the_string_there(page, ear) -> None:
+    page.choose("Pull at", "Centre of mass")
+    before = len(ear.events())
+    page.drag(*page.middle, -30.0, 0.0, steps=1)
+    ear.event("string_target", before)
+    page.release()
+    ear.event("string_release", before)
+    page.choose("Pull at", "Grabbed point")
+    # The knot is in mesh coordinates before scaling.
+    body = teapot().body
+    assert ear.values()["string.attach"] == pytest.approx(body.center_of_mass / body.scale, abs=1e-9)
+    assert "string_attach" not in [event["kind"] for event in ear.events()[before:]]
+
+
 def test_sliders_and_fields_change_the_nodes_parameters(page, ear) -> None:
     page.tab("Body")
     mass = teapot().body.mass
@@ -248,6 +263,20 @@ def test_what_was_done_by_hand_is_saved_as_scene_and_script(page, ear) -> None:
     assert "point" in files["script.yaml"] and "force" in files["script.yaml"]
 
 
+CAMERA_MESSAGE = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (1.0, 0.0, 0.0),
+    "fov": 0.7,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 4,
+    "image_width": 4,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+"""What viser waits for before it calls a page open."""
+
 STATE_TOPICS = ("pose", "twist", "events", "scene")
 
 
@@ -257,14 +286,52 @@ def listeners(ear: Ear) -> dict[str, int]:
     return {topic: sum(side == "sub" for side, *_ in found) for topic, found in ends.items()}
 
 
-def test_with_the_page_closed_the_node_has_the_subscribers_it_had_before(shared_page, ear) -> None:
+def test_with_the_page_closed_the_node_has_the_subscribers_it_had_before_and_a_link_opens_the_same_situation(
+    page, ear
+) -> None:
     assert listeners(ear) == {"pose": 2, "twist": 1, "events": 2, "scene": 2}
-    address = shared_page.page.url
-    shared_page.page.goto("about:blank")
+    before = len(ear.events())
+    page.click(*page.middle)
+    poke = ear.event("poke", before)["content"]
+    page.tab("Session")
+    page.button("Make a link")
+    made = page.page.locator("input[value*='/?']").first
+    link = page.until(lambda: made.count() and made.input_value(), "a link")
+    page.page.goto("about:blank")
     without = {"pose": 1, "twist": 0, "events": 1, "scene": 1}
     ear.until(lambda: listeners(ear) == without, "a node that only this test listens to")
-    shared_page.page.goto(address)
-    shared_page.until(lambda: "is flying" in shared_page.text or "is sleeping" in shared_page.text, "the page again")
+    ear.set_named({"gravity": [0.0, 0.0, -1.0]})
+    before = len(ear.events())
+    page.page.goto(link)
+    assert ear.event("poke", before)["content"]["force"] == poke["force"]
+    assert ear.event("poke", before)["content"]["frame_id"] == poke["frame_id"]
+    assert ear.values()["gravity"] == [0.0, 0.0, 0.0]
+    page.until(lambda: "is flying" in page.text or "is sleeping" in page.text, "the page again")
+
+
+def test_a_page_of_its_own_shows_a_node_that_runs_already(bench, ear, tmp_path) -> None:
+    """Without a browser: a socket as a page opens it."""
+    import msgspec.msgpack
+    from websockets.sync.client import connect
+
+    from rigid_proto_ros.rerun_view.ports import any_free_port
+
+    port, pages = any_free_port(), listeners(ear)["pose"]
+    second = RosProcess(
+        *("rigid_proto", "workbench", "--node", "rigid_body", "--port", port, "--no-browser"),
+        environment=bench.environment,
+        log=tmp_path / "second",
+    )
+    second.wait_for("The workbench is at")
+    with connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:
+        page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
+        ear.until(lambda: listeners(ear)["pose"] == pages + 1, "another page that listens to the node")
+    commands = [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in descendants(second.process.pid)]
+    assert len(commands) == 1 and b"workbench.main" in commands[0]
+    assert second.end() == 0
+    # The node isn't its own: it flies on.
+    assert bench.process.process.poll() is None
+    ear.now_ns()
 
 
 def test_a_killed_page_server_in_mid_drag_lets_the_string_go_by_its_timeout(page, ear, bench) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import http.client
+import importlib.util
 import socket
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ import pytest
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
+from rigid_proto_ros.cli.main import main  # noqa: E402
 from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
 from rigid_proto_ros.workbench.controls import Controls  # noqa: E402
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server  # noqa: E402
@@ -59,6 +61,22 @@ def test_a_page_opened_with_a_link_hands_it_on_and_an_image_does_not(server) -> 
     assert OPENED == []
     assert status(server, "/?1.abc-_", Sec_Fetch_Dest="document") == 200
     assert OPENED == ["1.abc-_"]
+
+
+@pytest.mark.parametrize("package", ["viser", "rclpy"])
+def test_without_what_it_needs_the_command_says_so_in_one_line(package, monkeypatch, capsys) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *given: None if name == package else find(name, *given)
+    )
+    assert main(["workbench"]) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and told.err.count("\n") == 1 and package in told.err and "[workbench]" in told.err
+
+
+def test_a_running_node_and_a_scene_to_start_one_are_refused_together(capsys) -> None:
+    assert main(["workbench", "t_handle", "--node", "other"]) == 2
+    assert "not both" in capsys.readouterr().err
 
 
 def test_nobody_can_ask_for_a_public_tunnel(server) -> None:

@@ -22,8 +22,9 @@ HOLD_S = 0.2
 """A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that is
 short."""
 
-RELEASE_LAG_S = 0.03
-"""A release taken in the same tick as a target would act before it, and the target would tie the string again."""
+SAME_TICK_S = 0.03
+"""Commands this far apart aren't taken in the same tick, where they act by kind and bytes: a release would act before a
+target, and the target would tie the string again."""
 
 POKE, PUSH = "Poke along the view", "Push inward"
 
@@ -137,22 +138,28 @@ class Pointer:
         frequency = self._tools.frequency
         if frequency > 0.0 and scenario.values["string.frequency"] != frequency:
             self._link.schedule(f"{{t: 0, set: {{string.frequency: {frequency!r}}}}}")
+        wait_s = KNOT_LEAD_S
         if self._tools.at_com or surface is None:
-            self._tie_to(body.mesh_point(np.zeros(3)), 1e-6 * surface.extent if surface is not None else np.zeros(3))
+            aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
+            wait_s += self._tie_to(body.mesh_point(np.zeros(3)), aside)
         else:
             point = body.mesh_point(seen.body_point(start))
             self._link.point("string/attach", MESH_FRAME, point)
             self._knot_by_message = True
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
-        asyncio.get_running_loop().call_later(KNOT_LEAD_S, self._send_target)
+        asyncio.get_running_loop().call_later(wait_s, self._send_target)
 
-    def _tie_to(self, point, aside) -> None:
-        """The knot at a point that isn't on the surface: only the parameter can say so."""
-        if self._knot_by_message:
-            # A parameter that keeps its value changes nothing, so it takes a step aside first.
-            self._set_knot(point + aside)
-            self._knot_by_message = False
-        self._set_knot(point)
+    def _tie_to(self, point, aside) -> float:
+        """The knot at a point that isn't on the surface: only the parameter can say so. Returns after how long [s] it is there."""
+        if not self._knot_by_message:
+            self._set_knot(point)
+            return 0.0
+        # A parameter that keeps its value changes nothing, so it takes a step aside first; in an earlier tick, for the order
+        # of two changes in one isn't that of their arrival.
+        self._knot_by_message = False
+        self._set_knot(point + aside)
+        asyncio.get_running_loop().call_later(SAME_TICK_S, self._set_knot, point)
+        return SAME_TICK_S
 
     def _set_knot(self, point) -> None:
         numbers = ", ".join(repr(float(x)) for x in point)
@@ -182,7 +189,7 @@ class Pointer:
         if self.dragging:
             drag = self._drag
             drag.ended = True
-            wait_s = max(0.0, drag.last_target_s + RELEASE_LAG_S - time.monotonic())
+            wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
             asyncio.get_running_loop().call_later(wait_s, self._release, drag)
 
     def _release(self, drag: _Drag) -> None:

@@ -41,7 +41,7 @@ SWITCHES = {
 }
 """What can be shown beside the body, and whether it is at first."""
 
-COM_SIZE = 0.015
+COM_SIZE = 0.025
 """Radius of the centre of mass as drawn, in body sizes."""
 
 SEE_THROUGH = 0.45
