@@ -61,6 +61,7 @@ def test_the_steady_state_makes_no_message_objects(counted):
     assert work["message_objects"] == {}
 
 
+@pytest.mark.stress
 def test_a_page_that_came_and_went_leaves_as_many_publish_calls_as_before(ros_environment):
     run = [sys.executable, str(WORK.with_name("page_work.py"))]
     done = subprocess.run(run, env=from_source(ros_environment), capture_output=True, text=True, timeout=180)

@@ -141,6 +141,7 @@ class Page:
             self.sightings.forget()
             self._readouts.restart()
             self._scene_text = self._loaded_text = ""
+            self._known.clear()  # somebody may change it meanwhile, and a link sets what differs from it
 
     # What the tabs ask for
 
