@@ -48,11 +48,10 @@ def main() -> None:
 def draw_pull(page: Page, picture: Path) -> None:
     """The T-handle a flip on, in the middle, pulled at by a string."""
     time.sleep(6.0)
+    page.choose("Speed", "1/10")
     x, y = page.middle
-    page.grab(x, y)
-    # The picture is taken before the body has followed: the string is taut.
-    page.page.mouse.move(x - 120.0, y - 90.0)
-    time.sleep(0.15)
+    # Slow, so that the picture is taken before the body has followed and the string is long.
+    page.drag(x, y, -150.0, -60.0, steps=2)
     page.page.screenshot(path=picture)
     page.release()
 

@@ -88,7 +88,7 @@ class SceneView:
         self._handles["Grid"] = [self._grid]
         none = np.zeros((1, 2, 3))
         self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
-        self._hand = scene.add_icosphere("/string/hand", 0.03, HAND_COLOUR, visible=False)
+        self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
         thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
         self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thin)
         self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
