@@ -106,6 +106,7 @@ def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environmen
         assert all(flown[stamp] == expected[stamp] for stamp in flown if stamp > 0)
 
 
+@pytest.mark.stress
 def test_publishing_to_nobody_ends_in_one_line(session, ros_environment):
     arguments = ["replay", session, "--publish", "commands", "--node", "/nobody"]
     done = run("rigid_proto", *arguments, environment=ros_environment)

@@ -50,8 +50,9 @@ class Flight:
     """publish(state) is called for every publication; take_commands(wall_ns) at every tick, to
     submit what has arrived; it says whether commands come in these seconds.
 
-    anybody_listens() says whether publications reach anybody; while they don't, none is made and the body crosses the
-    time between two looks at the commands at once.
+    anybody_listens() says whether publications reach a subscriber, is_viewed() whether a recording or viewer takes the states.
+    For these alone states are made in bundles, at the looks at the commands; for nobody none is made, and the body crosses
+    the time between two looks at once.
     on_failure(message) is called when the motion stopped in its last good state. followed_clock() gives nanoseconds of a clock
     that simulated time follows instead of the wall's.
     """
@@ -76,7 +77,7 @@ class Flight:
         self._on_failure = on_failure
         self._followed_clock = followed_clock
         self._anybody_listens = anybody_listens
-        self._listeners = True
+        self._heard = self._listeners = True
         self._is_viewed = is_viewed
         self._ghost: Ghost | None = None
         self._portions = Portions()
@@ -181,7 +182,7 @@ class Flight:
         wall_ns = time.monotonic_ns()
         if wall_ns >= self._next_look_ns:
             self._next_look_ns = wall_ns + DRAIN_NS
-            self._listeners = self._anybody_listens()
+            self._look_for_listeners()
         present_ns = self._simulated_present_ns()
         if not self._listeners and self._caught_up:
             self._pass_over(present_ns)
@@ -192,13 +193,17 @@ class Flight:
                 present_ns = self.simulation.time_ns
                 break
             due_ns = self._publication_ns()
-            if due_ns <= present_ns and self._factor > 0.0 and not self._followed_clock:
+            if due_ns <= present_ns and self._heard and self._factor > 0.0 and not self._followed_clock:
                 self.timekeeping.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
         self._lively = self._take_commands(wall_ns)
         if not self._listeners or self._followed_clock or not self._caught_up:
             self.catch_up()
+
+    def _look_for_listeners(self) -> None:
+        self._heard = self._anybody_listens()
+        self._listeners = self._heard or self._is_viewed()
 
     def _pass_over(self, present_ns: int) -> None:
         """Make no publication up to the present, but for what a run without pacing goes by."""
@@ -221,7 +226,7 @@ class Flight:
         self._take_commands(now_ns)
         if now_ns >= self._paused_publication_ns and not self._stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
-            self._listeners = self._anybody_listens()
+            self._look_for_listeners()
             self._publish(self.simulation.state)
 
     def _publish_next(self) -> bool:
@@ -304,7 +309,8 @@ class Flight:
             return latest_ns
         if self._factor == 0.0:
             return 0
-        if not self._listeners:
+        if not self._heard:
+            # Recordings and viewers take states in bundles: theirs are made together, a dozen wake-ups saved.
             return latest_ns
         ahead_ns = self._publication_ns() - self._anchor_simulated_ns
         publication_ns = self._anchor_wall_ns + int(ahead_ns / self._factor) + 1

@@ -140,7 +140,7 @@ class RigidBodyNode(Node):
     # Commands, on the physics thread
 
     def _anybody_listens(self) -> bool:
-        return self.states.look_for_subscribers() or self._is_viewed()
+        return self.states.look_for_subscribers()
 
     def _take_commands(self, wall_ns: int) -> bool:
         return self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
