@@ -118,6 +118,7 @@ def several_publishers(rig) -> tuple[dict, dict]:
     return before, before_alone
 
 
+@pytest.mark.stress
 def test_with_several_publishers_a_full_queue_is_told_and_no_number_of_lost_messages(rig):
     """Whose a sequence number is can't be known then."""
     several_publishers(rig)

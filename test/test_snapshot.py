@@ -66,6 +66,7 @@ def test_the_whole_layout_is_drawn_also_from_a_cut_file(recording, tmp_path):
         assert image.width == 1200 and 600 < image.height <= 700
 
 
+@pytest.mark.stress
 def test_tabs_and_views_behind_the_front_one_can_be_drawn_by_name(recording, tmp_path):
     for name in ("debugging", "State", "Plain"):
         picture = tmp_path / f"{name}.png"
