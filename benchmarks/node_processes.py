@@ -16,7 +16,9 @@ from pathlib import Path
 import psutil
 
 FOLDER = Path(__file__).parent
+sys.path.append(str(FOLDER.parent / "test"))
 
+from ros_domain import hold_domain
 
 _held: list[socket.socket] = []
 
@@ -24,18 +26,9 @@ _held: list[socket.socket] = []
 @functools.cache
 def domain() -> str:
     """A ROS domain that no other benchmark or test session on this machine holds."""
-    # An abstract socket is the lock: the kernel frees it with the process, so a crash leaves nothing behind.
-    for k in range(101):
-        number = 1 + (os.getpid() + k) % 101
-        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lock.bind(f"\0rigid_proto_ros.domain.{number}")
-        except OSError:
-            lock.close()
-            continue
-        _held.append(lock)
-        return str(number)
-    raise RuntimeError("all ROS domains 1..101 are held by others")
+    number, lock = hold_domain()
+    _held.append(lock)
+    return str(number)
 
 
 def environment() -> dict[str, str]:

@@ -3,12 +3,12 @@
 
 import importlib.util
 import os
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from ros_domain import hold_domain
 
 NEEDED = {"rerun": ["test_demo.py", "test_rerun_*.py", "test_snapshot.py"]}
 """Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""
@@ -43,20 +43,9 @@ def meshes() -> Path:
 @contextmanager
 def held_domain() -> Iterator[int]:
     """A ROS domain in 1..101 that no other test session on this machine holds, whichever checkout it runs from."""
-    # An abstract socket is the lock: the kernel frees it with the process, so a crash leaves nothing behind.
-    first = os.getpid() % 101
-    for k in range(101):
-        domain = 1 + (first + k) % 101
-        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lock.bind(f"\0rigid_proto_ros.domain.{domain}")
-        except OSError:
-            lock.close()
-            continue
+    domain, lock = hold_domain()
+    with lock:
         yield domain
-        lock.close()
-        return
-    pytest.fail("all ROS domains 1..101 are held by other test sessions")
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from numba import njit
 
 from .inertia_tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
 from .mass_properties import SCALE_LIMITS, loaded, stretched
-from .rotation import normalize
+from .rotation import normalize, quaternion_of_axes
 
 # A row of settings.
 SCALE = 0  # (3,)
@@ -82,28 +82,6 @@ def divided(product, factor):
 @njit(cache=True, error_model="numpy")
 def _plainly_good(a, b, c):
     return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
-
-
-@njit(cache=True, error_model="numpy")
-def quaternion_of_axes(R, q):
-    """Unit quaternion q (4,) xyzw of a proper rotation matrix R (3, 3), as ``rotation.quaternion_from_matrix``."""
-    trace = R[0, 0] + R[1, 1] + R[2, 2]
-    k, largest = 0, R[0, 0]
-    if R[1, 1] > largest:
-        k, largest = 1, R[1, 1]
-    if R[2, 2] > largest:
-        k, largest = 2, R[2, 2]
-    if trace > largest:
-        k = 3
-    if k == 3:
-        q[0], q[1], q[2], q[3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace
-    else:
-        i, j, m = k, (k + 1) % 3, (k + 2) % 3
-        q[i] = 1.0 + R[i, i] - R[j, j] - R[m, m]
-        q[j] = R[j, i] + R[i, j]
-        q[m] = R[m, i] + R[i, m]
-        q[3] = R[m, j] - R[j, m]
-    q[0], q[1], q[2], q[3] = normalize(q[0], q[1], q[2], q[3])
 
 
 @njit(cache=True, error_model="numpy")

@@ -64,24 +64,36 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     return np.array(rows) if q.ndim == 1 else np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion (4,) xyzw of a proper rotation matrix (3, 3).
+@njit(cache=True, error_model="numpy")
+def quaternion_of_axes(R, q):
+    """Unit quaternion into q (4,) xyzw, of a proper rotation matrix R (3, 3).
 
     The largest of the four squared components is taken as the divisor (Shepperd 1978), so that no digits cancel.
     """
-    R = np.asarray(R, dtype=float)
     trace = R[0, 0] + R[1, 1] + R[2, 2]
-    k = int(np.argmax([R[0, 0], R[1, 1], R[2, 2], trace]))
-    q = np.empty(4)
+    k, largest = 0, R[0, 0]
+    if R[1, 1] > largest:
+        k, largest = 1, R[1, 1]
+    if R[2, 2] > largest:
+        k, largest = 2, R[2, 2]
+    if trace > largest:
+        k = 3
     if k == 3:
-        q[:] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace
+        q[0], q[1], q[2], q[3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace
     else:
         i, j, m = k, (k + 1) % 3, (k + 2) % 3
         q[i] = 1.0 + R[i, i] - R[j, j] - R[m, m]
         q[j] = R[j, i] + R[i, j]
         q[m] = R[m, i] + R[i, m]
         q[3] = R[m, j] - R[j, m]
-    return np.array(normalize(q[0], q[1], q[2], q[3]))
+    q[0], q[1], q[2], q[3] = normalize(q[0], q[1], q[2], q[3])
+
+
+def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion (4,) xyzw of a proper rotation matrix (3, 3)."""
+    q = np.empty(4)
+    quaternion_of_axes(np.array(R, dtype=float, order="C"), q)
+    return q
 
 
 def unit_quaternion(q, field: str) -> np.ndarray:

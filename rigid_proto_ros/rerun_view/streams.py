@@ -12,6 +12,7 @@ import os
 import platform
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,7 @@ class RecordingLostError(OSError):
     """The file can't be written any more: full disk, lost folder, file taken away."""
 
 
-class Stream:
+class Stream(ABC):
     """A Rerun recording: one run of the simulation, with simulated time from 0."""
 
     may_skip = False
@@ -81,9 +82,9 @@ class Stream:
         """Make a viewer open with the layout for a body of this size [m]."""
         self.layout.fit(self.recording, size, initial_view, ghost)
 
+    @abstractmethod
     def flush(self) -> None:
         """Hand on what was sent, and see whether it arrives."""
-        raise NotImplementedError
 
     def close(self) -> None:
         """Finish and let go of the sink."""

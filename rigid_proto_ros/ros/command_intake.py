@@ -13,7 +13,6 @@ from collections.abc import Callable
 
 import yaml
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
-from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -34,6 +33,7 @@ from . import qos
 from .message_bytes import read_message, read_wrench_stamped, whole_stamp
 from .sequence_gaps import SequenceGaps
 from .stamps import effective_time
+from .taken_by_hand import TakenByHand
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
@@ -52,19 +52,6 @@ LIVELY_NS = 5_000_000_000
 
 MAX_BRACKETS = 100
 """Lists and mappings opened in one: the YAML reader takes seconds over thousands, and the body would wait for it."""
-
-
-class _TakenByHand(CallbackGroup):
-    """A callback group whose entities no executor may serve."""
-
-    def can_execute(self, entity) -> bool:
-        return False
-
-    def beginning_execution(self, entity) -> bool:
-        return False
-
-    def ending_execution(self, entity) -> None:
-        pass
 
 
 class CommandIntake:
@@ -93,7 +80,7 @@ class CommandIntake:
         self._next_publishers_look_ns = 0
         self._read_frames: dict[str, Frame] = {}
         self._on_refusal = on_refusal
-        group = _TakenByHand()
+        group = TakenByHand()
 
         def subscribe(message_type, topic):
             return node.create_subscription(

@@ -310,7 +310,7 @@ class Flight:
         if self._factor == 0.0:
             return 0
         if not self._heard:
-            # Recordings and viewers take states in bundles: theirs are made together, a dozen wake-ups saved.
+            # Recordings and viewers take states in bundles: theirs are made together, at 1 kHz ten a wake-up.
             return latest_ns
         ahead_ns = self._publication_ns() - self._anchor_simulated_ns
         publication_ns = self._anchor_wall_ns + int(ahead_ns / self._factor) + 1

@@ -16,7 +16,6 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped, WrenchStamped
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
@@ -28,21 +27,9 @@ from ..parameters import parameter_named
 from ..poke_script import ScriptCommand
 from ..ros import qos
 from ..ros.parameter_server import ros_parameter
+from ..ros.taken_by_hand import TakenByHand
 
 _TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
-
-
-class _TakenByHand(CallbackGroup):
-    """A callback group whose entities no executor may serve."""
-
-    def can_execute(self, entity) -> bool:
-        return False
-
-    def beginning_execution(self, entity) -> bool:
-        return False
-
-    def ending_execution(self, entity) -> None:
-        pass
 
 
 @dataclass(frozen=True)
@@ -84,7 +71,7 @@ class RosLink:
         self._services = {name: self.node.create_client(Trigger, f"{self.target}/{name}") for name in _TRIGGERS}
         self._services["pause"] = self.node.create_client(SetBool, f"{self.target}/pause")
         self._set = self.node.create_client(SetParametersAtomically, f"{self.target}/set_parameters_atomically")
-        self._by_hand = _TakenByHand()
+        self._by_hand = TakenByHand()
         self._taken: dict[str, object] = {}
         self._served: list = []
         self._poses: dict[int, PoseStamped] = {}
