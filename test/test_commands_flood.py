@@ -70,12 +70,17 @@ def push(client, count: int, rate: float = 0.0) -> None:
 def told(rig, before: dict[str, int], condition) -> dict[str, int]:
     """What the counters rose by, once that fulfils the condition."""
 
+    found = {}
+
     def gained():
         report = rig.all_diagnostics(last=1)[-1]
-        found = {key: int(report[key]) - before[key] for key in ("poke_received", "sequence_gaps", "queue_full")}
-        return condition(found) and found
+        found.update({key: int(report[key]) - before[key] for key in ("poke_received", "sequence_gaps", "queue_full")})
+        return condition(found) and dict(found)
 
-    return rig.until(gained, "the counters")
+    try:
+        return rig.until(gained, "the counters")
+    except AssertionError as error:
+        raise AssertionError(f"{error}; they are {found}") from None
 
 
 def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(rig):
