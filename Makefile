@@ -27,7 +27,7 @@ workbench: setup ## node and interactive page; stays until Ctrl-C
 	@.venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
 
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
-	$(PY) -m pytest -n 2 --dist loadfile -m "not stress and not bench and not soak" $(ARGS)
+	$(PY) -m pytest -n 3 --dist loadfile -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
 	$(PY) -m ruff check .
