@@ -190,6 +190,9 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
             assert one.events() == []
             assert two.heard("odom", last=1)[0]["child_frame_id"] == "tool"
             assert two.heard("inertia")[0]["header"]["frame_id"] == "tool/mesh"
+            # What a user overrides is of that topic alone.
+            depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
+            assert list(two.get(*depths).values()) == [3, 10]
             assert one.heard("inertia")[0]["inertia"]["m"] != two.heard("inertia")[0]["inertia"]["m"]
             two.trigger("reset")
             two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")

@@ -87,7 +87,7 @@ class CommandIntake:
                 message_type,
                 f"~/{topic}",
                 lambda message: None,
-                qos.COMMAND,
+                qos.own(qos.COMMAND),
                 callback_group=group,
                 raw=True,
                 qos_overriding_options=qos.OVERRIDABLE,
