@@ -96,7 +96,7 @@ def test_repeats_come_every_so_often_and_jitter_is_the_same_for_the_same_seed_wi
 
 def client(rig, *arguments, timeout: float = 90.0):
     """The real poke_client, run to its end."""
-    return run("poke_client", *arguments, environment=rig.environment, timeout=timeout)
+    return run("poke_client", *arguments, "--timeout", timeout / 2, environment=rig.environment, timeout=timeout)
 
 
 def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
@@ -162,15 +162,20 @@ def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_comman
 
 def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, tmp_path):
     (tmp_path / "late.yaml").write_text("- {t: 0.0, impulse: [1.0e-6, 0, 0]}\n")
-    (tmp_path / "refused.yaml").write_text("- {t: 0.0, at: nowhere, force: [1, 0, 0]}\n")
+    # A ray that misses is refused when its time has come, long after all are sent.
+    (tmp_path / "refused.yaml").write_text(
+        "- {t: 0.0, at: nowhere, force: [1, 0, 0]}\n"
+        "- {t: 4.0, at: {ray: {origin: [5, 5, 5], direction: [0, 0, 1]}}, force: [1, 0, 0]}\n"
+    )
+    rig.set(real_time_factor=4.0)
     late = client(rig, tmp_path / "late.yaml", "--lead", 0)
     rig.sent += 1
     assert late.returncode == 1
     assert "1 late, 0 refused" in late.stdout
     refused = client(rig, tmp_path / "refused.yaml", "--reset")
-    rig.sent += 1
+    rig.sent += 2
     assert refused.returncode == 1
-    assert "0 late, 1 refused" in refused.stdout
+    assert "0 late, 2 refused" in refused.stdout
 
 
 class SlowNode:
@@ -245,6 +250,8 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(r
     try:
         done = run("poke_client", path, "--node", "slow", "--reset", environment=ros_environment)
         assert done.returncode == 0, done.stdout + done.stderr
+        # Its time doesn't move: the client says so, and waits no longer for the last command to act.
+        assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in done.stdout
         assert slow.most_ahead == 500
         assert slow.received == 1600
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]
