@@ -262,6 +262,34 @@ def test_the_inertia_that_was_received_sent_back_changes_nothing(rig):
     assert values == {"ballast.nut": [0.0, 0.01, 0.05, 0.02], "inertia_model": "explicit"}
 
 
+def test_in_flight_other_mass_properties_leave_the_mesh_where_it_is_and_another_size_the_centre_of_mass(rig):
+    rig.start_over(paused=True)
+    rig.schedule(
+        "{t: 0.3, set: {ballast.nut: [0.05, 0.01, 0.05, 0.02]}}", "{t: 0.6, set: {scale: [2.0, 1.0, 0.5], mass: 0.1}}"
+    )
+    rig.publish("poke", wrench_message(100 * MS, "world@com;impulse", (1e-3, 2e-3, -1e-3)))
+    rig.until_received(rig.sent)
+    known = rig.heard_count("inertia")
+    centres = [rig.heard("inertia", last=1)[0]]
+    rig.pause(False)
+    centres += rig.until(lambda: rig.heard_count("inertia") >= known + 2 and rig.heard("inertia", last=2), "inertia")
+    assert [stamp_ns(message) for message in centres[1:]] == [300 * MS, 600 * MS]
+    old, new = (np.array(list(message["inertia"]["com"].values())) for message in centres[:2])
+    rows = {ms: row_of(*rig.state_at(ms * MS)) for ms in (300, 310, 600, 610)}
+    before, after = rows[300], rows[310]
+    # No force acts: the new centre of mass goes on as the point of the moving mesh that it is.
+    shift = Rotation.from_quat(before[3:7]).apply(new - old)
+    assert np.linalg.norm(shift) > 1e-3
+    velocity = before[7:10] + np.cross(before[10:13], shift)
+    # Measured 1e-16 and 3e-17.
+    assert after[7:10] == pytest.approx(velocity, abs=1e-14)
+    assert after[:3] == pytest.approx(before[:3] + shift + 0.01 * velocity, abs=1e-15)
+    # Grown in place.
+    before, after = rows[600], rows[610]
+    assert after[7:10].tobytes() == before[7:10].tobytes()
+    assert after[:3] == pytest.approx(before[:3] + 0.01 * before[7:10], abs=1e-15)
+
+
 def test_schedule_takes_set_release_and_clear_wrench_and_refuses_all_else_by_name(rig):
     before = rig.counters()
     good = [

@@ -5,7 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 import yaml
 from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
 from conftest import held_domain
@@ -90,6 +89,8 @@ def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal
     report = rig.diagnostics()
     assert report["name"] == "/rigid_body: simulation"
     assert set(KEYS) <= report.keys()
+    kinds = ("wrench", "poke", "string", "inertia", "schedule")
+    assert int(report["commands_received"]) == sum(int(report[f"{kind}_received"]) for kind in kinds) == rig.sent
     before = rig.heard_count("/diagnostics")
     rig.publish("poke", wrench_message(0, "nowhere", (1.0, 0, 0)))
     rig.until_received(rig.sent)
@@ -172,7 +173,7 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
         other = NodeProcess(
             environment,
             tmp_path / "other.log",
-            {"mesh": "hammer", "qos_overrides./lab/tool/pose.publisher.depth": 3},
+            {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3},
             *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
         )
         one, two = RosClient(environment), RosClient(environment, "/lab/tool")
@@ -182,13 +183,16 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
                 client.watch_diagnostics()
             two.do("advertise", topic="/lab/hit", type="WrenchStamped")
             one.advertise("poke")
-            two.publish("/lab/hit", wrench_message(0, "tool@com;impulse", (1.0, 0.0, 0.0)))
-            two.until(two.events, "the poke")
+            # The names of its own frames, beside the words for them.
+            for frame in ("tool@com", "map@com", "map", "tool", "world", "body@origin"):
+                two.publish("/lab/hit", wrench_message(0, f"{frame};impulse", (1.0, 0.0, 0.0)))
+            two.until(lambda: len(two.events()) == 6, "the pokes")
             reports = two.diagnostics(), one.diagnostics()
-            assert [r["poke_received"] for r in reports] == ["1", "0"]
+            assert [(r["poke_received"], r["refused_total"]) for r in reports] == [("6", "0"), ("0", "0")]
             assert [r["name"] for r in reports] == ["/lab/tool: simulation", "/rigid_body: simulation"]
             assert one.events() == []
-            assert two.heard("odom", last=1)[0]["child_frame_id"] == "tool"
+            odometry = two.heard("odom", last=1)[0]
+            assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
             assert two.heard("inertia")[0]["header"]["frame_id"] == "tool/mesh"
             # What a user overrides is of that topic alone.
             depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
@@ -238,9 +242,9 @@ def test_two_nodes_in_one_process_have_nothing_in_common(ros_environment):
     assert done.stdout.splitlines()[-3:] == ["1 0", "True False", "['/one', '/two']"], done.stderr
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["qos_overrides./rigid_body/pose.publisher.reliability", "qos_overrides./rigid_body/wrench.subscription.depth"],
-)
-def test_qos_overrides_are_parameters_like_others(rig, name):
-    assert name in rig.names()
+def test_depth_and_reliability_of_each_topic_are_parameters_like_others(rig):
+    depths = {"wrench.subscription": 5000, "schedule.subscription": 5000, "pose.publisher": 10, "odom.publisher": 10}
+    depths |= {"inertia.publisher": 1, "scene.publisher": 1}
+    for topic, depth in depths.items():
+        own = f"qos_overrides./rigid_body/{topic}"
+        assert list(rig.get(f"{own}.depth", f"{own}.reliability").values()) == [depth, "reliable"]
