@@ -44,8 +44,6 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
         ["string/attach", 12 * SECOND, "rigid_body/mesh", [0.0, 0.0, 0.07]],
         ["string/target", 12 * SECOND + 1, "world", [0.02, 0.01, 0.1]],
         ["string/target", 12 * SECOND + 200_000_000, "world", [0.03, 0.0, 0.12]],
-        ["string/attach", 12 * SECOND + 500_000_000, "body", [0.0, 0.03, 0.05]],
-        ["string/attach", 12 * SECOND + 800_000_000, "world", [0.1, -0.2, 0.05]],
     ]
     arguments = ["--ros-args", "--params-file", scene, "-p", "publish_rate:=50", "-p", "real_time_factor:=3"]
     with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):

@@ -96,7 +96,7 @@ def test_repeats_come_every_so_often_and_jitter_is_the_same_for_the_same_seed_wi
 
 def client(rig, *arguments, timeout: float = 90.0):
     """The real poke_client, run to its end."""
-    return run("poke_client", *arguments, "--timeout", timeout / 2, environment=rig.environment, timeout=timeout)
+    return run("poke_client", *arguments, environment=rig.environment, timeout=timeout)
 
 
 def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
