@@ -27,7 +27,7 @@ STATES = ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom", "/rigid_b
 
 
 def main(scenario: str) -> None:
-    """Fly for a second and count in the next."""
+    """Fly for a simulated second and count in the next."""
     imported_before = sorted(name for name in ("rerun", "trimesh", "pyarrow") if name in sys.modules)
     rclpy.init()
     counts: Counter[str] = Counter()
@@ -53,18 +53,18 @@ def main(scenario: str) -> None:
             time.sleep(0.02)
         time.sleep(0.5)
     thread.start()
-    end = time.monotonic() + 1.0
-    while time.monotonic() < end:
+    while steps_and_time(node)[1] < 1e9:
         executor.spin_once(timeout_sec=0.05)
-    counts.clear()
     messages.clear()
-    before = steps_and_time(node)
-    end = time.monotonic() + 1.0
-    while time.monotonic() < end:
+    before, counts_before = look(node, counts)
+    wrenches_before = node.intake.received["wrench"]
+    while steps_and_time(node)[1] - before[1] < 1e9 or (
+        scenario == "listened_to" and node.intake.received["wrench"] < wrenches_before + 30
+    ):
         if scenario == "listened_to":
             publisher.publish(cdr.wrench_stamped(0, "world", (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0)))
         time.sleep(0.02)
-    after = steps_and_time(node)
+    after, counts = look(node, counts)
     thread.stop()
     print(
         json.dumps(
@@ -72,7 +72,7 @@ def main(scenario: str) -> None:
                 "imported": imported_before + sorted(n for n in ("rerun", "trimesh", "pyarrow") if n in sys.modules),
                 "steps": after[0] - before[0],
                 "simulated_ns": after[1] - before[1],
-                "publications": {topic: counts[topic] for topic in STATES},
+                "publications": {topic: counts[topic] - counts_before[topic] for topic in STATES},
                 "message_objects": dict(messages),
                 "wrenches": node.intake.received["wrench"],
             }
@@ -132,6 +132,12 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
 def steps_and_time(node: RigidBodyNode) -> tuple[int, int]:
     """Committed steps and simulated time, read on the physics thread."""
     return node.call(lambda: (node.flight.simulation.steps, node.flight.simulation.time_ns))
+
+
+def look(node: RigidBodyNode, counts: Counter) -> tuple[tuple[int, int], Counter]:
+    """The same and the counts of one moment: states are published by the physics thread."""
+    simulation = node.flight.simulation
+    return node.call(lambda: ((simulation.steps, simulation.time_ns), Counter(counts)))
 
 
 def count_publications(counts: Counter) -> None:

@@ -121,8 +121,15 @@ def dumped(rig, folder) -> Path:
 
 
 def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, tmp_path):
-    rig.set(mass=1.5, ballast__nut=[0.1, 0.0, 0.0, 0.07], gravity=[0.0, 0.0, -1.0], string__stiffness=7.0)
-    scene = rig.heard("scene", last=1)[0]["data"]
+    changes = {"mass": 1.5, "ballast.nut": [0.1, 0.0, 0.0, 0.07], "gravity": [0.0, 0.0, -1.0], "string.stiffness": 7.0}
+    rig.set_named(changes, atomically=True)
+
+    def told() -> str:
+        """The scene, once it has the changes."""
+        text = rig.heard("scene", last=1)[0]["data"]
+        return text if changes.items() <= read_scene_text(text).values.items() else ""
+
+    scene = rig.until(told, "the scene")
     dump = dumped(rig, tmp_path)
     # Read without ROS it is that scene too.
     first = make_scenario(read_scene_text(scene).values)
@@ -134,8 +141,8 @@ def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, t
         client = RosClient(environment)
         try:
             client.listen("scene")
-            told = client.until(lambda: client.heard("scene"), "the second node's scene")
-            assert told[-1]["data"] == scene
+            heard = client.until(lambda: client.heard("scene"), "the second node's scene")
+            assert heard[-1]["data"] == scene
         finally:
             client.close()
             assert second.stop() == 0

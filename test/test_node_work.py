@@ -57,7 +57,8 @@ def test_the_steady_state_makes_no_message_objects(counted):
     published = work["publications"]
     # Odometry is subscribed too, the IMU is not.
     for topic in ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom"):
-        assert 350 <= published[topic] <= 650, published
+        # One a period of 2 ms; the ends of the counted time cut one off.
+        assert published[topic] == pytest.approx(work["simulated_ns"] / 2e6, abs=2), published
     assert published["/rigid_body/imu"] == 0
     assert work["wrenches"] >= 30
     assert work["message_objects"] == {}

@@ -118,7 +118,7 @@ def test_stamps_zero_and_past_mean_now_and_one_of_the_systems_clock_is_told_apar
     assert rig.node_process.log.read_text().count("stamped by the system's clock") == 1
     pokes = rig.wait_event("poke", 5)
     assert len(pokes) == 5
-    assert all(sent_after <= event["time_ns"] < sent_after + 30 * SECOND for event in pokes)
+    assert all(sent_after <= event["time_ns"] < sent_after + 600 * SECOND for event in pokes)
     assert {event["content"]["stamp_ns"] for event in pokes} == set(stamps.values())
 
 
