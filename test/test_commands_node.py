@@ -208,9 +208,12 @@ def test_inertia_is_latched_and_comes_again_at_every_change_with_its_time(rig):
         "iyz": I[1, 2],
         "izz": I[2, 2],
     }
+    rig.start_over(paused=True)
     before = len(rig.heard("inertia"))
     rig.set(mass=2.0)
     rig.schedule("{t: 0.6, set: {scale: [2.0]}}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
     heard = rig.until(lambda: len(rig.heard("inertia")) >= before + 2 and rig.heard("inertia"), "inertia twice")
     assert [m["inertia"]["m"] for m in heard[before:]] == [2.0, 2.0]
     assert stamp_ns(heard[before + 1]) == 600 * MS
