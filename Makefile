@@ -63,7 +63,6 @@ clean: ## everything that was made here, the environments included
 
 PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip
 pins: setup ## for developers: newest versions into requirements/*.txt
-	$(PY) -m pip install --quiet uv
 	$(PINS) requirements/base.in -o requirements/base.txt
 	$(PINS) requirements/ros.in -c requirements/base.txt -o requirements/ros.txt
 	sed -i '1i # Exact pins, made by `make pins`.' requirements/base.txt requirements/ros.txt
