@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..problem import MOMENTS
 from ..rotation import multiply, normalize
 
