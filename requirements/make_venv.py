@@ -155,7 +155,7 @@ def main():
         if made.returncode:
             stop("python -m venv: " + (made.stdout.decode(errors="replace").strip().splitlines() or ["failed"])[-1])
     source = "the ROS installation's rclpy" if ros_installed else "rclpy from PyPI"
-    print("installing the pinned packages (about 1.5 GB, a few minutes the first time; {})".format(source), flush=True)
+    print("installing the pinned packages (about 1.5 GB, half a minute to some minutes; {})".format(source), flush=True)
     # Where the system's own packages count as installed, pip knows which they are.
     if ros_installed or not installed_by_uv(inner, files):
         install(inner, *(part for file in files for part in ("-r", file)))
