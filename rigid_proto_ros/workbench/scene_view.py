@@ -19,6 +19,8 @@ from ..core.rotation import quaternion_from_matrix
 from ..core.surface import Surface
 from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
+from .acting import Hit
+from .poke_mark import PokeMark
 
 BODY_COLOUR, GHOST_COLOUR = (214, 205, 190), (120, 180, 255)
 STRING_COLOUR, HAND_COLOUR = (250, 180, 60), (250, 130, 40)
@@ -91,6 +93,7 @@ class SceneView:
         self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
         thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
         self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thin)
+        self._poke = PokeMark(scene, LOAD_COLOUR)
         self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
         self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
 
@@ -228,6 +231,14 @@ class SceneView:
     def show_loads(self, arrows: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
         """Forces: point of attack and drawn vector, both in the world [m]."""
         self._show_arrows(self._loads, arrows, "Forces")
+
+    def show_hit(self, hit: Hit | None) -> None:
+        """Where the last poke hit, and how hard; None for no poke."""
+        if hit is None or not self._shown["Forces"]:
+            self._poke.hide()
+        else:
+            size = 2.0 * self._radius / self.unit
+            self._poke.show(self._drawn(hit.point), hit.direction, hit.text, hit.age, size)
 
     def show_momentum(self, position, momentum, omega) -> None:
         """L and ω at the COM, drawn vectors [m]."""
