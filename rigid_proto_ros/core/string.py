@@ -147,9 +147,7 @@ class Tied:
         )
 
 
-def tie(
-    settings: StringSettings, attach, target, body: Body, state: State, timeout_ns: int, mass: float = 0.0
-) -> Tied:
+def tie(settings: StringSettings, attach, target, body: Body, state: State, timeout_ns: int, mass: float = 0.0) -> Tied:
     """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
 
     timeout_ns 0 never lets go. mass: as ``settled`` takes it.

@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 
-INNER, OUTER = 0.022, 0.032
+INNER, OUTER = 0.03, 0.042
 """Radii of the ring as it begins, in body sizes."""
 
-WIDENS = 1.0
+WIDENS = 0.5
 """Of its first radius, until it is gone."""
 
 LIFTED = 0.02
 """Body sizes before the surface, towards where the force comes from: on a curved part the ring would sink in."""
+
+ABOVE = 0.06
+"""Body sizes from the point up to the label."""
 
 SIDES = 40
 
@@ -28,7 +31,7 @@ class PokeMark:
         self._ring: Any = scene.add_mesh_simple(
             "/poke/ring", vertices, triangles, color=colour, side="double", opacity=1.0, visible=False
         )
-        self._label: Any = scene.add_label("/poke/label", "", visible=False, anchor="bottom-left")
+        self._label: Any = scene.add_label("/poke/label", "", visible=False, anchor="bottom-center")
 
     def show(self, point: np.ndarray, direction: np.ndarray, text: str, age: float, size: float) -> None:
         """At ``point`` (3,), lying across the force's unit ``direction`` (3,). age: 0 when it hit, 1 when it is forgotten.
@@ -39,7 +42,7 @@ class PokeMark:
         self._ring.opacity = 1.0 - age
         if self._label.text != text:
             self._label.text = text
-        self._label.position = point
+        self._label.position = point + np.array([0.0, 0.0, ABOVE * size])
         self._switch(True)
 
     def hide(self) -> None:

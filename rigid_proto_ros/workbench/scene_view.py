@@ -24,7 +24,7 @@ from .poke_mark import PokeMark
 
 BODY_COLOUR, GHOST_COLOUR = (214, 205, 190), (120, 180, 255)
 STRING_COLOUR, HAND_COLOUR = (250, 180, 60), (250, 130, 40)
-LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (235, 85, 85), (190, 120, 245), (60, 190, 190)
+LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (205, 25, 25), (190, 120, 245), (60, 190, 190)
 AXES_COLOURS = np.array([(235, 85, 85), (90, 200, 110), (85, 150, 250)])
 
 SWITCHES = {
@@ -92,7 +92,8 @@ class SceneView:
         self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
         self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
         thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
-        self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thin)
+        thick: dict[str, Any] = {"shaft_radius": 0.013, "head_radius": 0.034, "head_length": 0.09, "visible": False}
+        self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thick)
         self._poke = PokeMark(scene, LOAD_COLOUR)
         self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
         self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
