@@ -206,7 +206,8 @@ class Simulation(Readings):
             self._string.move(command, self.setup, self.state)
         elif isinstance(command, ReleaseString):
             self._string.release()
-        if self.observer.hears_events():
+        # A change is told at once: waiting in a queue it would keep its whole setup, mesh included.
+        if self.observer.hears_events() or isinstance(command, Change):
             self.log(command.kind, command.content)
         else:
             self.events.note(self.time_ns, command)
