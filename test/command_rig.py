@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from ros_process import RosProcess
+from ros_process import READY_S, RosProcess
 
 TEST_FOLDER = Path(__file__).parent
 TYPES = {
@@ -119,8 +119,12 @@ class RosClient:
         for topic in topics:
             self.do("listen", topic=self.name(topic), type=TYPES[topic], latched=topic in LATCHED)
 
-    def heard(self, topic: str, clear: bool = False, last: int = 0, stamp: int | None = None) -> list[dict]:
-        return self.do("heard", topic=self.name(topic), clear=clear, last=last, stamp=stamp)
+    def heard(self, topic: str, last: int = 0, stamp: int | None = None, after: int | None = None) -> list[dict]:
+        return self.do("heard", topic=self.name(topic), last=last, stamp=stamp, after=after)
+
+    def forget(self, *topics: str) -> None:
+        """Drop what was heard."""
+        self.do("forget", topics=[self.name(topic) for topic in topics])
 
     def heard_count(self, topic: str) -> int:
         return self.do("heard_count", topic=self.name(topic))
@@ -160,24 +164,26 @@ class RosClient:
     def watch_diagnostics(self) -> None:
         self.do("listen", topic="/diagnostics", type="DiagnosticArray", depth=100)
 
-    def all_diagnostics(self, last: int = 0) -> list[dict]:
-        """Every report of the node so far, or among the ``last``: keys and values, with ``level``, ``message``, ``name``."""
+    def all_diagnostics(self, last: int = 0, after: int | None = None) -> list[dict]:
+        """Reports of the node so far, among the ``last`` or those made after a time of the system's clock [ns].
+
+        Each as keys and values, with ``level``, ``message``, ``name`` and ``stamp_ns``.
+        """
         reports = []
-        for message in self.heard("/diagnostics", last=last):
+        for message in self.heard("/diagnostics", last=last, after=after):
             for status in message["status"]:
                 if status["name"] == f"{self.node}: simulation":
                     values = {entry["key"]: entry["value"] for entry in status["values"]}
-                    reports.append({**values, **{k: status[k] for k in ("level", "message", "name")}})
+                    said = {k: status[k] for k in ("level", "message", "name")}
+                    reports.append({**values, **said, "stamp_ns": stamp_ns(message)})
         return reports
 
-    def diagnostics(self, reports: int = 2) -> dict:
-        """A report made after this call began: the second new one."""
-        before = len(self.all_diagnostics())
-        return self.until(
-            lambda: (found := self.all_diagnostics())[before + reports - 1 :] and found[-1], "diagnostics"
-        )
+    def diagnostics(self) -> dict:
+        """A report of what is so after this call began: it is stamped before its values are read."""
+        asked_ns = time.time_ns()
+        return self.until(lambda: self.all_diagnostics(after=asked_ns), "diagnostics")[0]
 
-    def until(self, condition, what: str, timeout_s: float = 40.0):
+    def until(self, condition, what: str, timeout_s: float = READY_S):
         """Wait for a condition; returns its value."""
         deadline = time.monotonic() + timeout_s
         while not (found := condition()):
@@ -204,7 +210,7 @@ class RosClient:
     def close(self) -> None:
         self.process.stdin.close()
         try:
-            self.process.wait(timeout=10.0)
+            self.process.wait(timeout=READY_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -246,7 +252,6 @@ class Commanded(RosClient):
         self.node_process = NodeProcess(environment, folder / "node.log", scene)
         try:
             super().__init__(environment, node)
-            # A first start compiles its kernels.
             self.node_process.wait_for("is flying")
             self.listen("pose", "twist", "odom", "inertia", "applied", "events", "scene")
             self.watch_diagnostics()
@@ -278,25 +283,24 @@ class Commanded(RosClient):
         for name in self.names():
             if name.startswith("ballast."):
                 self.set_named({name: [0.0, 0.0, 0.0, 0.0]})
-        self.heard("events", clear=True)
+        self.forget("events")
         self.start_over(paused=False)
 
     def start_over(self, paused: bool) -> None:
         """Time 0, paused or running; nothing heard of what was before."""
         self.pause(True)
-        self.heard("pose", clear=True)
+        self.forget("pose", "twist", "odom")
         resets = len([event for event in self.events() if event["kind"] == "reset"])
         self.trigger("reset")
         self.until(lambda: len([e for e in self.events() if e["kind"] == "reset"]) > resets, "the reset")
         # While paused states come at 10 Hz: once one of time 0 is here, no older one can follow.
         for topic in ("pose", "twist", "odom"):
             self.until(lambda topic=topic: stamp_ns((self.heard(topic, last=1) or [UNSTAMPED])[0]) == 0, "time 0")
-        for topic in ("pose", "twist", "odom", "applied", "events"):
-            self.heard(topic, clear=True)
+        self.forget("pose", "twist", "odom", "applied", "events")
         if not paused:
             self.pause(False)
             self.until(lambda: [e for e in self.events() if e["kind"] == "pause"], "the start")
-            self.heard("events", clear=True)
+            self.forget("events")
 
     def counters(self) -> dict[str, int]:
         """All whole-number counters of a report that has everything sent so far, and its consequences."""
@@ -304,8 +308,8 @@ class Commanded(RosClient):
         return self.counters_now()
 
     def counters_now(self) -> dict[str, int]:
-        """All whole-number counters of the next report."""
-        report = self.diagnostics(1)
+        """All whole-number counters now."""
+        report = self.diagnostics()
         return {key: int(value) for key, value in report.items() if str(value).lstrip("-").isdigit()}
 
     def gained(self, before: dict[str, int], *more: str) -> dict[str, int]:

@@ -24,10 +24,14 @@ from rcl_interfaces.srv import (
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
+
+WAIT_S = 180.0
+"""Longer than a first start with all kernels to compile on a loaded machine."""
 
 TYPES = {
     t.__name__: t
@@ -102,17 +106,21 @@ class Client:
         messages = self.received.setdefault(topic, [])
         subscription = self.node.create_subscription(TYPES[type], topic, messages.append, profile(**qos))
         if wait:
-            # A first start compiles its kernels.
-            _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}", 300.0)
+            _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}")
 
-    def heard(self, topic, clear=False, last=0, stamp=None):
-        """What has come on a topic; only the ``last`` ones, or those with this stamp [ns], if that is given."""
+    def heard(self, topic, last=0, stamp=None, after=None):
+        """What has come on a topic; only the ``last`` ones, those with this stamp [ns] or one after it, if that is given."""
         messages = list(self.received[topic])
-        if clear:
-            del self.received[topic][: len(messages)]
         if stamp is not None:
             messages = [m for m in messages if stamp_ns(m) == stamp]
+        if after is not None:
+            messages = [m for m in messages if stamp_ns(m) > after]
         return [plain(m) for m in (messages[-last:] if last else messages)]
+
+    def forget(self, topics):
+        """Drop what has come on some topics."""
+        for topic in topics:
+            self.received[topic].clear()
 
     def heard_count(self, topic):
         """How many messages have come on a topic."""
@@ -138,6 +146,7 @@ class Client:
         """One message ``count`` times; rate per second, 0 as fast as it goes."""
         publisher, message_type = self.publishers[topic]
         message = filled(message_type(), content)
+        message = serialize_message(message)
         start = time.monotonic()
         for k in range(count):
             if rate and k % 10 == 0:
@@ -153,9 +162,9 @@ class Client:
 
     def acknowledged(self, topic):
         """Wait until all that was published has been received by everybody."""
-        return self.publishers[topic][0].wait_for_all_acked(rclpy.duration.Duration(seconds=20))
+        assert self.publishers[topic][0].wait_for_all_acked(rclpy.duration.Duration(seconds=WAIT_S))
 
-    def call(self, service, type, request=None, timeout=20.0):
+    def call(self, service, type, request=None, timeout=WAIT_S):
         """A service's answer."""
         if service not in self.clients:
             self.clients[service] = self.node.create_client(TYPES[type], service)
@@ -203,7 +212,7 @@ class Client:
         return found
 
 
-def _until(condition, what, timeout=60.0):
+def _until(condition, what, timeout=WAIT_S):
     deadline = time.monotonic() + timeout
     while not condition():
         if time.monotonic() > deadline:
@@ -221,7 +230,10 @@ def main() -> None:
         except Exception as error:  # told to the test, which fails with it
             answer = {"failed": f"{type(error).__name__}: {error}"}
         print(json.dumps(answer), flush=True)
-    # The executor's thread still sits in the middleware: the orderly way out races with it.
+    # The executor's thread still sits in the middleware: the orderly way out races with it. But a publisher that goes
+    # without a word is believed to be there for 20 s more.
+    for publisher, _ in client.publishers.values():
+        client.node.destroy_publisher(publisher)
     sys.stdout.flush()
     os._exit(0)
 

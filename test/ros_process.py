@@ -20,7 +20,7 @@ MODULES = {
     "rigid_proto": "rigid_proto_ros.cli.main",
 }
 READY_S = 180.0
-"""Longer than a first start with all kernels to compile on a loaded machine."""
+"""Longer than a first start with all kernels to compile on a loaded machine; every wait's end."""
 
 LOOPBACK = (
     '<General><AllowMulticast>false</AllowMulticast><Interfaces><NetworkInterface name="lo"/></Interfaces></General>'
@@ -103,7 +103,7 @@ class RosProcess:
             assert time.monotonic() < deadline, f"no {text!r} in {self.output}{self.errors}"
             time.sleep(0.02)
 
-    def end(self, number: int = signal.SIGINT, within_s: float = 20.0) -> int:
+    def end(self, number: int = signal.SIGINT, within_s: float = READY_S) -> int:
         """Send a signal, wait for the end and return the exit status."""
         if self.process.poll() is None:
             self.process.send_signal(number)

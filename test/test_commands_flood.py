@@ -2,10 +2,24 @@
 """Floods of commands: all received, or the loss told."""
 
 import signal
+import time
 from contextlib import contextmanager
 
 import pytest
-from command_rig import RosClient, wrench_message
+from command_rig import Commanded, RosClient, wrench_message
+from conftest import held_domain
+
+
+@pytest.fixture(scope="module")
+def commanded(ros_environment, tmp_path_factory):
+    """A node of these tests' own: gaps count only where nobody else has lately published, and one who went without a word
+    is believed to be there for 20 s more.
+    """
+    with held_domain() as domain:
+        rig = Commanded({**ros_environment, "ROS_DOMAIN_ID": str(domain)}, tmp_path_factory.mktemp("flooded"))
+        yield rig
+        rig.close()
+
 
 HARMLESS = wrench_message(0, "world", (0.0, 0.0, 1e-9))
 
@@ -25,7 +39,15 @@ def flood(rig, count: int, messages: int, rate: float) -> tuple[int, dict]:
             client.answer()
         for client in clients:
             client.do("acknowledged", topic=rig.name("wrench"))
-        rig.diagnostics(2)
+
+        def settled() -> bool:
+            """All are taken, or some were lost and no more come."""
+            earlier, now = rig.counters_now(), rig.counters_now()
+            taken = now["wrench_received"] - before["wrench_received"]
+            lost = now["queue_full"] > before["queue_full"]
+            return taken == count * messages or (lost and earlier["wrench_received"] == now["wrench_received"])
+
+        rig.until(settled, "all messages, or their loss")
         gained = rig.gained(before, "wrench_received")
     finally:
         for client in clients:
@@ -88,8 +110,11 @@ def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(rig)
     before = rig.counters()
     push(rig, 2)
     told(rig, before, lambda gained: gained["poke_received"] == 2)
+    began = time.monotonic()
     with held_up(rig):
         push(rig, 12_000)
+    if time.monotonic() - began > 10.0:
+        pytest.skip("the machine took so long that the middleware took the node for gone, and its return for another's")
     rig.do("acknowledged", topic=rig.name("poke"))
     # The last one shows what was lost before it.
     push(rig, 1)
@@ -117,7 +142,7 @@ def several_publishers(rig) -> tuple[dict, dict]:
     finally:
         other.close()
     rig.until(lambda: len([e for e in rig.do("endpoints", topic=rig.name("poke")) if e[0] == "pub"]) == 1, "one alone")
-    rig.diagnostics(2)
+    rig.diagnostics()
     before_alone = rig.counters_now()
     rig.sent += before_alone["poke_received"] - before["poke_received"]
     return before, before_alone

@@ -156,7 +156,7 @@ def test_everything_of_a_kind_is_refused_with_its_reason_and_counted_and_the_bod
             rig.publish(topic, *messages)
     gained = rig.gained(before)
     assert gained == {"refused_total": len(commands), f"refused_{reason}": len(commands)}
-    report = rig.diagnostics(1)
+    report = rig.diagnostics()
     assert report["state"] == "flying"
     assert not rig.heard("applied")
     # Torque-free all the while: not one of them has touched it.

@@ -2,6 +2,7 @@
 """Simulated time: pause, step, reset, pace, clocks, and what a command's stamp means."""
 
 import itertools
+import math
 import time
 
 import pytest
@@ -23,13 +24,13 @@ def test_while_paused_states_go_out_with_the_frozen_stamp_and_commands_wait_for_
     rig.pause(True)
     rig.publish("poke", wrench_message(0, "world@tip;impulse", (1e-3, 0.0, 0.0)))
     rig.until_received(rig.sent)
-    rig.heard("pose", clear=True)
+    rig.forget("pose")
     rig.until(lambda: rig.heard_count("pose") >= 4, "states while paused")
     frozen = {stamp_ns(m) for m in rig.heard("pose")}
     assert len(frozen) == 1
     assert len({tuple(position(m)) for m in rig.heard("pose")}) == 1
     assert not [event for event in rig.events() if event["kind"] == "poke"]
-    assert rig.diagnostics(1)["state"] == "paused"
+    assert rig.diagnostics()["state"] == "paused"
     assert rig.pause(False)["success"]
     (poke,) = rig.wait_event("poke")
     assert poke["time_ns"] == frozen.pop()
@@ -45,7 +46,7 @@ def test_step_goes_on_by_one_publication_period_and_is_refused_while_running(rig
         assert answer["success"]
         rig.until(lambda k=k: rig.heard("pose", last=1, stamp=k * 10 * MS), "the next state")
     assert rig.wait_event("poke")[0]["time_ns"] == 0
-    rig.heard("pose", clear=True)
+    rig.forget("pose")
     assert stamp_ns(rig.until(lambda: rig.heard("pose"), "a state")[-1]) == 30 * MS
     # From an instant between two publications to the next one.
     rig.set(publish_rate=40.0)
@@ -79,7 +80,7 @@ def test_reset_takes_time_and_state_back_drops_what_was_to_come_and_keeps_parame
         k: v for k, v in before.items() if k.endswith("_received") or k.startswith("refused")
     }
     assert rig.get("linear_damping", "wrench_timeout") == {"linear_damping": 0.5, "wrench_timeout": 0.0}
-    assert rig.diagnostics(1)["state"] == ("paused" if paused else "flying")
+    assert rig.diagnostics()["state"] == ("paused" if paused else "flying")
 
 
 def test_clear_wrench_ends_what_acts_and_leaves_what_is_scheduled(rig):
@@ -145,18 +146,20 @@ def test_publication_k_is_at_the_rounded_kth_period(rig, rate):
 
 
 def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
-    advanced, states = {}, {}
-    for factor in (0.25, 4.0, 0.0):
+    states = []
+
+    def pace() -> float:
+        """Simulated time over wall time, between two reports."""
+        first, then = rig.diagnostics(), rig.diagnostics()
+        return (int(then["sim_time_ns"]) - int(first["sim_time_ns"])) / (then["stamp_ns"] - first["stamp_ns"])
+
+    # On a busy machine time is lost, so any second that goes as it should will do.
+    for factor, slowest, fastest in ((0.25, 0.125, 0.5), (4.0, 2.0, 8.0), (0.0, 10.0, math.inf)):
         rig.set(real_time_factor=factor)
         rig.start_over(paused=False)
-        report = rig.diagnostics(1)
-        later = rig.diagnostics(2)
-        advanced[factor] = int(later["sim_time_ns"]) - int(report["sim_time_ns"])
-        states[factor] = rig.state_at(200 * MS)
-    # Over the same two wall seconds; a factor of 16 is due between the first two.
-    assert advanced[4.0] > 4 * advanced[0.25]
-    assert advanced[0.0] > advanced[4.0]
-    assert states[0.25] == states[4.0] == states[0.0]
+        states.append(rig.state_at(200 * MS))
+        rig.until(lambda at_least=slowest, at_most=fastest: at_least < pace() < at_most, f"pace of {factor}")
+    assert states[0] == states[1] == states[2]
 
 
 def test_clock_is_published_on_request_with_the_states_stamps(rig):
@@ -168,7 +171,7 @@ def test_clock_is_published_on_request_with_the_states_stamps(rig):
     assert all(c % (10 * MS) == 0 for c in clocks)
     assert rig.set(publish_clock=False)[0][0]
     rig.start_over(paused=False)
-    rig.heard("/clock", clear=True)
+    rig.forget("/clock")
     rig.until(lambda: rig.now_ns() >= 300 * MS, "time going on")
     assert rig.heard_count("/clock") == 0
     # On again, by the one publisher.
@@ -194,23 +197,33 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
                 sec, nanosec = divmod(clock_ns, SECOND)
                 client.publish("/clock", {"clock": {"sec": sec, "nanosec": nanosec}})
 
+            def report() -> dict:
+                """The second new one; stamps are of /clock here, so they don't tell when it was made."""
+                before = client.heard_count("/diagnostics")
+                client.until(lambda: client.heard_count("/diagnostics") >= before + 2, "a report")
+                return client.all_diagnostics(last=1)[0]
+
             def reaches(simulated_ns: int) -> None:
-                client.until(lambda: int(client.diagnostics(1)["sim_time_ns"]) == simulated_ns, f"{simulated_ns} ns")
+                client.until(
+                    lambda: (
+                        (reports := client.all_diagnostics(last=1)) and int(reports[0]["sim_time_ns"]) == simulated_ns
+                    ),
+                    f"{simulated_ns} ns",
+                )
 
             start = 5000 * SECOND
-            assert client.diagnostics()["sim_time_ns"] == "0"
             tick(start)
-            assert client.diagnostics()["sim_time_ns"] == "0"
+            assert report()["sim_time_ns"] == "0"
             tick(start + 500 * MS)
             reaches(500 * MS)
             tick(start + 1234 * MS)
             reaches(1234 * MS)
             tick(start + 100 * MS)
-            client.diagnostics()
+            report()
             tick(start + 300 * MS)
             reaches(1434 * MS)
-            report = client.diagnostics()
-            assert (report["overruns"], report["real_time_lost_s"]) == ("0", "0.0")
+            last = report()
+            assert (last["overruns"], last["real_time_lost_s"]) == ("0", "0.0")
             stamps = [stamp_ns(m) for m in client.heard("pose")]
             assert [s for s in stamps if s] == [k * 10 * MS for k in range(1, 144)]
         finally:
@@ -225,7 +238,7 @@ def test_asleep_states_still_go_out_and_it_wakes_at_a_command(ros_environment, t
         try:
             report = rig.diagnostics()
             assert report["state"] == "sleeping"
-            rig.heard("pose", clear=True)
+            rig.forget("pose")
             rig.until(lambda: rig.heard_count("pose") >= 10, "states of a sleeper")
             stamps = [stamp_ns(m) for m in rig.heard("pose")]
             assert stamps == sorted(set(stamps))
@@ -239,7 +252,7 @@ def test_asleep_states_still_go_out_and_it_wakes_at_a_command(ros_environment, t
 def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_reset(rig):
     rig.set(integrator="rk4", step=0.1)
     rig.set(angular_damping=1e6)
-    report = rig.until(lambda: (r := rig.diagnostics(1))["state"] == "paused" and r, "the stop")
+    report = rig.until(lambda: (r := rig.diagnostics())["state"] == "paused" and r, "the stop")
     assert report["level"] == 1 and "1e+100" in report["message"]
     pose = rig.heard("pose", last=1)[0]
     assert all(abs(x) < 1e100 for x in position(pose))
@@ -262,8 +275,8 @@ def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_
 def test_services_and_commands_are_answered_while_the_motion_takes_all_the_time_there_is(rig, values):
     rig.set_named(values)
     before = rig.counters()
-    time_ns = int(rig.diagnostics(1)["sim_time_ns"])
-    assert int(rig.diagnostics(1)["sim_time_ns"]) > time_ns
+    time_ns = int(rig.diagnostics()["sim_time_ns"])
+    rig.until(lambda: int(rig.diagnostics()["sim_time_ns"]) > time_ns, "time going on")
     # Time goes on when they are asked, and each is answered; what comes by topic is counted.
     assert rig.set(linear_damping=0.25)[0] == [True, ""]
     assert rig.get("linear_damping") == {"linear_damping": 0.25}
@@ -271,7 +284,7 @@ def test_services_and_commands_are_answered_while_the_motion_takes_all_the_time_
     rig.publish("wrench", *[wrench_message(0, "nowhere")] * 20)
     assert rig.gained(before) == {"refused_total": 20, "refused_frame": 20}
     assert rig.pause(True)["success"]
-    frozen = rig.diagnostics(2)["sim_time_ns"]
-    assert rig.diagnostics(1)["sim_time_ns"] == frozen
+    frozen = rig.diagnostics()["sim_time_ns"]
+    assert rig.diagnostics()["sim_time_ns"] == frozen
     assert rig.trigger("reset")["success"]
-    assert rig.diagnostics(2)["sim_time_ns"] == "0"
+    assert rig.diagnostics()["sim_time_ns"] == "0"

@@ -57,7 +57,7 @@ MAX_BRACKETS = 100
 class CommandIntake:
     """apply_changes(changes) gives the Setup with parameters changed, as scheduled ``set`` entries need it.
 
-    received counts messages by topic, ``late`` and ``wall_stamp`` stamps that mean now; refusals are the simulation's.
+    received counts every message taken by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now; refusals are the simulation's.
     """
 
     def __init__(
@@ -135,7 +135,6 @@ class CommandIntake:
                     if not caught_up:
                         caught_up = True
                         catch_up()
-                    self.received[topic] += 1
                     self._lively_until_ns[source] = wall_ns + LIVELY_NS
                     self.sequence_gaps += gaps.before(taken[1].get("publication_sequence_number"))
                     try:
@@ -143,12 +142,9 @@ class CommandIntake:
                     except CommandRefused as refusal:
                         simulation.refuse(refusal)
                         self._on_refusal(refusal)
+                    # Last: a message that counts as received counts as late or refused too, if it is.
+                    self.received[topic] += 1
         return wall_ns < max(self._lively_until_ns)
-
-    @property
-    def commands_received(self) -> int:
-        """Every message taken, refused ones included."""
-        return sum(self.received.values())
 
     def _wrench(self, data, simulation, scenario) -> None:
         self._submit_wrench(True, data, simulation, scenario)

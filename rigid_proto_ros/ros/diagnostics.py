@@ -25,6 +25,8 @@ class Diagnostics:
         self._timer = node.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _report(self) -> None:
+        # Before the values are read: what was done before the stamp is in them.
+        stamp = self._node.get_clock().now().to_msg()
         values = self._values()
         troubles = sum(float(values[key]) for key in _TROUBLES)
         troubled, self._troubles_before = troubles > self._troubles_before, troubles
@@ -38,5 +40,5 @@ class Diagnostics:
         status.message = warning or ("refused, lost or late in the last second" if troubled else values["state"])
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.stamp = stamp
         self._publisher.publish(message)

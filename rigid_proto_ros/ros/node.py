@@ -311,14 +311,16 @@ class RigidBodyNode(Node):
         flight, intake = self.flight, self.intake
         simulation, timekeeping = flight.simulation, flight.timekeeping
         momentum = simulation.angular_momentum
+        # Counted last by the physics thread, so read first: who finds a message received finds its refusal too.
+        received = dict(intake.received)
         refused = dict(simulation.refused)
         return {
             "sim_time_ns": simulation.time_ns,
             "publish_rate": flight.scenario.values["publish_rate"],
             "overruns": timekeeping.overruns,
             "real_time_lost_s": timekeeping.real_time_lost_s,
-            **{f"{topic}_received": intake.received[topic] for topic in TOPICS},
-            "commands_received": intake.commands_received,
+            **{f"{topic}_received": received.get(topic, 0) for topic in TOPICS},
+            "commands_received": sum(received.values()),
             "refused_total": sum(refused.values()),
             **{f"refused_{reason}": refused.get(reason, 0) for reason in REFUSAL_REASONS},
             "late": intake.late,
