@@ -31,6 +31,8 @@ SWITCHES = {
     "See through the body": False,
     "COM": True,
     "Principal axes": False,
+    "Body axes": False,
+    "World axes": False,
     "Inertia ellipsoid": False,
     "Box of equal inertia": False,
     "Bounding box": False,
@@ -88,6 +90,11 @@ class SceneView:
             shadow_opacity=0.0,
         )
         self._handles["Grid"] = [self._grid]
+        # Length 1 is the picture's unit; the body's own are scaled to it.
+        triad: dict[str, Any] = {"axes_radius": 0.008, "origin_radius": 0.0, "visible": False}
+        self._world_axes = scene.add_frame("/world", axes_length=0.8, **triad)
+        self._body_axes = scene.add_frame("/body/own_axes", **triad)
+        self._handles["World axes"], self._handles["Body axes"] = [self._world_axes], [self._body_axes]
         none = np.zeros((1, 2, 3))
         self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
         self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
@@ -173,6 +180,7 @@ class SceneView:
     def _draw_inertia(self, scenario: Scenario, box, ellipsoid, corners) -> None:
         body, unit, scene = scenario.setup.body, self.unit, self._scene
         size = 2.0 * self._radius / unit
+        self._body_axes.axes_length = 0.7 * size
         turned = _wxyz(quaternion_from_matrix(body.principal_axes))
         axes = np.zeros((3, 2, 3))
         # All end outside the body, or the shortest would lie inside a rod.
@@ -214,9 +222,11 @@ class SceneView:
         self._body_frame.wxyz = _wxyz(row[3:7])
 
     def place_grid(self) -> None:
-        """The grid stands still in the world while the picture follows the body: by whole sections, it has no end."""
+        """Grid and world axes stand still in the world while the picture follows the body; the grid has no end, it moves by
+        whole sections."""
         section = 2.5
         shift = -(self.origin / self.unit)
+        self._world_axes.position = shift
         self._grid.position = (shift[0] % section, shift[1] % section, shift[2] - 1.2 if abs(shift[2]) < 3.0 else -1.2)
 
     def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None) -> None:
