@@ -32,13 +32,20 @@ CAMERA, FIELD_OF_VIEW = np.array([1.3, -2.2, 1.1]), math.radians(40.0)
 class Bench:
     """``rigid_proto workbench`` in a ROS domain of its own."""
 
-    def __init__(self, environment: dict[str, str], folder: Path, port: int, *arguments: str) -> None:
+    def __init__(
+        self, environment: dict[str, str], folder: Path, port: int, *arguments: str, wait: bool = True
+    ) -> None:
         self.port = port
         self.process = RosProcess(
             *("rigid_proto", "workbench", "--port", port, "--no-browser", *arguments),
             environment={**environment, "TMPDIR": str(folder)},
             log=folder / "workbench",
         )
+        if wait:
+            self.wait()
+
+    def wait(self) -> None:
+        """Until page and node are there."""
         self.process.wait_for("The workbench is at")
         self.process.wait_for("is flying")
 
@@ -173,8 +180,8 @@ class Page:
 class Ear(RosClient):
     """Listens to the node of a bench."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
-        super().__init__(environment)
+    def __init__(self, environment: dict[str, str], node: str = "/rigid_body") -> None:
+        super().__init__(environment, node)
         self.listen("pose", "events", "scene")
 
     def event(self, kind: str, after: int = 0) -> dict:
