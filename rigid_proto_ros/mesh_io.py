@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros import mesh_cache
 from rigid_proto_ros.core.errors import MeshError
@@ -18,6 +17,8 @@ from rigid_proto_ros.mesh_obj import read_obj
 from rigid_proto_ros.mesh_off import read_off
 from rigid_proto_ros.mesh_ply import read_ply
 from rigid_proto_ros.mesh_stl import is_ascii_stl, read_stl
+
+from .core.compilation import njit
 
 BODIES = Path(__file__).parent / "bodies"
 """Folder of the bundled meshes."""

@@ -9,10 +9,11 @@ materials) are skipped.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_text import EXACT, NEEDS_FLOAT, float_of, is_blank, line_of, read_number, token_end
+
+from .core.compilation import njit
 
 _OK, _BAD_VERTEX, _BAD_INDEX, _FEW_CORNERS = 0, 1, 2, 3
 

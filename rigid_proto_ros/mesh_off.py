@@ -6,10 +6,11 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_text import EXACT, NEEDS_FLOAT, excerpt, float_of, is_blank, line_of, read_number
+
+from .core.compilation import njit
 
 _OK, _ENDED, _BAD_VERTEX, _BAD_FACE = 0, 1, 2, 3
 

@@ -6,10 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_text import excerpt, line_of, read_numbers
+
+from .core.compilation import njit
 
 _TYPES = dict(
     pair.split(":")

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .core.compilation import njit
 
 EXACT = 0
 NEEDS_FLOAT = 1

@@ -91,11 +91,16 @@ class BagRecorder:
     def _spin(self) -> None:
         while not self._stop.is_set():
             self._executor.spin_once(timeout_sec=0.05)
+        # What is here already and hasn't been taken.
+        taken = -1
+        while taken != len(self.messages):
+            taken = len(self.messages)
+            self._executor.spin_once(timeout_sec=0.2)
 
     def close(self) -> list[Logged]:
         """Stop, and return what was received."""
         self._stop.set()
-        self._thread.join(5.0)
+        self._thread.join()
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()

@@ -124,7 +124,7 @@ def main(node: str, commands: list, until_ns: int) -> dict:
     pose = DataReader(participant, topic("pose", PoseStamped), qos=RELIABLE)
     twist = DataReader(participant, topic("twist", TwistStamped), qos=RELIABLE)
     found = {"pose": {}, "twist": {}}
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 150.0
     sent = False
     while min(max(found["pose"], default=-1), max(found["twist"], default=-1)) < until_ns:
         if time.monotonic() > deadline:

@@ -70,7 +70,9 @@ class NodeClient:
     def _on_diagnostics(self, message) -> None:
         for status in message.status:
             if status.name == f"{self.name}: simulation":
-                self.diagnostics.append({v.key: v.value for v in status.values})
+                stamp = message.header.stamp
+                values = {v.key: v.value for v in status.values}
+                self.diagnostics.append({**values, "stamp_ns": stamp.sec * SECOND + stamp.nanosec})
                 self.levels.append(status.level)
 
     def spin_until(self, condition, what: str) -> None:
@@ -133,10 +135,15 @@ class NodeClient:
         self._publishers["schedule"].publish(String(data=text))
 
     def fresh_diagnostics(self, reached=lambda values: True) -> dict:
-        """The first report from now on for which ``reached`` holds."""
+        """The first report of what is so from now on for which ``reached`` holds."""
         self.diagnostics.clear()
-        self.spin_until(lambda: self.diagnostics and reached(self.diagnostics[-1]), "diagnostics")
-        return self.diagnostics[-1]
+        asked_ns = time.time_ns()
+
+        def last() -> dict:
+            return self.diagnostics[-1]
+
+        self.spin_until(lambda: self.diagnostics and last()["stamp_ns"] > asked_ns and reached(last()), "diagnostics")
+        return last()
 
     def received(self, count: int) -> dict:
         """Diagnostics once ``commands_received`` is at least ``count``."""
@@ -158,18 +165,24 @@ class NodeClient:
         self.states.clear()
         return found
 
-    def forget(self) -> None:
-        """Drop every state that has arrived, those still in the middleware's queue too."""
-        end = time.monotonic() + 1.5
-        while time.monotonic() < end:
-            self.executor.spin_once(timeout_sec=0.0)
+    def reset(self) -> None:
+        """Time 0, and none of the states that were published before; some must have been."""
         self.states.clear()
+        self.spin_until(lambda: len(self._latest()) == 2, "states")
+        before = self._latest()
+        assert self.trigger("reset").success
+        self.spin_until(lambda: all(now < before[topic] for topic, now in self._latest().items()), "states of time 0")
+        self.rows()
+
+    def _latest(self) -> dict[str, int]:
+        """Stamps of the newest pose and twist [ns]."""
+        return {t: m.header.stamp.sec * SECOND + m.header.stamp.nanosec for t, m in self.states[-4:]}
 
     def fly_until(self, time_ns: int) -> dict[str, dict[int, list[float]]]:
         """Collect states until both topics have reached ``time_ns``."""
 
         def reached() -> bool:
-            latest = {t: m.header.stamp.sec * SECOND + m.header.stamp.nanosec for t, m in self.states[-4:]}
+            latest = self._latest()
             return len(latest) == 2 and min(latest.values()) >= time_ns
 
         self.spin_until(reached, f"states at {time_ns} ns")

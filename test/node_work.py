@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections import Counter
@@ -13,7 +14,8 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
 
 from rigid_proto_ros import cdr
 from rigid_proto_ros.ros.node import RigidBodyNode
@@ -25,7 +27,7 @@ STATES = ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom", "/rigid_b
 
 
 def main(scenario: str) -> None:
-    """Fly for a second and count in the next."""
+    """Fly for a simulated second and count in the next."""
     imported_before = sorted(name for name in ("rerun", "trimesh", "pyarrow") if name in sys.modules)
     rclpy.init()
     counts: Counter[str] = Counter()
@@ -40,6 +42,9 @@ def main(scenario: str) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     listener = rclpy.create_node("listener")
+    if scenario == "described":
+        print(json.dumps(descriptions(node, thread, executor, listener, counts)))
+        os._exit(0)
     publisher = listener.create_publisher(WrenchStamped, "/rigid_body/wrench", QoSProfile(depth=100))
     if scenario == "listened_to":
         for message_type, topic in ((PoseStamped, "pose"), (TwistStamped, "twist"), (Odometry, "odom")):
@@ -48,18 +53,18 @@ def main(scenario: str) -> None:
             time.sleep(0.02)
         time.sleep(0.5)
     thread.start()
-    end = time.monotonic() + 1.0
-    while time.monotonic() < end:
+    while steps_and_time(node)[1] < 1e9:
         executor.spin_once(timeout_sec=0.05)
-    counts.clear()
     messages.clear()
-    before = steps_and_time(node)
-    end = time.monotonic() + 1.0
-    while time.monotonic() < end:
+    before, counts_before = look(node, counts)
+    wrenches_before = node.intake.received["wrench"]
+    while steps_and_time(node)[1] - before[1] < 1e9 or (
+        scenario == "listened_to" and node.intake.received["wrench"] < wrenches_before + 30
+    ):
         if scenario == "listened_to":
             publisher.publish(cdr.wrench_stamped(0, "world", (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0)))
         time.sleep(0.02)
-    after = steps_and_time(node)
+    after, counts = look(node, counts)
     thread.stop()
     print(
         json.dumps(
@@ -67,7 +72,7 @@ def main(scenario: str) -> None:
                 "imported": imported_before + sorted(n for n in ("rerun", "trimesh", "pyarrow") if n in sys.modules),
                 "steps": after[0] - before[0],
                 "simulated_ns": after[1] - before[1],
-                "publications": {topic: counts[topic] for topic in STATES},
+                "publications": {topic: counts[topic] - counts_before[topic] for topic in STATES},
                 "message_objects": dict(messages),
                 "wrenches": node.intake.received["wrench"],
             }
@@ -78,9 +83,61 @@ def main(scenario: str) -> None:
     rclpy.try_shutdown()
 
 
+def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
+    """Masses in the robot descriptions that subscribers who come and go get, and the publish calls after each."""
+    topic = "/rigid_body/robot_description"
+    latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    heard: list[float] = []
+    masses, calls = [], []
+    executor.add_node(listener)
+    thread.start()
+
+    def until(condition) -> None:
+        deadline = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < deadline, (masses, calls, heard)
+            executor.spin_once(timeout_sec=0.05)
+
+    def change(mass: float) -> None:
+        answer = node.set_parameters_atomically([rclpy.parameter.Parameter("mass", value=mass)])
+        assert answer.successful, answer.reason
+        until(lambda: node.call(lambda: node.flight.simulation.setup.body.mass) == mass)
+        # Whatever that made ready for the executor is served.
+        for _ in range(20):
+            executor.spin_once(timeout_sec=0.0)
+
+    def listened() -> bool:
+        (publisher,) = (p for p in node.publishers if p.topic_name == topic)
+        return publisher.get_subscription_count() > 0
+
+    for mass in (1.0, 10.0, 100.0):
+        change(mass)
+        change(mass + 1.0)
+        subscription = listener.create_subscription(
+            String, topic, lambda m: heard.append(float(m.data.split('mass value="')[1].split('"')[0])), latched
+        )
+        until(lambda: heard)
+        calls.append(counts[topic])
+        change(mass + 2.0)
+        until(lambda mass=mass: heard[-1] == mass + 2.0)
+        calls.append(counts[topic])
+        masses.append(heard.copy())
+        listener.destroy_subscription(subscription)
+        until(lambda: not listened())
+        heard.clear()
+    thread.stop()
+    return {"masses": masses, "calls": calls}
+
+
 def steps_and_time(node: RigidBodyNode) -> tuple[int, int]:
     """Committed steps and simulated time, read on the physics thread."""
     return node.call(lambda: (node.flight.simulation.steps, node.flight.simulation.time_ns))
+
+
+def look(node: RigidBodyNode, counts: Counter) -> tuple[tuple[int, int], Counter]:
+    """The same and the counts of one moment: states are published by the physics thread."""
+    simulation = node.flight.simulation
+    return node.call(lambda: ((simulation.steps, simulation.time_ns), Counter(counts)))
 
 
 def count_publications(counts: Counter) -> None:

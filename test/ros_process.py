@@ -150,6 +150,13 @@ def alive(pid: int) -> bool:
         return False
 
 
+def catches(pid: int, number: int) -> bool:
+    """Whether a process has a handler of its own for a signal and for SIGTERM, which no interpreter starts with."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    caught = int(status.partition("SigCgt:")[2].split()[0], 16)
+    return all(caught >> (each - 1) & 1 for each in (number, signal.SIGTERM))
+
+
 def dds_client(environment: dict[str, str], node: str, commands: list, until_ns: int) -> subprocess.Popen:
     """Start the outside client; its result is the last line of its output, see dds_client.py."""
     process = subprocess.Popen(

@@ -24,8 +24,8 @@ pytestmark = pytest.mark.skipif(not DOCUMENT.is_file(), reason="not run from a s
 HEUN = '''
 """heun: two evaluations a step, order 2."""
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
 from .runge_kutta import advance, is_good, rates, stages
 from .stepping import FixedSteps

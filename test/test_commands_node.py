@@ -194,7 +194,8 @@ def test_a_refused_command_leaves_no_event(rig):
 
 def test_inertia_is_latched_and_comes_again_at_every_change_with_its_time(rig):
     scenario = make_scenario(rig.scene)
-    message = rig.heard("inertia", last=1)[0]
+    mass = scenario.setup.body.mass
+    message = rig.until(lambda: (m := rig.heard("inertia", last=1)[0])["inertia"]["m"] == mass and m, "the inertia")
     I, com = scenario.setup.body.inertia, scenario.setup.body.center_of_mass
     assert message["header"]["frame_id"] == "rigid_body/mesh"
     assert message["inertia"] == {
@@ -207,9 +208,12 @@ def test_inertia_is_latched_and_comes_again_at_every_change_with_its_time(rig):
         "iyz": I[1, 2],
         "izz": I[2, 2],
     }
+    rig.start_over(paused=True)
     before = len(rig.heard("inertia"))
     rig.set(mass=2.0)
     rig.schedule("{t: 0.6, set: {scale: [2.0]}}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
     heard = rig.until(lambda: len(rig.heard("inertia")) >= before + 2 and rig.heard("inertia"), "inertia twice")
     assert [m["inertia"]["m"] for m in heard[before:]] == [2.0, 2.0]
     assert stamp_ns(heard[before + 1]) == 600 * MS
@@ -234,7 +238,7 @@ def test_an_inertia_message_makes_the_model_explicit_and_the_parameters_follow_t
     assert values["explicit_inertia.center_of_mass"] == [0.01, 0.0, 0.02]
     assert values["explicit_inertia.tensor"] == [1e-3, 1e-5, 0.0, 2e-3, 0.0, 2.5e-3]
     assert values["ballast.nut"] == [0.0, 0.0, 0.0, 0.07]
-    assert rig.heard("inertia", last=1)[0]["inertia"]["m"] == 0.5
+    rig.until(lambda: rig.heard("inertia", last=1)[0]["inertia"]["m"] == 0.5, "the inertia")
     # In the body frame the centre of mass counts from the present one.
     rig.publish("inertia/set", inertia_message(0, "body", 0.5, (0.0, 0.01, 0.0), (1e-3, 1e-5, 0, 2e-3, 0, 2.5e-3)))
     rig.wait_event("inertia", 2)
@@ -243,12 +247,14 @@ def test_an_inertia_message_makes_the_model_explicit_and_the_parameters_follow_t
 
 
 def test_the_inertia_that_was_received_sent_back_changes_nothing(rig):
-    rig.set(scale=[1.1, 1.3, 1.7], ballast__nut=[0.013, 0.01, 0.05, 0.02])
+    changes = {"scale": [1.1, 1.3, 1.7], "ballast.nut": [0.013, 0.01, 0.05, 0.02]}
+    rig.set_named(changes, atomically=True)
     rig.pause(True)
     rig.trigger("step")
-    received = rig.heard("inertia", last=1)[0]
+    mass = make_scenario({**rig.scene, **changes}).setup.body.mass
+    received = rig.until(lambda: (m := rig.heard("inertia", last=1)[0])["inertia"]["m"] == mass and m, "the inertia")
     message = {**received, "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": received["header"]["frame_id"]}}
-    pose, twist = rig.heard("pose", last=1)[0], rig.heard("twist", last=1)[0]
+    pose, twist = rig.state_at(int(rig.diagnostics()["sim_time_ns"]))
     count = len(rig.heard("inertia"))
     rig.publish("inertia/set", message)
     rig.until_received(rig.sent)
@@ -260,6 +266,34 @@ def test_the_inertia_that_was_received_sent_back_changes_nothing(rig):
     assert stamp_ns(again) == stamp_ns(pose) == stamp_ns(twist)
     values = rig.get("ballast.nut", "inertia_model")
     assert values == {"ballast.nut": [0.0, 0.01, 0.05, 0.02], "inertia_model": "explicit"}
+
+
+def test_in_flight_other_mass_properties_leave_the_mesh_where_it_is_and_another_size_the_centre_of_mass(rig):
+    rig.start_over(paused=True)
+    rig.schedule(
+        "{t: 0.3, set: {ballast.nut: [0.05, 0.01, 0.05, 0.02]}}", "{t: 0.6, set: {scale: [2.0, 1.0, 0.5], mass: 0.1}}"
+    )
+    rig.publish("poke", wrench_message(100 * MS, "world@com;impulse", (1e-3, 2e-3, -1e-3)))
+    rig.until_received(rig.sent)
+    known = rig.heard_count("inertia")
+    centres = [rig.heard("inertia", last=1)[0]]
+    rig.pause(False)
+    centres += rig.until(lambda: rig.heard_count("inertia") >= known + 2 and rig.heard("inertia", last=2), "inertia")
+    assert [stamp_ns(message) for message in centres[1:]] == [300 * MS, 600 * MS]
+    old, new = (np.array(list(message["inertia"]["com"].values())) for message in centres[:2])
+    rows = {ms: row_of(*rig.state_at(ms * MS)) for ms in (300, 310, 600, 610)}
+    before, after = rows[300], rows[310]
+    # No force acts: the new centre of mass goes on as the point of the moving mesh that it is.
+    shift = Rotation.from_quat(before[3:7]).apply(new - old)
+    assert np.linalg.norm(shift) > 1e-3
+    velocity = before[7:10] + np.cross(before[10:13], shift)
+    # Measured 1e-16 and 3e-17.
+    assert after[7:10] == pytest.approx(velocity, abs=1e-14)
+    assert after[:3] == pytest.approx(before[:3] + shift + 0.01 * velocity, abs=1e-15)
+    # Grown in place.
+    before, after = rows[600], rows[610]
+    assert after[7:10].tobytes() == before[7:10].tobytes()
+    assert after[:3] == pytest.approx(before[:3] + 0.01 * before[7:10], abs=1e-15)
 
 
 def test_schedule_takes_set_release_and_clear_wrench_and_refuses_all_else_by_name(rig):

@@ -5,7 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 import yaml
 from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
 from conftest import held_domain
@@ -90,6 +89,8 @@ def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal
     report = rig.diagnostics()
     assert report["name"] == "/rigid_body: simulation"
     assert set(KEYS) <= report.keys()
+    kinds = ("wrench", "poke", "string", "inertia", "schedule")
+    assert int(report["commands_received"]) == sum(int(report[f"{kind}_received"]) for kind in kinds) == rig.sent
     before = rig.heard_count("/diagnostics")
     rig.publish("poke", wrench_message(0, "nowhere", (1.0, 0, 0)))
     rig.until_received(rig.sent)
@@ -120,8 +121,15 @@ def dumped(rig, folder) -> Path:
 
 
 def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, tmp_path):
-    rig.set(mass=1.5, ballast__nut=[0.1, 0.0, 0.0, 0.07], gravity=[0.0, 0.0, -1.0], string__stiffness=7.0)
-    scene = rig.heard("scene", last=1)[0]["data"]
+    changes = {"mass": 1.5, "ballast.nut": [0.1, 0.0, 0.0, 0.07], "gravity": [0.0, 0.0, -1.0], "string.stiffness": 7.0}
+    rig.set_named(changes, atomically=True)
+
+    def told() -> str:
+        """The scene, once it has the changes."""
+        text = rig.heard("scene", last=1)[0]["data"]
+        return text if changes.items() <= read_scene_text(text).values.items() else ""
+
+    scene = rig.until(told, "the scene")
     dump = dumped(rig, tmp_path)
     # Read without ROS it is that scene too.
     first = make_scenario(read_scene_text(scene).values)
@@ -133,8 +141,8 @@ def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, t
         client = RosClient(environment)
         try:
             client.listen("scene")
-            told = client.until(lambda: client.heard("scene"), "the second node's scene")
-            assert told[-1]["data"] == scene
+            heard = client.until(lambda: client.heard("scene"), "the second node's scene")
+            assert heard[-1]["data"] == scene
         finally:
             client.close()
             assert second.stop() == 0
@@ -172,7 +180,7 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
         other = NodeProcess(
             environment,
             tmp_path / "other.log",
-            {"mesh": "hammer", "qos_overrides./lab/tool/pose.publisher.depth": 3},
+            {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3},
             *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
         )
         one, two = RosClient(environment), RosClient(environment, "/lab/tool")
@@ -182,14 +190,20 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
                 client.watch_diagnostics()
             two.do("advertise", topic="/lab/hit", type="WrenchStamped")
             one.advertise("poke")
-            two.publish("/lab/hit", wrench_message(0, "tool@com;impulse", (1.0, 0.0, 0.0)))
-            two.until(two.events, "the poke")
+            # The names of its own frames, beside the words for them.
+            for frame in ("tool@com", "map@com", "map", "tool", "world", "body@origin"):
+                two.publish("/lab/hit", wrench_message(0, f"{frame};impulse", (1.0, 0.0, 0.0)))
+            two.until(lambda: len(two.events()) == 6, "the pokes")
             reports = two.diagnostics(), one.diagnostics()
-            assert [r["poke_received"] for r in reports] == ["1", "0"]
+            assert [(r["poke_received"], r["refused_total"]) for r in reports] == [("6", "0"), ("0", "0")]
             assert [r["name"] for r in reports] == ["/lab/tool: simulation", "/rigid_body: simulation"]
             assert one.events() == []
-            assert two.heard("odom", last=1)[0]["child_frame_id"] == "tool"
+            odometry = two.heard("odom", last=1)[0]
+            assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
             assert two.heard("inertia")[0]["header"]["frame_id"] == "tool/mesh"
+            # What a user overrides is of that topic alone.
+            depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
+            assert list(two.get(*depths).values()) == [3, 10]
             assert one.heard("inertia")[0]["inertia"]["m"] != two.heard("inertia")[0]["inertia"]["m"]
             two.trigger("reset")
             two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")
@@ -235,9 +249,9 @@ def test_two_nodes_in_one_process_have_nothing_in_common(ros_environment):
     assert done.stdout.splitlines()[-3:] == ["1 0", "True False", "['/one', '/two']"], done.stderr
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["qos_overrides./rigid_body/pose.publisher.reliability", "qos_overrides./rigid_body/wrench.subscription.depth"],
-)
-def test_qos_overrides_are_parameters_like_others(rig, name):
-    assert name in rig.names()
+def test_depth_and_reliability_of_each_topic_are_parameters_like_others(rig):
+    depths = {"wrench.subscription": 5000, "schedule.subscription": 5000, "pose.publisher": 10, "odom.publisher": 10}
+    depths |= {"inertia.publisher": 1, "scene.publisher": 1}
+    for topic, depth in depths.items():
+        own = f"qos_overrides./rigid_body/{topic}"
+        assert list(rig.get(f"{own}.depth", f"{own}.reliability").values()) == [depth, "reliable"]

@@ -55,9 +55,9 @@ rclpy.init()
 node = rclpy.create_node("looker")
 looks = ("get_subscriber_names_and_types_by_node", "get_publisher_names_and_types_by_node",
          "get_service_names_and_types_by_node")
-seen, deadline = None, time.monotonic() + 60.0
+seen, deadline = None, time.monotonic() + 150.0
 while time.monotonic() < deadline:
-    time.sleep(0.5)
+    time.sleep(0.3)
     try:
         now = [dict(getattr(node, look)({NAME!r}, "/")) for look in looks]
     except rclpy.node.NodeNameNonExistentError:

@@ -33,22 +33,29 @@ def check_states(found: dict, offline: OfflineRun, at_least: int) -> None:
 def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environment, tmp_path):
     pytest.importorskip("cyclonedds")
     scene = scene_path("t_handle")
-    # Stamped far enough ahead that a loaded machine has sent them all before the first acts.
     commands = [
-        ["wrench", 12 * SECOND + 123_456_789, "body", [0.0, 0.0, 0.0], [1e-4, 0.0, -2e-4]],
-        ["poke", 12 * SECOND + 500_000_001, "world@tip;duration=0.7", [0.0, 0.01, 0.02], [0.0, 0.0, 0.0]],
-        ["poke", 12 * SECOND + 500_000_001, "normal@vertex/3", [0.03, 0.0, 0.0], [0.0, 0.0, 0.0]],
-        ["wrench", 13 * SECOND, "world@left", [0.01, 0.0, 0.0], [0.0, 1e-5, 0.0]],
-        ["poke", 13 * SECOND + 7, "body@point/0.0,0.05,0.0;impulse", [0.0, 0.0, 1e-3], [0.0, 0.0, 0.0]],
-        ["poke", 11 * SECOND + 5, "world@ray/5.0,0.0,0.0/-1.0,0.0,0.0", [-0.02, 0.0, 0.0], [0.0, 0.0, 0.0]],
-        ["string/attach", 12 * SECOND, "rigid_body/mesh", [0.0, 0.0, 0.07]],
-        ["string/target", 12 * SECOND + 1, "world", [0.02, 0.01, 0.1]],
-        ["string/target", 12 * SECOND + 200_000_000, "world", [0.03, 0.0, 0.12]],
+        ["wrench", 2 * SECOND + 123_456_789, "body", [0.0, 0.0, 0.0], [1e-4, 0.0, -2e-4]],
+        ["poke", 2 * SECOND + 500_000_001, "world@tip;duration=0.7", [0.0, 0.01, 0.02], [0.0, 0.0, 0.0]],
+        ["poke", 2 * SECOND + 500_000_001, "normal@vertex/3", [0.03, 0.0, 0.0], [0.0, 0.0, 0.0]],
+        ["wrench", 3 * SECOND, "world@left", [0.01, 0.0, 0.0], [0.0, 1e-5, 0.0]],
+        ["poke", 3 * SECOND + 7, "body@point/0.0,0.05,0.0;impulse", [0.0, 0.0, 1e-3], [0.0, 0.0, 0.0]],
+        ["poke", SECOND + 5, "world@ray/5.0,0.0,0.0/-1.0,0.0,0.0", [-0.02, 0.0, 0.0], [0.0, 0.0, 0.0]],
+        ["string/attach", 2 * SECOND, "rigid_body/mesh", [0.0, 0.0, 0.07]],
+        ["string/target", 2 * SECOND + 1, "world", [0.02, 0.01, 0.1]],
+        ["string/target", 2 * SECOND + 200_000_000, "world", [0.03, 0.0, 0.12]],
     ]
     arguments = ["--ros-args", "--params-file", scene, "-p", "publish_rate:=50", "-p", "real_time_factor:=3"]
+    # Paused until they are all there.
+    arguments += ["-p", "start_paused:=true"]
     with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
-        outside = dds_client(ros_environment, "rigid_body", commands, 16 * SECOND)
-        output, errors = outside.communicate(timeout=90)
+        outside = dds_client(ros_environment, "rigid_body", commands, 6 * SECOND)
+        client = NodeClient(ros_environment)
+        try:
+            client.received(len(commands))
+            client.pause(False)
+        finally:
+            client.close()
+        output, errors = outside.communicate(timeout=180)
     assert outside.returncode == 0, errors
     found = json.loads(output.splitlines()[-1])
     found = {topic: {int(ns): row for ns, row in rows.items()} for topic, rows in found.items()}

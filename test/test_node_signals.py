@@ -2,10 +2,11 @@
 """SIGINT and SIGTERM end every command with status 0, a complete recording and no orphan."""
 
 import signal
+import time
 
 import pytest
 from conftest import needs_rerun
-from ros_process import RosProcess, alive, descendants, running_node
+from ros_process import RosProcess, alive, catches, descendants, running_node
 
 from rigid_proto_ros.rerun_view.reader import read_session
 
@@ -50,6 +51,10 @@ def test_a_waiting_client_and_an_offline_run_end(ros_environment, tmp_path, numb
         )
         while not (session.exists() and session.stat().st_size > 10_000):
             assert flight.process.poll() is None, flight.errors
+            time.sleep(0.02)
+        while not catches(client.pid, number):
+            assert client.process.poll() is None, client.errors
+            time.sleep(0.02)
         assert flight.end(number) == 0, flight.errors
         assert client.end(number) == 0, client.errors
     assert "Traceback" not in flight.errors + client.errors

@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 from command_rig import stamp_ns
-from ros_process import command, from_source, run
+from ros_process import READY_S, command, from_source, run
 
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.rotation import rotate
@@ -94,9 +94,9 @@ def test_repeats_come_every_so_often_and_jitter_is_the_same_for_the_same_seed_wi
             times(f"[{{t: 1, impulse: [1, 0, 0], {wrong}}}]")
 
 
-def client(rig, *arguments, timeout: float = 90.0):
+def client(rig, *arguments, timeout: float = READY_S):
     """The real poke_client, run to its end."""
-    return run("poke_client", *arguments, environment=rig.environment, timeout=timeout)
+    return run("poke_client", *arguments, "--timeout", 120, environment=rig.environment, timeout=timeout)
 
 
 def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
@@ -134,24 +134,31 @@ def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(r
 def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_commands_come_from_the_line(rig, tmp_path):
     rig.set(real_time_factor=4.0)
     (tmp_path / "two.yaml").write_text("- {t: 0.1, impulse: [1.0e-6, 0, 0]}\n- {t: 0.35, impulse: [1.0e-6, 0, 0]}\n")
-    # At once: each is a process with a start-up of its own.
+    # While time stands still, so that none comes late; and at once: each is a process with a start-up of its own.
+    rig.start_over(paused=True)
+    start_ns = rig.now_ns()
     arguments = (
-        (tmp_path / "two.yaml", "--lead", 3),
-        ("poke", "--at", "tip", "--push", 5, "--lead", 3),
-        ("wrench", "--force", 1, 0, 0, "--for", 2, "--lead", 3),
+        (tmp_path / "two.yaml", "--lead", 1),
+        ("poke", "--at", "tip", "--push", 5, "--lead", 1),
+        ("wrench", "--force", 1, 0, 0, "--for", 2, "--lead", 1),
     )
     children = [
         subprocess.Popen(
-            command("poke_client", *a), env=from_source(rig.environment), stdout=subprocess.PIPE, text=True
+            command("poke_client", *a, "--timeout", 120),
+            env=from_source(rig.environment),
+            stdout=subprocess.PIPE,
+            text=True,
         )
         for a in arguments
     ]
-    said = [child.communicate(timeout=90.0)[0] for child in children]
+    said = [child.communicate(timeout=READY_S)[0] for child in children]
     assert [child.returncode for child in children] == [0, 0, 0], said
     rig.sent += 2 + 1 + 4
+    rig.until_received(rig.sent)
+    rig.pause(False)
     pokes, wrenches = rig.wait_event("poke", 3), rig.wait_event("wrench", 4)
     first, second = (e["time_ns"] for e in pokes if "impulse" in e["content"]["frame_id"])
-    assert second - first == SECOND // 4
+    assert (first - start_ns, second - first) == (SECOND * 11 // 10, SECOND // 4)
     (push,) = (e["content"] for e in pokes if "impulse" not in e["content"]["frame_id"])
     assert (push["frame_id"], push["force"]) == ("normal@tip", [5.0, 0.0, 0.0])
     # Held for 2 s: repeated every half timeout, ended by a zero one.
@@ -162,15 +169,20 @@ def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_comman
 
 def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, tmp_path):
     (tmp_path / "late.yaml").write_text("- {t: 0.0, impulse: [1.0e-6, 0, 0]}\n")
-    (tmp_path / "refused.yaml").write_text("- {t: 0.0, at: nowhere, force: [1, 0, 0]}\n")
+    # A ray that misses is refused when its time has come, long after all are sent.
+    (tmp_path / "refused.yaml").write_text(
+        "- {t: 0.0, at: nowhere, force: [1, 0, 0]}\n"
+        "- {t: 4.0, at: {ray: {origin: [5, 5, 5], direction: [0, 0, 1]}}, force: [1, 0, 0]}\n"
+    )
+    rig.set(real_time_factor=4.0)
     late = client(rig, tmp_path / "late.yaml", "--lead", 0)
     rig.sent += 1
     assert late.returncode == 1
     assert "1 late, 0 refused" in late.stdout
     refused = client(rig, tmp_path / "refused.yaml", "--reset")
-    rig.sent += 1
+    rig.sent += 2
     assert refused.returncode == 1
-    assert "0 late, 1 refused" in refused.stdout
+    assert "0 late, 2 refused" in refused.stdout
 
 
 class SlowNode:
@@ -245,6 +257,8 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(r
     try:
         done = run("poke_client", path, "--node", "slow", "--reset", environment=ros_environment)
         assert done.returncode == 0, done.stdout + done.stderr
+        # Its time doesn't move: the client says so, and waits no longer for the last command to act.
+        assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in done.stdout
         assert slow.most_ahead == 500
         assert slow.received == 1600
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]

@@ -22,7 +22,7 @@ from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, complaints, headless_viewer, show
 
-WAIT_S = 30.0
+WAIT_S = 180.0
 
 
 @pytest.fixture
@@ -105,7 +105,7 @@ import time
 from rigid_proto_ros.rerun_view import RerunObserver
 observer = RerunObserver(viewer="web")
 print(observer._processes[0].process.pid, flush=True)
-time.sleep(60)
+time.sleep(600)
 """
 
 

@@ -20,7 +20,7 @@ from rigid_proto_ros.rerun_view import RerunObserver, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 RUN_WITH_A_STOPPED_VIEWER = """
 import sys, time
@@ -34,7 +34,7 @@ observer.state(0, states[0])
 print(observer.live_address, flush=True)
 sys.stdin.readline()
 streams = observer._flusher._writer.streams
-k, deadline = 1, time.monotonic() + 30.0
+k, deadline = 1, time.monotonic() + 150.0
 while k < 200 and time.monotonic() < deadline:
     observer.state(k * flight.PERIOD_NS, states[k])
     observer.body_changed(k * flight.PERIOD_NS, flight.BODY)

@@ -44,7 +44,7 @@ def flown(ros_environment, tmp_path_factory) -> list[Logged]:
             client.spin_until(lambda: any(m.topic.endswith("twist") for m in recorder.messages), "states")
             client.pause(False)
             _fly(client)
-            client.trigger("reset")
+            client.reset()
             _fly(client)
         finally:
             client.close()

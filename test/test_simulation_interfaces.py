@@ -14,8 +14,6 @@ pytest.importorskip("rclpy")
 MESSAGES = SimpleNamespace(
     SimulatorFeatures=SimpleNamespace(
         SIMULATION_RESET=20,
-        SIMULATION_RESET_TIME=21,
-        SIMULATION_RESET_STATE=22,
         SIMULATION_STATE_GETTING=24,
         SIMULATION_STATE_SETTING=25,
         SIMULATION_STATE_PAUSE=26,
@@ -69,11 +67,33 @@ def state(value):
     return SimpleNamespace(state=SimpleNamespace(state=value))
 
 
-def test_only_what_is_supported_is_listed(services):
+def test_what_is_listed_is_served_and_nothing_else_is(services):
     answer, _ = services
     listed = answer.get_simulator_features(None, response()).features
-    assert listed.features == [20, 21, 22, 24, 25, 26, 31, 32]
     assert listed.spawn_formats == []
+
+    def reset(scope):
+        return answer.reset_simulation(SimpleNamespace(scope=scope, **SCOPES), response())
+
+    def set_state(value):
+        return answer.set_simulation_state(state(value), response())
+
+    def step(steps):
+        return answer.step_simulation(SimpleNamespace(steps=steps), response())
+
+    # What a client that finds the feature listed may call, by the package's definition of the feature.
+    calls = {
+        20: lambda: reset(SCOPES["SCOPE_ALL"]),
+        21: lambda: reset(SCOPES["SCOPE_TIME"]),
+        22: lambda: reset(SCOPES["SCOPE_STATE"]),
+        23: lambda: reset(SCOPES["SCOPE_SPAWNED"]),
+        24: lambda: answer.get_simulation_state(None, response()),
+        25: lambda: set_state(1),
+        26: lambda: set_state(2),
+        31: lambda: step(1),
+        32: lambda: step(3),
+    }
+    assert [feature for feature, call in calls.items() if call().result.result == OK] == listed.features
 
 
 def test_steps_are_publications_and_need_a_pause(services):

@@ -17,7 +17,7 @@ EXPONENTS = (-308, -300, -200, -100, -30, 0, 15, 16, 30, 100, 200, 300, 308)
 FEW_EXPONENTS = (-308, -30, 0, 16, 308)
 MORE_EXPONENTS = (*EXPONENTS, -16, -8, 3, 6, 8, 12, 14)
 """Forces that auto resolves at up to 1e7 rad/s take it seconds."""
-STEPS_S = (1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.3, 1.0, 10.0, 100.0, 1000.0)
+STEPS_S = (1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.3, 0.7146, 1.0, 10.0, 100.0, 1000.0)
 FRAMES = ("world@com", "body@com", "world@point/.3,-.2,.1", "body@point/.3,-.2,.1")
 LOADS = ("free", "body wrench", "world wrench", "string", "stiff string", "damping")
 MOST_STEPS = 2_000

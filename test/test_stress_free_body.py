@@ -124,7 +124,7 @@ def cases(draw, count):
     return moments, spins, steps
 
 
-@njit(cache=True)
+@njit
 def worst_errors(kernel, moments, spins, steps):
     """Largest attitude error/(ε (1 + |ω|h)) [rad], rate error/(ε |ω| (1 + |ω|h)), and the first case that went wrong."""
     attitude, rate = 0.0, 0.0

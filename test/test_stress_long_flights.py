@@ -19,7 +19,7 @@ SPIN = (0.7, 1.9, -0.6)
 EXACTLY_CONSERVING = ("free_body", "lie_midpoint")
 
 
-@njit(cache=True)
+@njit
 def invariants(y, moments):
     """2E, L in the world (3,), |q|² of the variables of a segment."""
     m = moments * y[4:7]

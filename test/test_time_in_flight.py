@@ -114,9 +114,11 @@ def test_stamps_zero_and_past_mean_now_and_one_of_the_systems_clock_is_told_apar
     rig.publish("poke", wrench_message(wall + day + 3600 * SECOND, "world@com;impulse", (1e-6, 0.0, 0.0)))
     gained = rig.gained(before)
     assert gained == {"late": 2, "wall_stamp": 2, "refused_total": 1, "refused_stamp": 1}
+    # Told once in the node's life, and counted from then on.
+    assert rig.node_process.log.read_text().count("stamped by the system's clock") == 1
     pokes = rig.wait_event("poke", 5)
     assert len(pokes) == 5
-    assert all(sent_after <= event["time_ns"] < sent_after + 30 * SECOND for event in pokes)
+    assert all(sent_after <= event["time_ns"] < sent_after + 600 * SECOND for event in pokes)
     assert {event["content"]["stamp_ns"] for event in pokes} == set(stamps.values())
 
 

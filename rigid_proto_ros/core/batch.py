@@ -8,11 +8,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import boolean, float64, int64, njit, types
+from numba import boolean, float64, int64, types
 from numba.core.types.function_type import CompileResultWAP
 
 from .batch_body import BODY, GYROSCOPIC, make_body_row
 from .batch_flight import AUTO, FIXED_STEPS, KERNELS, ONE_EXACT_STEP, fly
+from .compilation import njit
 from .flight_measures import measure_flight
 from .integrators import series_steps, taylor_adaptive
 from .integrators.auto import AUTO as AUTO_INTEGRATOR

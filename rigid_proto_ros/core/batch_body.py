@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from .compilation import njit
 from .inertia_tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
 from .mass_properties import SCALE_LIMITS, loaded, stretched
 from .rotation import normalize, quaternion_of_axes

@@ -12,11 +12,12 @@ import math
 import warnings
 
 import numpy as np
-from numba import boolean, float64, int64, njit, types
+from numba import boolean, float64, int64, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from . import batch_body as b
 from . import problem as pr
+from .compilation import njit
 from .integrators import control as ctl
 from .integrators.auto import ANY_LOADS, FREE, STEADY, TURNING_LOADS, kind_of_segment
 from .integrators.integrator import MAX_SPEED

@@ -1,12 +1,90 @@
 # SPDX-License-Identifier: MIT
-"""Whether kernels are being compiled: cached ones compile nothing."""
+"""How kernels are compiled and kept: ``njit`` for this package, and word of it when something is being compiled.
+
+numba keeps compiled code on disk and compiles anew when the file of a function has changed, but not when a file has that this
+one imports from, though its functions are compiled in. After an update the old numbers would go on for ever. So a kernel of
+this package also counts as changed when any file has that its own imports, directly or not.
+"""
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
+from numba import njit
 from numba.core import event
+from numba.core.caching import CacheImpl
+
+__all__ = ["njit", "source_stamp", "told_when_compiling"]
+
+PACKAGE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+
+_RELATIVE_IMPORT = re.compile(r"^[ \t]*from[ \t]+(\.+)([\w.]*)[ \t]+import[ \t]+(?:\(([^)]*)\)|([^\n]*))", re.MULTILINE)
+
+
+@functools.cache
+def source_stamp(file: str) -> bytes:
+    """SHA-256 of a file and of all that it imports relatively, directly or not."""
+    hashes: dict[str, bytes] = {}
+    waiting = [file]
+    while waiting:
+        file = waiting.pop()
+        if file not in hashes:
+            hashes[file], imported = _source(file)
+            waiting += imported
+    return hashlib.sha256(b"".join(hashes[file] for file in sorted(hashes))).digest()
+
+
+@functools.cache
+def _source(file: str) -> tuple[bytes, list[str]]:
+    """Hash of a file, and the files that it imports."""
+    with open(file, encoding="utf-8") as stream:
+        text = stream.read()
+    candidates = set()
+    for dots, name, in_brackets, plain in _RELATIVE_IMPORT.findall(text):
+        folder = file
+        for _ in dots:
+            folder = os.path.dirname(folder)
+        module = os.path.join(folder, *filter(None, name.split(".")))
+        # What is imported is a name in a module, or a module of a package.
+        candidates |= {f"{module}.py", os.path.join(module, "__init__.py")}
+        candidates |= {os.path.join(module, f"{name}.py") for name in re.findall(r"\w+", in_brackets or plain)}
+    return hashlib.sha256(text.encode()).digest(), [file for file in candidates if _exists(file)]
+
+
+_exists = functools.cache(os.path.isfile)
+
+
+def _stamp(own: Callable[[], object], file: str) -> tuple[object, bytes]:
+    return own(), source_stamp(file)
+
+
+class _WithImports:
+    """Where numba itself would keep a kernel of this package, with a stamp that knows what the kernel imports."""
+
+    @classmethod
+    def from_function(cls, function, file: str):
+        """A locator as numba wants it; None for what isn't of this package."""
+        path = os.path.realpath(file)
+        if not path.startswith(PACKAGE + os.sep):
+            return None
+        for standard in _STANDARD:
+            locator = standard.from_function(function, file)
+            if locator is not None:
+                locator.get_source_stamp = functools.partial(_stamp, locator.get_source_stamp, path)
+                return locator
+        return None
+
+
+# numba has no public way that all its releases share; without this list it caches as it always does.
+_STANDARD: list[Any] = getattr(CacheImpl, "_locator_classes", [])
+if _STANDARD:
+    CacheImpl._locator_classes = [_WithImports, *_STANDARD]  # type: ignore[list-item]
 
 
 @contextmanager

@@ -8,7 +8,7 @@ fastmath: the whole point is the rounding error that algebra says is zero.
 
 from __future__ import annotations
 
-from numba import njit
+from .compilation import njit
 
 _SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
 

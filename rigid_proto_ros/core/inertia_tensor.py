@@ -6,9 +6,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.errors import TensorError
+
+from .compilation import njit
 
 TRIANGLE_SLACK_GIVEN = 1e-5
 """Given tensors may miss A + B ≥ C by this much of C: published ones are rounded to five or six digits."""

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.errors import InputError, MeshError, TensorError
 from rigid_proto_ros.core.inertia_tensor import (
@@ -20,6 +19,8 @@ from rigid_proto_ros.core.inertia_tensor import (
 )
 from rigid_proto_ros.core.moments import Moments, box_moments, point_moments, solid_moments
 from rigid_proto_ros.core.moments_shell import shell_moments
+
+from .compilation import njit
 
 INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
 """How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding

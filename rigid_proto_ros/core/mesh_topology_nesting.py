@@ -11,7 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from .compilation import njit
 
 WORK_LIMIT = 200_000_000
 """Triangle visits after which nesting or crossing is left undecided and said to be so: some seconds of work."""

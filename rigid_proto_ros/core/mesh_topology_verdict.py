@@ -6,10 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.mesh_topology import Topology, component_volumes, mesh_topology
 from rigid_proto_ros.core.mesh_topology_nesting import component_nesting
+
+from .compilation import njit
 
 INFO, WARNING, ERROR = "info", "warning", "error"
 MAX_NESTED_COMPONENTS = 2000

@@ -13,11 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.core.exact_arithmetic import pair_add, pair_divide, pair_multiply
 from rigid_proto_ros.core.moments_solid import blocked_sums, compensated_sums, joined_sums
+
+from .compilation import njit
 
 SMALL_MESH = 1024
 """Up to this many triangles the compensated sums cost well under a millisecond, so they are always taken."""

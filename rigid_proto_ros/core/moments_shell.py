@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.exact_arithmetic import pair_add
 from rigid_proto_ros.core.moments import Moments, as_arrays, central_moments, exact_reference
+
+from .compilation import njit
 
 
 @njit(cache=True, nogil=True)

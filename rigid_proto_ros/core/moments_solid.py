@@ -14,9 +14,10 @@ add up over a fine mesh. Both kernels return the raw sums of d, d s and d (s sáµ
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from rigid_proto_ros.core.exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
+
+from .compilation import njit
 
 BLOCK = 256
 """Triangles a block: its corners (18 KB) stay in the first-level cache, and its plain sum rounds at most 256 times."""

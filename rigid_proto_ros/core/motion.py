@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from .compilation import njit
 from .problem import (
     PRINCIPAL_AXES,
     PRINCIPAL_QUATERNION,

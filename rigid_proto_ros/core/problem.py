@@ -18,10 +18,10 @@ it is the even motion of the string's free end.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from . import loads as of_loads
 from .body import Body
+from .compilation import njit
 from .loads import LoadSum
 from .state import State
 from .string import Tied

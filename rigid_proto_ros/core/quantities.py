@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from .compilation import njit
 from .rotation import rotate
 
 QUANTITIES = {

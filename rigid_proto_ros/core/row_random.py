@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, uint32, uint64
+from numba import uint32, uint64
+
+from .compilation import njit
 
 _POOL = 4
 _LOW = uint64(0xFFFFFFFF)

@@ -57,7 +57,8 @@ MAX_BRACKETS = 100
 class CommandIntake:
     """apply_changes(changes) gives the Setup with parameters changed, as scheduled ``set`` entries need it.
 
-    received counts every message taken by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now; refusals are the simulation's.
+    received counts every message taken by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now;
+    refusals are the simulation's.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class CommandIntake:
         self._next_quiet_look_ns = 0
         self._next_publishers_look_ns = 0
         self._read_frames: dict[str, Frame] = {}
+        self._logger = node.get_logger()
         self._on_refusal = on_refusal
         group = TakenByHand()
 
@@ -87,7 +89,7 @@ class CommandIntake:
                 message_type,
                 f"~/{topic}",
                 lambda message: None,
-                qos.COMMAND,
+                qos.own(qos.COMMAND),
                 callback_group=group,
                 raw=True,
                 qos_overriding_options=qos.OVERRIDABLE,
@@ -225,6 +227,10 @@ class CommandIntake:
             self.late += 1
         elif counter == "wall_stamp":
             self.wall_stamp += 1
+            if self.wall_stamp == 1:
+                self._logger.warning(
+                    "a command is stamped by the system's clock: it acts now, as others like it will; stamps are simulated time"
+                )
         return when_ns
 
 

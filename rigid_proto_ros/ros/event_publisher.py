@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from xml.sax.saxutils import quoteattr
 
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
@@ -14,10 +13,9 @@ from .. import cdr
 from ..core.body import Body
 from ..core.commands import WrenchCommand
 from ..core.loads import Load
-from ..core.mass_properties import MassProperties
 from ..core.observer import BodySnapshot, Observer
-from ..inertial_export import urdf_inertial
 from . import qos
+from .robot_description import RobotDescription
 
 
 class EventPublisher(Observer):
@@ -25,14 +23,14 @@ class EventPublisher(Observer):
 
     def __init__(self, node: Node, body_frame: str, mesh_path: Callable[[], str]) -> None:
         def publisher(message_type, topic, profile):
-            return node.create_publisher(message_type, f"~/{topic}", profile, qos_overriding_options=qos.OVERRIDABLE)
+            return node.create_publisher(
+                message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE
+            )
 
-        self._body_frame = body_frame
         self._mesh_frame = f"{body_frame}/mesh"
-        self._mesh_path = mesh_path
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
         self._scene = publisher(String, "scene", qos.LATCHED)
-        self._description = publisher(String, "robot_description", qos.LATCHED)
+        self._description = RobotDescription(node, body_frame, mesh_path)
         self._applied = publisher(WrenchStamped, "applied", qos.EVENT)
         self._events = publisher(String, "events", qos.EVENT)
 
@@ -51,7 +49,7 @@ class EventPublisher(Observer):
         inertia.ixx, inertia.ixy, inertia.ixz = float(I[0, 0]), float(I[0, 1]), float(I[0, 2])
         inertia.iyy, inertia.iyz, inertia.izz = float(I[1, 1]), float(I[1, 2]), float(I[2, 2])
         self._inertia.publish(message)
-        self._description.publish(String(data=self._urdf(body)))
+        self._description.body_changed(body)
 
     def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
         """A wrench or poke as it took effect: its point settled on the body, its axes world or body."""
@@ -68,18 +66,3 @@ class EventPublisher(Observer):
     def hears_events(self) -> bool:
         """Somebody listens to the topic."""
         return self._events.get_subscription_count() > 0
-
-    def _urdf(self, body: BodySnapshot) -> str:
-        """The body as a URDF of one link at the COM, for viewers that draw robot descriptions."""
-        inertial = urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia), frame="com")
-        path = self._mesh_path()
-        visual = ""
-        if path:
-            origin = " ".join(f"{-c + 0.0:.17g}" for c in body.center_of_mass)
-            scale = " ".join(f"{s:.17g}" for s in body.scale)
-            mesh = f'<mesh filename={quoteattr("file://" + path)} scale="{scale}"/>'
-            visual = f'<visual><origin xyz="{origin}" rpy="0 0 0"/><geometry>{mesh}</geometry></visual>'
-        name = quoteattr(self._body_frame)
-        return (
-            f'<?xml version="1.0"?>\n<robot name={name}>\n<link name={name}>\n{inertial}{visual}\n</link>\n</robot>\n'
-        )

@@ -15,22 +15,21 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from ..core.commands import Change, ClearWrench, ReleaseString
+from ..core.commands import ClearWrench, ReleaseString
 from ..core.errors import CommandRefused, InputError
 from ..core.observer import Observer, Observers
 from ..offline import tell_start
-from ..parameters import is_ros_parameter, parameter_named
 from ..scenario import Scenario, check_inertia, make_scenario
 from .command_intake import TOPICS, CommandIntake
 from .diagnostics import REFUSAL_REASONS, Diagnostics
 from .event_publisher import EventPublisher
 from .flight import Flight
+from .live_parameters import LiveParameters
 from .node_name import NODE_NAME
-from .parameter_server import ParametersTogether, converted, declare_parameters, descriptor, is_read_only, ros_parameter
+from .parameter_server import declare_parameters
 from .physics_thread import PhysicsThread, step_over
 from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
-from .warm_up import warm_up
 
 
 class RigidBodyNode(Node):
@@ -55,7 +54,7 @@ class RigidBodyNode(Node):
         self.body_frame = scenario.values["body_frame"] or self.get_name()
         self._event_publisher = EventPublisher(self, self.body_frame, self._mesh_path)
         self._viewer = make_viewer(scenario, self.get_name())
-        self._recorder = self._open_recorder(scenario)
+        self._recorder = self.open_recorder(scenario)
         self.observer = self._observers()
         self.states = StatePublisher(self, self.world_frame, self.body_frame, self._specific_force)
         self.states.configure(scenario.values)
@@ -76,18 +75,17 @@ class RigidBodyNode(Node):
             self._apply_inertia,
             self._command_refused,
         )
-        self._parameters_guard = self.create_guard_condition(self._store_parameters)
+        self._live_parameters = LiveParameters(self)
         self.create_service(Trigger, "~/reset", _answering(self._on_reset))
         self.create_service(Trigger, "~/step", _answering(self._on_step))
         self.create_service(Trigger, "~/clear_wrench", _answering(self._on_clear_wrench))
         self.create_service(SetBool, "~/pause", _answering(self._on_pause))
         self.create_service(Trigger, "~/string/release", _answering(self._on_string_release))
-        self._parameter_services = ParametersTogether(self)
         offer_simulation_interfaces(self)
         self._diagnostics = Diagnostics(self, self._diagnostic_values)
         tell_start(self.observer, scenario)
         self.flight.simulation.announce()
-        self._tell_scene(scenario)
+        self.tell_scene(scenario)
 
     def call(self, function: Callable):
         """Run a function on the physics thread; returns what it returns. Raises InputError when that is too busy."""
@@ -106,7 +104,7 @@ class RigidBodyNode(Node):
     def _is_viewed(self) -> bool:
         return self._viewer is not None or self._recorder is not None
 
-    def _open_recorder(self, scenario: Scenario) -> Observer | None:
+    def open_recorder(self, scenario: Scenario) -> Observer | None:
         """The recorder that ``record`` asks for; raises InputError when its file can't be written."""
         path = scenario.values["record"]
         if not path:
@@ -118,7 +116,7 @@ class RigidBodyNode(Node):
     def _recording_failed(self, message: str) -> None:
         print(f"{self.get_name()}: {message}", file=sys.stderr)
 
-    def _switch_recording(self, recorder: Observer | None) -> None:
+    def switch_recording(self, recorder: Observer | None) -> None:
         """On the physics thread: the old recording is finished, the new one is told what flies."""
         finished, self._recorder = self._recorder, recorder
         self.observer = self._observers()
@@ -170,114 +168,21 @@ class RigidBodyNode(Node):
         mesh = self.flight.scenario.body_mesh
         return mesh.mesh.path if mesh else ""
 
-    def _tell_scene(self, scenario: Scenario) -> None:
+    def tell_scene(self, scenario: Scenario) -> None:
         self.observer.scene_changed(self.flight.simulation.time_ns, scenario.text)
 
     def _take_on(self, scenario: Scenario):
         self.flight.simulation.check_change(scenario.setup)
         self.flight.change(scenario)
-        self._tell_scene(scenario)
-        self._parameters_guard.trigger()
+        self.tell_scene(scenario)
+        self._live_parameters.changed()
         return scenario.setup
 
     # Parameters, on the executor's thread
 
     def set_parameters_atomically(self, parameter_list) -> SetParametersResult:
-        """Convert, check together, and hand over to the physics thread; a refusal leaves all as it was."""
-        return self._set(parameter_list)
-
-    def set_several(self, parameter_list) -> list[SetParametersResult]:
-        """What one ``set_parameters`` request brings, as ``ros2 param load`` sends a whole file: at once where all fit
-        together. Otherwise one by one, and the refused ones again after the others, so that their order doesn't matter.
-        """
-        if len(parameter_list) > 1 and self._set(parameter_list, counted=False).successful:
-            return [SetParametersResult(successful=True) for _ in parameter_list]
-        refused, before = list(range(len(parameter_list))), len(parameter_list) + 1
-        while 1 < len(refused) < before:
-            before = len(refused)
-            refused = [k for k in refused if not self._set([parameter_list[k]], counted=False).successful]
-        results = [SetParametersResult(successful=True) for _ in parameter_list]
-        for k in refused:
-            results[k] = self._set([parameter_list[k]])
-        return results
-
-    def _set(self, parameter_list, counted: bool = True) -> SetParametersResult:
-        """counted: a refusal goes to the counters."""
-        try:
-            parameter_list = converted(parameter_list)
-        except InputError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        # A dump of this very node is no change of what can't change.
-        fixed = [p for p in parameter_list if is_read_only(p.name)]
-        other = [p.name for p in fixed if not self.has_parameter(p.name) or not _same(self.get_parameter(p.name), p)]
-        if other:
-            return SetParametersResult(successful=False, reason=f"{', '.join(other)}: can be set at start only")
-        parameter_list = [p for p in parameter_list if p not in fixed]
-        changes = {p.name: p.value for p in parameter_list if not is_ros_parameter(p.name)}
-        if "density" in changes and "mass" not in changes:
-            changes["mass"] = 0.0
-            parameter_list = [*parameter_list, *self._as_ros({"mass": 0.0})]
-        try:
-            if changes:
-                self._change(changes, counted)
-        except InputError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        self._declare_new(changes)
-        return super().set_parameters_atomically(parameter_list)
-
-    def _declare_new(self, changes: dict) -> None:
-        """A ballast that comes along in flight."""
-        for name, value in changes.items():
-            if not self.has_parameter(name):
-                self.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
-
-    def _change(self, changes: dict, counted: bool) -> None:
-        # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
-        present = self.flight.scenario
-        planned = present.with_changes(changes)
-        if planned.setup.integrator is not present.setup.integrator:
-            self._warm_up(planned)
-        recorder = None
-        if "record" in changes:
-            if changes["record"] == present.values["record"]:
-                changes = {name: value for name, value in changes.items() if name != "record"}
-            else:
-                recorder = self._open_recorder(planned)
-
-        def change() -> None:
-            scenario = self.flight.scenario.with_changes(changes)
-            try:
-                self.flight.simulation.check_change(scenario.setup)
-            except CommandRefused as refusal:
-                if counted:
-                    self.flight.simulation.refuse(refusal)
-                raise
-            self.flight.change(scenario)
-            self.flight.simulation.submit(Change(changes, lambda: scenario.setup))
-            self._tell_scene(scenario)
-
-        self.call(change)
-        if "record" in changes:
-            self.call(lambda: self._switch_recording(recorder))
-        self.states.configure(self.flight.scenario.values)
-
-    def _warm_up(self, scenario: Scenario) -> None:
-        try:
-            warm_up(scenario.setup)
-        except CommandRefused:
-            pass  # what acts now decides whether it is refused, and that is counted
-
-    def _store_parameters(self) -> None:
-        """Bring the ROS parameters up to what scheduled commands and inertia messages have changed."""
-        values = self.flight.scenario.values
-        self._declare_new(values)
-        behind = {n: v for n, v in values.items() if _plain(self.get_parameter(n).value) != v}
-        if behind:
-            super().set_parameters_atomically(self._as_ros(behind))
-            self.states.configure(values)
-
-    def _as_ros(self, values: dict) -> list:
-        return [ros_parameter(parameter_named(name), value) for name, value in values.items()]
+        """rclpy's way for all changes: checked, and handed to the physics thread."""
+        return self._live_parameters.set_together(parameter_list)
 
     # Services, on the executor's thread
 
@@ -310,12 +215,14 @@ class RigidBodyNode(Node):
     def _diagnostic_values(self) -> dict:
         flight, intake = self.flight, self.intake
         simulation, timekeeping = flight.simulation, flight.timekeeping
+        # First: whatever happened up to then is counted in what follows.
+        time_ns = simulation.time_ns
         momentum = simulation.angular_momentum
         # Counted last by the physics thread, so read first: who finds a message received finds its refusal too.
         received = dict(intake.received)
         refused = dict(simulation.refused)
         return {
-            "sim_time_ns": simulation.time_ns,
+            "sim_time_ns": time_ns,
             "publish_rate": flight.scenario.values["publish_rate"],
             "overruns": timekeeping.overruns,
             "real_time_lost_s": timekeeping.real_time_lost_s,
@@ -339,16 +246,6 @@ class RigidBodyNode(Node):
             "recording": "" if getattr(self._recorder, "error", "") else flight.scenario.values["record"],
             "warning": simulation.failure or simulation.too_coarse,
         }
-
-
-def _same(one, other) -> bool:
-    """Whether two ROS parameters have the same value."""
-    return _plain(one.value) == _plain(other.value)
-
-
-def _plain(value):
-    """rclpy keeps arrays of doubles as array.array."""
-    return value if isinstance(value, (str, bool, int, float)) else list(value)
 
 
 def _answering(callback: Callable) -> Callable:

@@ -6,7 +6,6 @@ from __future__ import annotations
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.parameter_service import ParameterService
 
 from .. import parameters
 from ..core.errors import InputError
@@ -20,15 +19,6 @@ _TYPES = {
     "string": ParameterType.PARAMETER_STRING,
 }
 _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
-
-
-class ParametersTogether(ParameterService):
-    """rclpy's parameter services, but for ``set_parameters``: what one request brings goes to the node's ``set_several``."""
-
-    def _set_parameters_callback(self, request, response):
-        given = [RosParameter.from_parameter_msg(message) for message in request.parameters]
-        response.results = self._get_node().set_several(given)
-        return response
 
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
@@ -23,3 +25,8 @@ CLOCK = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=Reliabi
 TF = QoSProfile(depth=100, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
 
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
+
+
+def own(profile: QoSProfile) -> QoSProfile:
+    """A copy for one topic: rclpy writes what a user overrides into the very profile that it is given."""
+    return copy(profile)

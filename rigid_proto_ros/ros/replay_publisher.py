@@ -138,7 +138,7 @@ def _send_states(node, session: RecordedSession, speed: float) -> None:
         publisher, pack = senders[name]
         publisher.publish(pack(time_ns, streams[name].rows[k].tolist()))
     for publisher, _ in senders.values():
-        publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
+        publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=10.0))
 
 
 def _streams(session: RecordedSession) -> dict[str, StampedRows]:

@@ -31,15 +31,24 @@ SEND_AHEAD_NS = 60 * 1_000_000_000
 STALLED_S = 15.0
 """A node that confirms nothing for this long is gone, or receives nothing."""
 
+STANDSTILL_REPORTS = 3
+"""Simulated time that so many reports find unmoved is paused by somebody, or follows a clock that stands."""
+
+BURST_S = 0.5
+"""Reports that have waited in the queue come together: of so many seconds the last one counts; the node makes one a second."""
+
 
 @dataclass(frozen=True)
 class Report:
-    """sent: messages by topic. late, refused: what the node's counters rose by meanwhile."""
+    """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``. last_ns: when the
+    last command acts.
+    """
 
     sent: dict[str, int]
     late: int
     refused: int
     last_ns: int
+    reached_ns: int
 
     @property
     def all_in_time(self) -> bool:
@@ -49,7 +58,10 @@ class Report:
     def text(self) -> str:
         """One line for the terminal."""
         parts = ", ".join(f"{count} {topic}" for topic, count in self.sent.items() if count) or "nothing"
-        return f"sent {parts}; {self.late} late, {self.refused} refused; the last acts at {self.last_ns / 1e9:.6g} s"
+        text = f"sent {parts}; {self.late} late, {self.refused} refused; the last acts at {self.last_ns / 1e9:.6g} s"
+        if sum(self.sent.values()) and self.reached_ns <= self.last_ns:
+            text += f", but simulated time stands still at {self.reached_ns / 1e9:.6g} s"
+        return text
 
 
 class ScriptSender(Node):
@@ -59,6 +71,7 @@ class ScriptSender(Node):
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self.target = node_name if node_name.startswith("/") else f"/{node_name}"
         self._counters: dict[str, str] = {}
+        self._reports = 0
         self._simulated_ns: int | None = None
         self._get_parameters: Client | None = None
         publisher = self.create_publisher
@@ -75,7 +88,7 @@ class ScriptSender(Node):
         self._wait_for_node(timeout_s)
 
     def send(self, script: list[ScriptCommand], reset: bool = False, lead_s: float = 0.2) -> Report:
-        """Send all commands, each stamped with the simulated time at which it acts."""
+        """Send all commands, each stamped with the simulated time at which it acts, and wait until all have acted."""
         script = with_contacts(script, self._contacts(script))
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
@@ -100,10 +113,13 @@ class ScriptSender(Node):
         self._confirm(len(script))
         if paused:
             self._call(self._pause_client, SetBool.Request(data=False))
+        last_ns = start_ns + (script[-1].t_ns if script else 0)
+        if script:
+            self._wait_until_acted(last_ns)
         self._show("")
-        # The counters of the same report that confirmed the last command.
+        # All of one report: what it has reached, it has counted.
         late, refused = (int(self._counters[k]) - int(before[k]) for k in ("late", "refused_total"))
-        return Report(sent, late, refused, start_ns + (script[-1].t_ns if script else 0))
+        return Report(sent, late, refused, last_ns, self._reported_ns())
 
     def _contacts(self, script: list[ScriptCommand]) -> dict[str, tuple]:
         """The contacts that the script ties strings to, as the node has them."""
@@ -141,6 +157,7 @@ class ScriptSender(Node):
         for status in message.status:
             if status.name == f"{self.target}: simulation":
                 self._counters = {v.key: v.value for v in status.values}
+                self._reports += 1
 
     def _now_ns(self) -> int:
         """Simulated time of a state published from now on."""
@@ -159,7 +176,7 @@ class ScriptSender(Node):
         """Wait while too much is unconfirmed, or the command lies too far ahead to be sent."""
         if number - self._confirmed() >= MAX_UNCONFIRMED:
             self._confirm(number - MAX_UNCONFIRMED + 1)
-        while stamp_ns > int(self._counters["sim_time_ns"]) + SEND_AHEAD_NS:
+        while stamp_ns > self._reported_ns() + SEND_AHEAD_NS:
             rclpy.spin_once(self, timeout_sec=0.5)
             self._show(f"sent {number}, waiting for simulated time")
 
@@ -169,6 +186,26 @@ class ScriptSender(Node):
     def _confirm(self, count: int) -> None:
         if count:
             self._spin_until(lambda: self._confirmed() >= count, f"{self.target} to confirm {count} commands")
+
+    def _wait_until_acted(self, last_ns: int) -> None:
+        """Until a report from after the last command: only there a ray meets the body or misses it. Not for ever where
+        simulated time doesn't get there.
+        """
+        unmoved = 0
+        while (before_ns := self._reported_ns()) <= last_ns and unmoved < STANDSTILL_REPORTS:
+            self._show(f"all sent, waiting for {last_ns / 1e9:.6g} s of simulated time")
+            number, end = self._reports, time.monotonic() + BURST_S
+            self._spin_until(
+                lambda number=number, end=end: (
+                    self._reported_ns() > last_ns or (self._reports > number and time.monotonic() > end)
+                ),
+                f"a report of {self.target}",
+            )
+            unmoved = unmoved + 1 if self._reported_ns() == before_ns else 0
+
+    def _reported_ns(self) -> int:
+        """Simulated time of the last report."""
+        return int(self._counters["sim_time_ns"])
 
     def _call(self, client, request) -> None:
         future = client.call_async(request)

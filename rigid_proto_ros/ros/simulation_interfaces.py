@@ -42,12 +42,10 @@ class SimulationInterfaces:
             self._node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
 
     def get_simulator_features(self, request, response):
-        """What is really supported, and nothing else."""
+        """What is really supported, and nothing else: the features of single scopes mean that a reset takes them alone."""
         features = self._messages.SimulatorFeatures
         response.features.features = [
             features.SIMULATION_RESET,
-            features.SIMULATION_RESET_TIME,
-            features.SIMULATION_RESET_STATE,
             features.SIMULATION_STATE_GETTING,
             features.SIMULATION_STATE_SETTING,
             features.SIMULATION_STATE_PAUSE,
@@ -56,7 +54,8 @@ class SimulationInterfaces:
         ]
         response.features.spawn_formats = []
         response.features.custom_info = (
-            "One rigid body, set by parameters. A step is one publication period. Time and state are reset together."
+            "One rigid body, set by parameters, which a reset keeps. A step is one publication period. "
+            "Time and state are reset together: SCOPE_ALL."
         )
         return response
 

@@ -32,7 +32,9 @@ class StatePublisher:
         self._frames = world_frame, body_frame
 
         def publisher(message_type, topic):
-            return node.create_publisher(message_type, f"~/{topic}", qos.STATE, qos_overriding_options=qos.OVERRIDABLE)
+            return node.create_publisher(
+                message_type, f"~/{topic}", qos.own(qos.STATE), qos_overriding_options=qos.OVERRIDABLE
+            )
 
         self._pose = publisher(PoseStamped, "pose")
         self._twist = publisher(TwistStamped, "twist")

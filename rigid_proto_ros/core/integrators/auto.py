@@ -19,8 +19,8 @@ import math
 from types import ModuleType
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from ..motion import damping_functions
 from ..problem import (
     ACCELERATION_ADDED,

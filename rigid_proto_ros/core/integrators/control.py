@@ -8,7 +8,8 @@ changes the steps.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compilation import njit
 
 ACCURACY = 0  # local error rate asked for [1/s]
 DEGREE = 1  # of the series

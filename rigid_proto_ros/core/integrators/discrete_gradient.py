@@ -24,8 +24,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from ..motion import HAND_WORK, HEAT, LOW
 from ..problem import (
     ACCELERATION_ADDED,

@@ -8,8 +8,8 @@ II.10. The one for large steps under loads of any kind; not conservative, and us
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from . import slack
 from .dop853_tableau import STAGES, WEIGHTS
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from ..compilation import njit
 
 SMALL_ARGUMENT = 0.03
 """Below it the Maclaurin series of sn, cut after u⁹, errs by 2e-19 (for m = 1 the next term is 0.0089 u¹¹)."""

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,

@@ -8,8 +8,7 @@ section II.1. Energy grows steadily; with ``gyroscopic: false`` it is the paper'
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compilation import njit
 from . import slack
 from .equations import accelerations
 from .gram_schmidt import columns, orthonormal, quaternion_near, turned

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..problem import MOMENTS
 from .free_body_step import free_step
 from .integrator import MAX_SPEED, Integrator

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..problem import MOMENTS, TRANSLATES
 from .free_body_step import free_step
 from .integrator import LOADS, Integrator

@@ -29,8 +29,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
 from ..rotation import multiply, normalize
 from .elliptic import carlson_rj, complete_quarter_period, sn_cn_dn

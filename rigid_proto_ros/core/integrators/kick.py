@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compilation import njit
 from ..motion import damping_functions
 from ..problem import (
     ACCELERATION_ADDED,

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..exact_arithmetic import fast_two_sum, two_product, two_sum
 from ..motion import LOW
 from ..problem import ATTACH, REST_LENGTH, STRING_START

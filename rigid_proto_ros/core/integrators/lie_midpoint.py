@@ -8,8 +8,7 @@ proof of a right motion.
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compilation import njit
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,

@@ -8,8 +8,7 @@ section II.1. With ``gyroscopic: false`` it is the paper's eq. 9.
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compilation import njit
 from . import slack
 from .equations import accelerations
 from .gram_schmidt import columns, orthonormal, quaternion_near, turned

@@ -15,9 +15,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from ..problem import MOMENTS
+from ..compilation import njit
+from ..problem import DAMPING_ANGULAR, MOMENTS
 from ..rotation import multiply, normalize
 
 MAX_ITERATIONS = 60
@@ -61,13 +60,15 @@ def gyroscopic_torque(ox, oy, oz, p):
 def newton_correction(ox, oy, oz, rx, ry, rz, h, p, extra, ax, ay, az):
     """δ with J δ = −residual r of 2I(ω̄ − ω) − h(...) = 0.
 
-    J = 2I + h([ω̄]× I − [Iω̄]×) + ``extra`` (|a|² 1 − a aᵀ): the gyroscopic term exactly, a string at arm a as a spring.
+    J = 2I + h([ω̄]× I − [Iω̄]× + c) + ``extra`` (|a|² 1 − a aᵀ): gyroscopic term and damping exactly (its torque is −c ω̄ in the
+    axes of the start too), a string at arm a as a spring.
     """
+    damping = h * p[DAMPING_ANGULAR]
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     size = ax * ax + ay * ay + az * az
-    j00 = 2.0 * A + extra * (size - ax * ax)
-    j11 = 2.0 * B + extra * (size - ay * ay)
-    j22 = 2.0 * C + extra * (size - az * az)
+    j00 = 2.0 * A + damping + extra * (size - ax * ax)
+    j11 = 2.0 * B + damping + extra * (size - ay * ay)
+    j22 = 2.0 * C + damping + extra * (size - az * az)
     # Row i of ω̄ × Iω̄ differentiated; for instance (C − B) ω̄₂ω̄₃.
     j01, j02 = h * (C - B) * oz - extra * ax * ay, h * (C - B) * oy - extra * ax * az
     j10, j12 = h * (A - C) * oz - extra * ax * ay, h * (A - C) * ox - extra * ay * az

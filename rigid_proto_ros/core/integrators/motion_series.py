@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..motion import LOW
 from ..problem import (
     ACCELERATION_ADDED,

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from ..problem import DAMPING_ANGULAR, GYROSCOPIC, HAS_WORLD_TORQUE, MOMENTS, TORQUE_BODY, TRANSLATES
 from ..rotation import normalize
 from . import slack

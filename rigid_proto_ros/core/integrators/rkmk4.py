@@ -8,8 +8,7 @@ the attitude by construction; energy still drifts with h⁵ per step.
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compilation import njit
 from ..rotation import multiply, normalize
 from . import slack
 from .equations import accelerations

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..compilation import njit
 from ..motion import VARIABLES
 from ..problem import HAS_STRING, HAS_WORLD_TORQUE, TRANSLATES
 from ..rotation import normalize

@@ -8,8 +8,7 @@ gyroscopic term is taken explicitly, so a spinning body gains energy.
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compilation import njit
 from ..rotation import multiply, normalize
 from . import slack
 from .equations import accelerations

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from ..motion import HEAT, STORED
 from ..problem import BILATERAL, HAS_STRING, STIFFNESS
 from . import control as ctl

@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from ..motion import HEAT
 from ..problem import STIFFNESS
 from .equations import stretch, tension_margin

@@ -10,8 +10,8 @@ the series diverges.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,

@@ -11,8 +11,8 @@ import functools
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from . import control as ctl
 from .error_measure import FLOOR, WEIGHINGS, heavier, scales
 from .runge_kutta import is_good

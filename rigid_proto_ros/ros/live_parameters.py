@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""Parameters that change in flight: checked together, handed to the physics thread, and brought up to what commands changed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
+
+from ..core.commands import Change
+from ..core.errors import CommandRefused, InputError
+from ..parameters import is_ros_parameter, parameter_named
+from ..scenario import Scenario
+from .parameter_server import converted, descriptor, is_read_only, ros_parameter
+from .warm_up import warm_up
+
+if TYPE_CHECKING:
+    from .node import RigidBodyNode
+
+
+class LiveParameters:
+    """Serves the parameter services of a node. All but ``changed`` runs on the executor's thread."""
+
+    def __init__(self, node: RigidBodyNode) -> None:
+        self._node = node
+        self._behind = node.create_guard_condition(self._follow)
+        self._services = _ParameterServices(node, self)
+
+    def changed(self) -> None:
+        """From any thread: a command has changed what parameters say."""
+        self._behind.trigger()
+
+    def set_together(self, parameters: list[Parameter], counted: bool = True) -> SetParametersResult:
+        """Convert, check together, and hand over to the physics thread; a refusal leaves all as it was.
+
+        counted: a refusal goes to the counters.
+        """
+        try:
+            parameters = converted(parameters)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        # A dump of this very node is no change of what can't change.
+        fixed = [p for p in parameters if is_read_only(p.name)]
+        other = [p.name for p in fixed if not self._is_in_force(p)]
+        if other:
+            return SetParametersResult(successful=False, reason=f"{', '.join(other)}: can be set at start only")
+        parameters = [p for p in parameters if p not in fixed]
+        changes = {p.name: p.value for p in parameters if not is_ros_parameter(p.name)}
+        if "density" in changes and "mass" not in changes:
+            changes["mass"] = 0.0
+            parameters = [*parameters, *_as_ros({"mass": 0.0})]
+        try:
+            if changes:
+                self._change(changes, counted)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return self._store(parameters, changes)
+
+    def set_several(self, parameters: list[Parameter]) -> list[SetParametersResult]:
+        """What one ``set_parameters`` request brings, as ``ros2 param load`` sends a whole file: at once where all fit
+        together. Otherwise one by one, and the refused ones again after the others, so that their order doesn't matter.
+        """
+        if len(parameters) > 1 and self.set_together(parameters, counted=False).successful:
+            return [SetParametersResult(successful=True) for _ in parameters]
+        refused, before = list(range(len(parameters))), len(parameters) + 1
+        while 1 < len(refused) < before:
+            before = len(refused)
+            refused = [k for k in refused if not self.set_together([parameters[k]], counted=False).successful]
+        results = [SetParametersResult(successful=True) for _ in parameters]
+        for k in refused:
+            results[k] = self.set_together([parameters[k]])
+        return results
+
+    def _change(self, changes: dict, counted: bool) -> None:
+        # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
+        node, flight = self._node, self._node.flight
+        present = flight.scenario
+        planned = present.with_changes(changes)
+        if planned.setup.integrator is not present.setup.integrator:
+            _warm_up(planned)
+        recorder = None
+        if "record" in changes:
+            if changes["record"] == present.values["record"]:
+                changes = {name: value for name, value in changes.items() if name != "record"}
+            else:
+                recorder = node.open_recorder(planned)
+
+        def change() -> None:
+            scenario = flight.scenario.with_changes(changes)
+            try:
+                flight.simulation.check_change(scenario.setup)
+            except CommandRefused as refusal:
+                if counted:
+                    flight.simulation.refuse(refusal)
+                raise
+            flight.change(scenario)
+            flight.simulation.submit(Change(changes, lambda: scenario.setup))
+            node.tell_scene(scenario)
+
+        node.call(change)
+        if "record" in changes:
+            node.call(lambda: node.switch_recording(recorder))
+        node.states.configure(flight.scenario.values)
+
+    def _follow(self) -> None:
+        """Bring the ROS parameters up to what scheduled commands and inertia messages have changed."""
+        values = self._node.flight.scenario.values
+        behind = {name: value for name, value in values.items() if not self._is_in_force(_as_ros({name: value})[0])}
+        if behind:
+            self._store(_as_ros(behind), behind)
+            self._node.states.configure(values)
+
+    def _store(self, parameters: list[Parameter], values: dict) -> SetParametersResult:
+        """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""
+        for name, value in values.items():
+            if not self._node.has_parameter(name):
+                self._node.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
+        return Node.set_parameters_atomically(self._node, parameters)
+
+    def _is_in_force(self, parameter: Parameter) -> bool:
+        """Whether the node has that parameter, with that value."""
+        name = parameter.name
+        return self._node.has_parameter(name) and _plain(self._node.get_parameter(name).value) == _plain(
+            parameter.value
+        )
+
+
+class _ParameterServices(ParameterService):
+    """rclpy's parameter services, but for ``set_parameters``, whose requests are taken as a whole."""
+
+    def __init__(self, node: Node, parameters: LiveParameters) -> None:
+        super().__init__(node)
+        self._parameters = parameters
+
+    def _set_parameters_callback(self, request, response):
+        given = [Parameter.from_parameter_msg(message) for message in request.parameters]
+        response.results = self._parameters.set_several(given)
+        return response
+
+
+def _warm_up(scenario: Scenario) -> None:
+    try:
+        warm_up(scenario.setup)
+    except CommandRefused:
+        pass  # what acts now decides whether it is refused, and that is counted
+
+
+def _as_ros(values: dict) -> list[Parameter]:
+    return [ros_parameter(parameter_named(name), value) for name, value in values.items()]
+
+
+def _plain(value):
+    """rclpy keeps arrays of doubles as array.array."""
+    return value if isinstance(value, (str, bool, int, float)) else list(value)
