@@ -57,7 +57,7 @@ def browser(bench) -> Iterator:
 
 @pytest.fixture(scope="module")
 def ear(bench) -> Iterator[Ear]:
-    ear = Ear(bench.environment)
+    ear = Ear(bench.environment, wait=bench.wait)
     ear.until(lambda: ear.heard("pose", last=1), "a state")
     yield ear
     ear.close()
@@ -69,7 +69,6 @@ LINKED = "- {t: 0.25, at: {point: [0.1, 0.0, 0.05]}, force: [0.0, 0.5, 0.0]}\n"
 @pytest.fixture(scope="module")
 def linked_page(bench, browser, ear) -> Page:
     """The page, opened with a link to a teapot under light gravity that is poked after a quarter of a second."""
-    bench.wait()
     link = encode(kept_scene(read_scene("teapot", {"gravity": [0.0, 0.0, -1.0]})), LINKED)
     return Page(browser, f"{bench.address}/?{link}")
 

@@ -180,8 +180,10 @@ class Page:
 class Ear(RosClient):
     """Listens to the node of a bench."""
 
-    def __init__(self, environment: dict[str, str], node: str = "/rigid_body") -> None:
+    def __init__(self, environment: dict[str, str], node: str = "/rigid_body", wait=lambda: None) -> None:
+        """wait(): until the node is there, while the client's own process starts."""
         super().__init__(environment, node)
+        wait()
         self.listen("pose", "events", "scene")
 
     def event(self, kind: str, after: int = 0) -> dict:
