@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Real nodes and ROS clients as processes, for tests of commands. Each is ended by its own pid."""
+"""Real nodes and ROS clients as processes, for tests. Each is ended by its own pid."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -10,6 +11,8 @@ import time
 from pathlib import Path
 
 from ros_process import READY_S, RosProcess
+
+from rigid_proto_ros.core.rotation import rotate
 
 TEST_FOLDER = Path(__file__).parent
 TYPES = {
@@ -30,6 +33,7 @@ TYPES = {
     "robot_description": "String",
 }
 COMMANDS = ("wrench", "poke", "string/target", "string/attach", "inertia/set", "schedule")
+STATES = ("pose", "twist")
 LATCHED = ("inertia", "scene", "robot_description")
 
 
@@ -96,6 +100,18 @@ class RosClient:
         )
         self.node = node
 
+    def __enter__(self) -> RosClient:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    def meet(self) -> None:
+        """Hear the node's states and reports from now on, and be ready to command it."""
+        self.listen(*STATES)
+        self.watch_diagnostics()
+        self.advertise(*COMMANDS)
+
     def send(self, do: str, **job) -> None:
         """Ask for something without waiting for the answer; ``answer`` fetches it."""
         self.process.stdin.write(json.dumps({"do": do, **job}) + "\n")
@@ -150,7 +166,7 @@ class RosClient:
         return self.set_named({n.replace("__", "."): v for n, v in values.items()}, atomically)
 
     def set_named(self, values: dict, atomically: bool = False) -> list:
-        pairs = [[name, _doubles(value)] for name, value in values.items()]
+        pairs = [[name, _alike(value)] for name, value in values.items()]
         return self.do("set_parameters", node=self.node, values=pairs, atomically=atomically)
 
     def get(self, *names: str) -> dict:
@@ -207,6 +223,38 @@ class RosClient:
         """The stamp of the newest state heard on pose."""
         return stamp_ns(self.until(lambda: self.heard("pose", last=1), "a state")[-1])
 
+    def runs(self) -> int:
+        """How often simulated time has begun anew in the states heard, on every topic."""
+        stamps = [self.do("stamps", topic=self.name(topic)) for topic in STATES]
+        return min(sum(b < a for a, b in itertools.pairwise(own)) for own in stamps)
+
+    def reset(self) -> None:
+        """Time 0, and states heard that were published since; some must have been heard before."""
+        self.fly_until(1)
+        before = self.runs()
+        assert self.trigger("reset")["success"]
+        self.until(lambda: self.runs() > before, "states since the reset")
+
+    def fly_until(self, time_ns: int) -> None:
+        """Wait until the newest states heard have reached ``time_ns``."""
+
+        def reached() -> bool:
+            newest = [self.heard(topic, last=1) for topic in STATES]
+            return all(messages and stamp_ns(messages[0]) >= time_ns for messages in newest)
+
+        self.until(reached, f"states at {time_ns} ns")
+
+    def rows(self) -> dict[str, dict[int, list[float]]]:
+        """Pose [p, q] and twist [v, ω] heard since simulated time last began anew, by stamp [ns]."""
+        found: dict[str, dict[int, list[float]]] = {topic: {} for topic in STATES}
+        for topic, parts in (("pose", ("position", "orientation")), ("twist", ("linear", "angular"))):
+            for message in self.heard(topic):
+                time_ns = stamp_ns(message)
+                if found[topic] and time_ns < max(found[topic]):
+                    found[topic].clear()
+                found[topic][time_ns] = [x for part in parts for x in message[topic][part].values()]
+        return found
+
     def close(self) -> None:
         self.process.stdin.close()
         try:
@@ -216,10 +264,16 @@ class RosClient:
             self.process.wait()
 
 
-def _doubles(value):
-    """Lists of numbers as lists of doubles: rclpy takes no mixed ones."""
-    numbers = isinstance(value, (list, tuple)) and all(type(x) in (int, float) for x in value)
-    return [float(x) for x in value] if numbers else value
+def _alike(value):
+    """A list of whole numbers and doubles as one of doubles: rclpy takes no mixed ones."""
+    mixed = isinstance(value, (list, tuple)) and {type(x) for x in value} == {int, float}
+    return [float(x) for x in value] if mixed else value
+
+
+def published(row) -> tuple[list[float], list[float]]:
+    """What pose and twist carry for a state row (13,)."""
+    row = row.tolist()
+    return row[:7], [*row[7:10], *rotate(*row[3:7], *row[10:13])]
 
 
 def _text(value) -> str:

@@ -122,6 +122,10 @@ class Client:
         for topic in topics:
             self.received[topic].clear()
 
+    def stamps(self, topic):
+        """Stamps of what has come on a topic [ns]."""
+        return [stamp_ns(m) for m in list(self.received[topic])]
+
     def heard_count(self, topic):
         """How many messages have come on a topic."""
         return len(self.received[topic])

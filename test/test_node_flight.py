@@ -5,9 +5,9 @@ import json
 import signal
 
 import pytest
+from command_rig import RosClient, published
 from conftest import needs_rerun
-from node_client import NodeClient, published
-from ros_process import RosProcess, dds_client, run, running_node
+from ros_process import READY_S, RosProcess, dds_client, run, running_node
 
 from rigid_proto_ros.bundled import example_path, scene_path
 from rigid_proto_ros.core.commands import WrenchCommand
@@ -43,19 +43,22 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
         ["string/attach", 2 * SECOND, "rigid_body/mesh", [0.0, 0.0, 0.07]],
         ["string/target", 2 * SECOND + 1, "world", [0.02, 0.01, 0.1]],
         ["string/target", 2 * SECOND + 200_000_000, "world", [0.03, 0.0, 0.12]],
+        # Both taken onto the surface from where they are off it.
+        ["string/attach", 2 * SECOND + 500_000_000, "body", [0.0, 0.03, 0.05]],
+        ["string/attach", 2 * SECOND + 800_000_000, "world", [0.1, -0.2, 0.05]],
     ]
     arguments = ["--ros-args", "--params-file", scene, "-p", "publish_rate:=50", "-p", "real_time_factor:=3"]
     # Paused until they are all there.
     arguments += ["-p", "start_paused:=true"]
-    with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
+    with (
+        RosClient(ros_environment) as client,
+        running_node(*arguments, environment=ros_environment, log=tmp_path / "node"),
+    ):
         outside = dds_client(ros_environment, "rigid_body", commands, 6 * SECOND)
-        client = NodeClient(ros_environment)
-        try:
-            client.received(len(commands))
-            client.pause(False)
-        finally:
-            client.close()
-        output, errors = outside.communicate(timeout=180)
+        client.watch_diagnostics()
+        client.until_received(len(commands))
+        client.pause(False)
+        output, errors = outside.communicate(timeout=READY_S)
     assert outside.returncode == 0, errors
     found = json.loads(output.splitlines()[-1])
     found = {topic: {int(ns): row for ns, row in rows.items()} for topic, rows in found.items()}
@@ -82,29 +85,25 @@ def test_poke_client_and_simulate_give_one_motion_and_the_recording_verifies(ros
     scene, session = scene_path("t_handle"), tmp_path / "session.rrd"
     scripts = [example_path(n) for n in ("flip_and_poke", "same_force_three_ways", "heavier_in_flight")]
     arguments = ["--ros-args", "--params-file", scene, "-p", f"record:={session}", "-p", "publish_rate:=25"]
-    with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
-        client = NodeClient(ros_environment)
-        try:
-            for script in scripts:
-                client.set(real_time_factor=1.0)
-                client.set(density=7850.0, gravity=[0.0, 0.0, 0.0])
-                client.pause(True)
-                client.set(real_time_factor=8.0)
-                # So that nothing from the run before carries a later stamp than this one's.
-                client.trigger("reset")
-                client.fresh_diagnostics(lambda values: values["sim_time_ns"] == "0")
-                client.states.clear()
-                poker = RosProcess(
-                    "poke_client", script, "--reset", environment=ros_environment, log=tmp_path / "poker"
-                )
-                client.spin_until(lambda ended=poker.process.poll: ended() is not None, "end of poke_client")
-                assert poker.end() == 0, poker.output + poker.errors
-                assert "0 late, 0 refused" in poker.output
-                found = client.fly_until(9 * SECOND)
-                offline = OfflineRun(read_scene(str(scene), {"publish_rate": 25.0}), read_script(script))
-                check_states(found, offline, 100)
-        finally:
-            client.close()
+    with (
+        RosClient(ros_environment) as client,
+        running_node(*arguments, environment=ros_environment, log=tmp_path / "node"),
+    ):
+        client.meet()
+        for script in scripts:
+            client.set(real_time_factor=1.0)
+            client.set(density=7850.0, gravity=[0.0, 0.0, 0.0])
+            client.pause(True)
+            client.set(real_time_factor=8.0)
+            # So that nothing from the run before carries a later stamp than this one's.
+            client.reset()
+            client.forget("pose", "twist")
+            poker = run("poke_client", script, "--reset", "--timeout", 120, environment=ros_environment)
+            assert poker.returncode == 0, poker.stdout + poker.stderr
+            assert "0 late, 0 refused" in poker.stdout
+            client.fly_until(9 * SECOND)
+            offline = OfflineRun(read_scene(str(scene), {"publish_rate": 25.0}), read_script(script))
+            check_states(client.rows(), offline, 100)
     recorded = read_session(session)
     assert recorded.complete and len(recorded.times) > 200
     assert run("rigid_proto", "replay", session, "--verify", environment=ros_environment).returncode == 0

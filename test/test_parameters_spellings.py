@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from node_client import NodeClient
+from command_rig import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.core.errors import InputError
@@ -105,20 +105,19 @@ def test_the_node_takes_every_spelling_from_files_the_command_line_and_services(
     path.write_text(scene_lines(lambda v: f'"{v}"' if next(spellings) % 2 else str(v)), encoding="utf-8")
     line = ["-p", "linear_damping:=2", "-p", "gravity:=[0, 0, 3]", "-p", 'angular_damping:="1e-3"']
     arguments = ["--ros-args", "--params-file", path, *line]
-    with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
-        client = NodeClient(ros_environment)
-        try:
-            for parameter in filter(settable, NUMERIC):
-                expected = {"linear_damping": 2.0, "gravity": [0.0, 0.0, 3.0], "angular_damping": 1e-3}
-                value = expected.get(parameter.name, parameter.convert(whole(parameter)))
-                assert client.get(parameter.name) == [value], parameter.name
-            for parameter in filter(settable, NUMERIC):
-                if parameter.changes == READ_ONLY or parameter.name == "density":
-                    continue
-                value = whole(parameter)
-                for spelling in (value, str(value), str(mixed(value)) if isinstance(value, list) else mixed(value)):
-                    (result,) = client.set(**{parameter.name.replace(".", "__"): spelling})
-                    assert result.successful, (parameter.name, spelling, result.reason)
-                    assert client.get(parameter.name) == [parameter.convert(value)]
-        finally:
-            client.close()
+    with (
+        RosClient(ros_environment) as client,
+        running_node(*arguments, environment=ros_environment, log=tmp_path / "node"),
+    ):
+        read = client.get(*(p.name for p in NUMERIC if settable(p)))
+        given = {"linear_damping": 2.0, "gravity": [0.0, 0.0, 3.0], "angular_damping": 1e-3}
+        for parameter in filter(settable, NUMERIC):
+            expected = given.get(parameter.name, parameter.convert(whole(parameter)))
+            assert read[parameter.name] == expected, parameter.name
+        for parameter in filter(settable, NUMERIC):
+            if parameter.changes == READ_ONLY or parameter.name == "density":
+                continue
+            value = whole(parameter)
+            for spelling in (value, str(value), str(mixed(value)) if isinstance(value, list) else mixed(value)):
+                assert client.set_named({parameter.name: spelling}) == [[True, ""]], (parameter.name, spelling)
+                assert client.get(parameter.name) == {parameter.name: parameter.convert(value)}

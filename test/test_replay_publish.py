@@ -13,7 +13,8 @@ pytest.importorskip("rclpy")
 pytest.importorskip("mcap")
 
 from bag_recorder import BagRecorder
-from node_client import SECOND, NodeClient
+from command_rig import RosClient, wrench_message
+from flights import SECOND
 from ros_process import run, running_node
 
 from rigid_proto_ros.bundled import scene_path
@@ -85,19 +86,18 @@ def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environmen
     scene.write_text(scene_path("t_handle").read_text().replace("rigid_body:", "other:"))
     arguments = ["--ros-args", "--params-file", scene, "-r", "__node:=other"]
     other = BagRecorder(ros_environment, name="other")
-    with running_node(*arguments, environment=ros_environment, log=tmp_path / "node"):
-        client = NodeClient(ros_environment, "other")
-        try:
-            done = run(
-                *("rigid_proto", "replay", session, "--publish", "commands", "--node", "/other"),
-                environment=ros_environment,
-                cwd=tmp_path,
-            )
-            assert done.returncode == 0, done.stderr
-            client.spin_until(lambda: flown_to(other.messages) >= 2 * SECOND, "the flight after the reset")
-            assert client.get("record") == [""]
-        finally:
-            client.close()
+    with (
+        RosClient(ros_environment, "/other") as client,
+        running_node(*arguments, environment=ros_environment, log=tmp_path / "node"),
+    ):
+        done = run(
+            *("rigid_proto", "replay", session, "--publish", "commands", "--node", "/other"),
+            environment=ros_environment,
+            cwd=tmp_path,
+        )
+        assert done.returncode == 0, done.stderr
+        client.until(lambda: flown_to(other.messages) >= 2 * SECOND, "the flight after the reset")
+        assert client.get("record") == {"record": ""}
     assert not recorder.close()
     messages = other.close()
     (recorded,) = read_runs(session)
@@ -131,16 +131,16 @@ def test_speed_without_states_to_publish_is_refused(session, capsys):
 def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_environment, tmp_path, ending):
     path = tmp_path / f"session{ending}"
     arguments = ["--params-file", scene_path("hammer"), "-p", f"record:={path}", "-r", "__node:=flyer"]
-    with running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"):
-        client = NodeClient(ros_environment, "flyer")
-        try:
-            client.wrench("poke", 0, "flyer@com;impulse", (0.0, 0.3, 0.0))
-            client.set(gravity=[0.0, 0.0, -1.0])
-            client.fly_until(SECOND)
-            client.reset()
-            client.fly_until(SECOND // 2)
-        finally:
-            client.close()
+    with (
+        RosClient(ros_environment, "/flyer") as client,
+        running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"),
+    ):
+        client.meet()
+        client.publish("poke", wrench_message(0, "flyer@com;impulse", (0.0, 0.3, 0.0)))
+        client.set(gravity=[0.0, 0.0, -1.0])
+        client.fly_until(SECOND)
+        client.reset()
+        client.fly_until(SECOND // 2)
     runs = read_runs(path)
     assert len(runs) == (2 if ending == ".mcap" else 1)
     assert all(session.complete for session in runs)
@@ -160,20 +160,22 @@ def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_r
 ):
     path = tmp_path / f"session{ending}"
     arguments = ["--params-file", scene_path("hammer")]
-    with running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"):
-        client = NodeClient(ros_environment)
-        try:
-            client.wrench("poke", 0, "body@com;impulse", (0.0, 0.3, 0.0))
-            client.set(record=str(path))
-            client.states.clear()
-            client.spin_until(lambda: len(client.states) > 100, "half a second of states")
-            client.set(record="")
-            late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
-            assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
-            assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
-            client.set(record=str(path))
-            client.reset()
-            client.fly_until(SECOND // 2)
-        finally:
-            client.close()
+    with (
+        RosClient(ros_environment) as client,
+        running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"),
+    ):
+        client.meet()
+        client.publish("poke", wrench_message(0, "body@com;impulse", (0.0, 0.3, 0.0)))
+        client.set(record=str(path))
+        client.forget("pose")
+        client.until(lambda: client.heard_count("pose") > 50, "half a second of states")
+        assert client.diagnostics()["recording"] == str(path)
+        client.set(record="")
+        assert client.diagnostics()["recording"] == ""
+        late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
+        assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
+        assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
+        client.set(record=str(path))
+        client.reset()
+        client.fly_until(SECOND // 2)
     assert main(["replay", str(path), "--verify"]) == 0

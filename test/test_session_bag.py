@@ -16,8 +16,9 @@ pytest.importorskip("mcap")
 pytest.importorskip("rclpy")
 
 from bag_recorder import BagRecorder, Logged, write_bag, write_bag_file
+from command_rig import RosClient, wrench_message
+from flights import SECOND
 from mcap.writer import CompressionType
-from node_client import SECOND, NodeClient
 from ros_process import running_node
 
 from rigid_proto_ros import cdr
@@ -37,30 +38,30 @@ def flown(ros_environment, tmp_path_factory) -> list[Logged]:
     recorder = BagRecorder(ros_environment)
     arguments = ["-p", f"mesh:={folder / 'bracket.obj'}", "-p", "initial.angular_velocity:=[0.3, 2.0, 0.1]"]
     arguments += ["-p", "contacts.tip:=[0.01, 0.0, 0.0]", "-p", "start_paused:=true"]
-    with running_node("--ros-args", *arguments, environment=ros_environment, log=folder / "node"):
-        client = NodeClient(ros_environment)
-        try:
-            # Recorders find the node late; nothing has moved by then.
-            client.spin_until(lambda: any(m.topic.endswith("twist") for m in recorder.messages), "states")
-            client.pause(False)
-            _fly(client)
-            client.reset()
-            _fly(client)
-        finally:
-            client.close()
+    with (
+        RosClient(ros_environment) as client,
+        running_node("--ros-args", *arguments, environment=ros_environment, log=folder / "node"),
+    ):
+        client.meet()
+        # Recorders find the node late; nothing has moved by then.
+        client.until(lambda: any(m.topic.endswith("twist") for m in recorder.messages), "states")
+        client.pause(False)
+        _fly(client)
+        client.reset()
+        _fly(client)
     messages = recorder.close()
     (folder / "bracket.obj").unlink()
     return messages
 
 
-def _fly(client: NodeClient) -> None:
-    client.wrench("poke", 0, "world@tip;impulse", (0.0, 0.001, 0.0))
-    client.wrench("wrench", 0, "body", torque=(0.0, 0.0, 1e-4))
+def _fly(client: RosClient) -> None:
+    client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
+    client.publish("wrench", wrench_message(0, "body", torque=(0.0, 0.0, 1e-4)))
     client.fly_until(SECOND // 2)
     client.set(gravity=[0.0, 0.0, -0.5], density=2000.0)
     client.pause(True)
     client.trigger("step")
-    client.wrench("poke", 0, "world@point/0.0,0.0,0.0;duration=0.1", (0.01, 0.0, 0.0))
+    client.publish("poke", wrench_message(0, "world@point/0.0,0.0,0.0;duration=0.1", (0.01, 0.0, 0.0)))
     client.pause(False)
     client.fly_until(SECOND)
     client.set(string__target=[0.0, 0.0, 0.2], string__attached=True)

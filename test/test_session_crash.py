@@ -152,7 +152,7 @@ def test_random_bytes_never_end_in_a_traceback(recording, tmp_path, capsys):
 def kill_while_recording(
     environment: dict[str, str], folder: Path, ending: str, after_s: float, pace: float = 1.0
 ) -> None:
-    from node_client import NodeClient
+    from command_rig import RosClient, stamp_ns, wrench_message
     from ros_process import RosProcess
 
     pytest.importorskip("rclpy")
@@ -162,19 +162,15 @@ def kill_while_recording(
     arguments += ["-p", f"real_time_factor:={pace}"]
     node = RosProcess("rigid_body_node", "--ros-args", *arguments, environment=environment, log=folder / "node")
     try:
-        node.wait_for("is flying")
-        client = NodeClient(environment)
-        try:
-            client.wrench("poke", 0, "world@tip;impulse", (0.0, 0.001, 0.0))
+        with RosClient(environment) as client:
+            node.wait_for("is flying")
+            client.meet()
+            client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
             end = time.monotonic() + after_s
-            client.spin_until(lambda: client.states and time.monotonic() > end, "states")
+            client.until(lambda: client.heard_count("pose") and time.monotonic() > end, "states")
             node.process.kill()
-            # What was published before the end and hasn't been taken yet.
-            for _ in range(100):
-                client.executor.spin_once(timeout_sec=0.005)
-            last = max(m.header.stamp.sec * SECOND + m.header.stamp.nanosec for _, m in client.states)
-        finally:
-            client.close()
+            node.process.wait()
+            last = max(stamp_ns(message) for topic in ("pose", "twist") for message in client.heard(topic, last=1))
     finally:
         node.process.kill()
         node.process.wait()
