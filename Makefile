@@ -26,8 +26,11 @@ up: setup ## node and viewer; stays until Ctrl-C
 workbench: setup ## node and interactive page; stays until Ctrl-C
 	@.venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
 
+# Hundreds of processes are started: none of them should read our source anew.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
-	$(PY) -m pytest -n 3 --dist loadfile -m "not stress and not bench and not soak" $(ARGS)
+	@$(PY) test/warm_kernels.py
+	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
 	$(PY) -m ruff check .
@@ -63,7 +66,6 @@ clean: ## everything that was made here, the environments included
 
 PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip
 pins: setup ## for developers: newest versions into requirements/*.txt
-	$(PY) -m pip install --quiet uv
 	$(PINS) requirements/base.in -o requirements/base.txt
 	$(PINS) requirements/ros.in -c requirements/base.txt -o requirements/ros.txt
 	sed -i '1i # Exact pins, made by `make pins`.' requirements/base.txt requirements/ros.txt

@@ -23,6 +23,37 @@ ENDINGS = [".mcap", pytest.param(".rrd", marks=needs_rerun)]
 collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 
+LONG = (
+    *(
+        "time_in_flight",
+        "stress_extremes",
+        "readme",
+        "replay_publish",
+        "mass_exactness",
+        "node_flight",
+        "workbench_page",
+    ),
+    *(
+        "session_crash",
+        "conventions_of_the_node",
+        "string_pendulum",
+        "commands_node",
+        "commands_refused",
+        "poke_client",
+    ),
+    *("node_signals", "sweep_bits", "sweep_runs", "demo", "commands_flood", "stress_auto", "order_of_commands"),
+    *("rerun_live", "rerun_slow_viewers", "snapshot", "packaging", "workbench_script_node", "session_bag"),
+    *("architecture", "sweep_cluster", "simulate_bad_input", "rerun_crash", "node_work", "interface"),
+)
+"""Files that take longest, waiting and computing ones by turns: workers begin with them, so that none has one left at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The files' order; within a file, and of all others, it stays as it is."""
+    rank = {f"test_{name}": number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
+
+
 def pytest_report_header() -> list[str]:
     """What isn't run, and why."""
     return [f"not run, for want of {package}: {', '.join(files)}" for package, files in MISSING.items()]
