@@ -152,6 +152,7 @@ _DECLARED = (
     Parameter("initial.orientation_xyzw", "doubles", [0.0, 0.0, 0.0, 1.0], "Attitude at time 0, body to world; normalized.", "", -_HUGE, _HUGE, lengths=(4,), changes=AT_RESET),
     _vector("initial.linear_velocity", [0.0, 0.0, 0.0], "Velocity of the centre of mass at time 0, world axes.", "m/s", changes=AT_RESET),
     _vector("initial.angular_velocity", [0.0, 0.0, 0.0], "Angular velocity at time 0, world axes.", "rad/s", changes=AT_RESET),
+    Parameter("initial.string_mass", "double", 0.0, "Effective mass that stiffness and damping of a string tied at time 0 are taken from; 0 is that of the body as it lies then.", "kg", 0.0, 1e100, changes=AT_RESET),
     Parameter("integrator", "string", "auto", "Integrator of the motion; auto picks the cheapest that meets accuracy.", choices=tuple(INTEGRATORS)),
     Parameter("step", "double", 0.001, "Step of fixed-step integrators, rounded to the nearest nanosecond.", "s", 1e-9, 1e5),
     Parameter("accuracy", "double", 1e-9, "Local error a second that auto allows: angle, displacement per half diagonal, relative velocities.", "1/s", 1e-16, 1.0, above=True),

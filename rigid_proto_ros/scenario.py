@@ -172,6 +172,7 @@ def _setup(values: Mapping[str, object], body_mesh: BodyMesh | None) -> tuple[Se
         ),
         accuracy=values["accuracy"],
         initial=state_row(values["initial.position"], quaternion, values["initial.linear_velocity"], omega_body),
+        initial_string_mass=values["initial.string_mass"],
     )
     return setup, tuple(properties.warnings)
 

@@ -141,21 +141,22 @@ def _load_entry(acting: _Acting, scenario: Scenario, now_ns: int) -> dict | None
 
 
 def _string(again: Resimulation, now_ns: int, notes: list[str]) -> tuple[list[dict], dict]:
-    """What ties the string again as it is: entries of a script where it will let go, parameters where it won't."""
-    tied, values = again.simulation.string, again.scenario.values
+    """What ties the string again as it is: parameters, and entries of a script for what it still does by itself."""
+    tied = again.simulation.string
     if tied is None:
-        return [], {"string.attached": False} if values["string.attached"] else {}
-    free_end = [float(x) for x in tied.free_end(now_ns)]
-    notes.append("the string's stiffness and damping are settled anew, from the effective mass at its new start")
+        return [], {"string.attached": False, "initial.string_mass": 0.0}
+    changes = {
+        "string.attached": True,
+        "string.attach": list(tied.attach),
+        "string.target": [float(x) for x in tied.free_end(now_ns)],
+        # Stiffness and damping were settled from it, and stay what they were.
+        "initial.string_mass": tied.effective_mass,
+    }
+    entries = []
     if now_ns < tied.end_ns:
         notes.append("the string's free end was moving: it rests where it was, then goes on to its target")
-    if tied.release_ns is None and now_ns >= tied.end_ns:
-        changes = {"string.attached": True, "string.attach": list(tied.attach), "string.target": free_end}
-        return [], changes
-    entries = [{"t": 0.0, "string": {"attach": [float(x) for x in tied.attach], "target": free_end}}]
-    if now_ns < tied.end_ns:
-        left_s = (tied.end_ns - now_ns) / 1e9
-        entries.append({"t": left_s, "string": {"target": [float(x) for x in tied.target]}})
+        target = [float(x) for x in tied.target]
+        entries.append({"t": (tied.end_ns - now_ns) / 1e9, "set": {"string.target": target}})
     if tied.release_ns is not None:
-        entries.append({"t": (tied.release_ns - now_ns) / 1e9, "string": "release"})
-    return entries, {"string.attached": False}
+        entries.append({"t": (tied.release_ns - now_ns) / 1e9, "set": {"string.attached": False}})
+    return entries, changes

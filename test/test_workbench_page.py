@@ -10,15 +10,20 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import held_domain
-from ros_process import RosProcess, descendants
-from workbench_page import CHROMIUM, FLAGS, Bench, Ear, Page
+from ros_process import READY_S, RosProcess, descendants, running_node
+from workbench_page import CHROMIUM, FLAGS, SAID_S, Bench, Ear, Page
 
 from rigid_proto_ros.offline import read_scene
+from rigid_proto_ros.poke_script import parse_script
+from rigid_proto_ros.scene_file import read_scene_text
+from rigid_proto_ros.workbench.link import decode, encode
+from rigid_proto_ros.workbench.save_as_script import kept_scene
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser to drive")
@@ -34,7 +39,8 @@ def bench(ros_environment, tmp_path_factory) -> Iterator[Bench]:
 
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        bench = Bench(environment, tmp_path_factory.mktemp("bench"), any_free_port(), "teapot")
+        # The browser and the client start while it does.
+        bench = Bench(environment, tmp_path_factory.mktemp("bench"), any_free_port(), "teapot", wait=False)
         bench.environment = environment
         yield bench
         status = bench.process.end()
@@ -42,15 +48,7 @@ def bench(ros_environment, tmp_path_factory) -> Iterator[Bench]:
 
 
 @pytest.fixture(scope="module")
-def ear(bench) -> Iterator[Ear]:
-    ear = Ear(bench.environment)
-    ear.until(lambda: ear.heard("pose", last=1), "a state")
-    yield ear
-    ear.close()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator:
+def browser(bench) -> Iterator:
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield browser
@@ -58,8 +56,28 @@ def browser() -> Iterator:
 
 
 @pytest.fixture(scope="module")
-def shared_page(bench, ear, browser) -> Page:
-    return Page(browser, bench.address)
+def ear(bench) -> Iterator[Ear]:
+    ear = Ear(bench.environment, wait=bench.wait)
+    ear.until(lambda: ear.heard("pose", last=1), "a state")
+    yield ear
+    ear.close()
+
+
+LINKED = "- {t: 0.25, at: {point: [0.1, 0.0, 0.05]}, force: [0.0, 0.5, 0.0]}\n"
+
+
+@pytest.fixture(scope="module")
+def linked_page(bench, browser, ear) -> Page:
+    """The page, opened with a link to a teapot under light gravity that is poked after a quarter of a second."""
+    link = encode(kept_scene(read_scene("teapot", {"gravity": [0.0, 0.0, -1.0]})), LINKED)
+    return Page(browser, f"{bench.address}/?{link}")
+
+
+@pytest.fixture(scope="module")
+def shared_page(linked_page, ear) -> Page:
+    ear.event("poke")
+    assert ear.set_named({"gravity": [0.0, 0.0, 0.0]})[0][0]
+    return linked_page
 
 
 @pytest.fixture
@@ -68,7 +86,13 @@ def page(shared_page, ear) -> Page:
     ear.trigger("reset")
     ear.trigger("string/release")
     shared_page.tab("Play")
-    time.sleep(0.3)
+
+    def as_reset() -> bool:
+        # One that moved before is shown at rest, or the page shows a time that isn't there yet.
+        time_s, energy = shared_page.readout
+        return energy == 0.0 and time_s <= ear.now_ns() * 1e-9
+
+    shared_page.until(as_reset, "the body at rest")
     return shared_page
 
 
@@ -82,6 +106,14 @@ def seen_point(page: Page, x: float, y: float) -> np.ndarray:
     origin, direction = page.ray(x, y)
     hit, _ = setup.surface.ray_hit(setup.body.mesh_point(UNIT * origin), direction / setup.body.scale)
     return hit
+
+
+def test_a_link_opens_the_situation_that_it_holds(linked_page, ear) -> None:
+    poke = ear.event("poke")
+    assert poke["time_ns"] == 250_000_000
+    assert poke["content"]["frame_id"] == "world@point/0.1,0.0,0.05"
+    assert poke["content"]["force"] == [0.0, 0.5, 0.0]
+    assert ear.values()["gravity"] == [0.0, 0.0, -1.0]
 
 
 def test_a_click_pokes_along_the_view_at_the_point_that_was_clicked(page, ear) -> None:
@@ -120,10 +152,12 @@ def test_a_drag_ties_the_string_where_it_grabbed_and_moves_the_body_that_way(pag
     size = float(np.linalg.norm(teapot().surface.extent))
     assert knot["axes"] == "mesh"
     assert np.linalg.norm(np.array(knot["point"]) - grabbed) <= 0.01 * size
-    time.sleep(1.2)
-    targets = [event for event in ear.events()[before:] if event["kind"] == "string_target"]
-    # A still hand goes on holding: at 0.2 s, where the string would let go after a second.
-    assert len(targets) > 5
+
+    def targets() -> list:
+        return [event["content"]["point"] for event in ear.events()[before:] if event["kind"] == "string_target"]
+
+    # A still hand goes on holding: six times in the second after which the string would let go.
+    ear.until(lambda: len(held := targets()) > 6 and held[-1] == held[-7], "a hand that holds still")
     page.release()
     ear.event("string_release", before)
     position = ear.heard("pose", last=1)[0]["pose"]["position"]
@@ -133,6 +167,58 @@ def test_a_drag_ties_the_string_where_it_grabbed_and_moves_the_body_that_way(pag
     time.sleep(0.3)
     tail = [event["kind"] for event in ear.events()[before:]]
     assert tail[-1] == "string_release"
+
+
+def test_a_finger_taps_to_poke_and_drags_to_pull(page, ear) -> None:
+    before = len(ear.events())
+    x, y = page.middle
+    seen = seen_point(page, x, y)
+    page.touch("touchStart", (x, y))
+    page.touch("touchEnd")
+    frame, _, point = ear.event("poke", before)["content"]["frame_id"].partition("point/")
+    size = float(np.linalg.norm(teapot().surface.extent))
+    assert frame == "world@" and np.linalg.norm(np.array(point.split(","), float) - seen) <= 0.01 * size
+    ear.trigger("reset")
+    before = len(ear.events())
+    page.touch("touchStart", (x, y))
+    for k in (1, 2, 3):
+        page.touch("touchMove", (x - 30.0 * k, y))
+        time.sleep(SAID_S)
+    ear.event("string_attach", before)
+    ear.event("string_target", before)
+    page.touch("touchEnd")
+    ear.event("string_release", before)
+
+
+def test_two_pages_have_one_string_and_closing_one_lets_go_of_what_it_holds(page, ear, bench) -> None:
+    def kinds(since: int) -> set[str]:
+        return {event["kind"] for event in ear.events()[since:] if event["kind"].startswith("string")}
+
+    before = len(ear.events())
+    with bare_page(bench.port) as other:
+        ear.until(lambda: listeners(ear)["pose"] == 2, "one page server that listens, for all its pages")
+        other.send(drag_message("start", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
+        ear.event("string_target", before)
+        # It is the other page's string: a drag here moves nothing of it, and its end doesn't let go.
+        page.drag(*page.middle, -60.0, 0.0, steps=2)
+        page.release()
+        other.send(drag_message("update", (0.0, 0.0, 0.1), (0.0, 0.0, 0.5)))
+        pulled = [0.0, 0.0, 0.5 * UNIT]
+        last = ear.until(
+            lambda: (p := last_target(ear)) and np.allclose(p, pulled, atol=1e-6) and p, "the other's hand"
+        )
+        assert last[2] == pytest.approx(0.5 * UNIT)
+        assert kinds(before) == {"string_attach", "string_target"}
+    ear.event("string_release", before)
+    ear.trigger("reset")
+    before = len(ear.events())
+    page.click(*page.middle)
+    ear.event("poke", before)
+
+
+def last_target(ear: Ear) -> list[float] | None:
+    targets = [event["content"]["point"] for event in ear.events() if event["kind"] == "string_target"]
+    return targets[-1] if targets else None
 
 
 def test_with_the_switch_at_the_centre_of_mass_a_drag_ties_the_string_there(page, ear) -> None:
@@ -228,7 +314,7 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     before = len(ear.events())
     page.click(*page.middle)
     poke = ear.event("poke", before)
-    time.sleep(1.0)
+    ear.until(lambda: ear.now_ns() > poke["time_ns"] + 700_000_000, "a flight of 0.7 s")
     page.tab("Session")
     page.write("Seconds back", "0.5")
     page.until(lambda: "Looking at" in page.text, "a look back")
@@ -249,10 +335,10 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     ear.set_named({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 1.0]})
 
 
-def test_what_was_done_by_hand_is_saved_as_scene_and_script(page, ear) -> None:
+def test_what_was_done_by_hand_is_saved_as_scene_and_script_and_as_a_link(page, ear, bench) -> None:
     before = len(ear.events())
     page.click(*page.middle)
-    ear.event("poke", before)
+    poke = ear.event("poke", before)
     page.tab("Session")
     downloads = []
     page.page.on("download", lambda download: downloads.append(download))
@@ -260,7 +346,18 @@ def test_what_was_done_by_hand_is_saved_as_scene_and_script(page, ear) -> None:
     page.until(lambda: len(downloads) == 2 or page.page.wait_for_timeout(50), "two files")
     files = {Path(d.suggested_filename).name: Path(d.path()).read_text("utf-8") for d in downloads}
     assert "mesh: teapot" in files["scene.yaml"].replace('"', "")
-    assert "point" in files["script.yaml"] and "force" in files["script.yaml"]
+    commands = parse_script(files["script.yaml"])
+    (command,) = [command for command in commands if command.kind == "poke"]
+    assert command.t_ns == poke["time_ns"]
+    assert command.frame_id == poke["content"]["frame_id"] and list(command.force) == poke["content"]["force"]
+    # The link holds the same.
+    page.button("Make a link")
+    made = page.page.locator("input[value*='/?']").first
+    link = page.until(lambda: made.count() and made.input_value(), "a link")
+    assert link.startswith(f"{bench.address}/?")
+    scene, script = decode(link.partition("?")[2])
+    assert parse_script(script) == commands
+    assert read_scene_text(scene).values == read_scene_text(files["scene.yaml"]).values
 
 
 CAMERA_MESSAGE = {
@@ -277,6 +374,32 @@ CAMERA_MESSAGE = {
 }
 """What viser waits for before it calls a page open."""
 
+
+@contextmanager
+def bare_page(port: int) -> Iterator:
+    """A second page without a browser: a socket as a page opens it."""
+    import msgspec.msgpack
+    from websockets.sync.client import connect
+
+    with connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:
+        page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
+        yield page
+
+
+def drag_message(phase: str, start: tuple, end: tuple) -> bytes:
+    """What a browser sends of a drag on the body, in the picture's units."""
+    import msgspec.msgpack
+
+    message = {"type": "SceneNodeDragMessage", "phase": phase, "name": "/body/mesh", "instance_index": None}
+    places = {
+        "start_position": start,
+        "start_screen_pos": (0.5, 0.5),
+        "end_position": end,
+        "end_screen_pos": (0.5, 0.5),
+    }
+    return msgspec.msgpack.encode({**message, **places, "button": "left", "modifier": None, "owner": ""})
+
+
 STATE_TOPICS = ("pose", "twist", "events", "scene")
 
 
@@ -286,66 +409,70 @@ def listeners(ear: Ear) -> dict[str, int]:
     return {topic: sum(side == "sub" for side, *_ in found) for topic, found in ends.items()}
 
 
-def test_with_the_page_closed_the_node_has_the_subscribers_it_had_before_and_a_link_opens_the_same_situation(
-    page, ear
-) -> None:
-    assert listeners(ear) == {"pose": 2, "twist": 1, "events": 2, "scene": 2}
-    before = len(ear.events())
-    page.click(*page.middle)
-    poke = ear.event("poke", before)["content"]
-    page.tab("Session")
-    page.button("Make a link")
-    made = page.page.locator("input[value*='/?']").first
-    link = page.until(lambda: made.count() and made.input_value(), "a link")
-    page.page.goto("about:blank")
-    without = {"pose": 1, "twist": 0, "events": 1, "scene": 1}
-    ear.until(lambda: listeners(ear) == without, "a node that only this test listens to")
-    ear.set_named({"gravity": [0.0, 0.0, -1.0]})
-    before = len(ear.events())
-    page.page.goto(link)
-    assert ear.event("poke", before)["content"]["force"] == poke["force"]
-    assert ear.event("poke", before)["content"]["frame_id"] == poke["frame_id"]
-    assert ear.values()["gravity"] == [0.0, 0.0, 0.0]
-    page.until(lambda: "is flying" in page.text or "is sleeping" in page.text, "the page again")
+WITH_A_PAGE = {"pose": 2, "twist": 1, "events": 2, "scene": 2}
+"""Listeners while a page is open, this test among them."""
 
 
 @pytest.mark.stress
-def test_a_page_of_its_own_shows_a_node_that_runs_already(bench, ear, tmp_path) -> None:
-    """Without a browser: a socket as a page opens it."""
-    import msgspec.msgpack
-    from websockets.sync.client import connect
-
+def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_environment, tmp_path) -> None:
     from rigid_proto_ros.rerun_view.ports import any_free_port
 
-    port, pages = any_free_port(), listeners(ear)["pose"]
-    second = RosProcess(
-        *("rigid_proto", "workbench", "--node", "rigid_body", "--port", port, "--no-browser"),
-        environment=bench.environment,
-        log=tmp_path / "second",
-    )
-    second.wait_for("The workbench is at")
-    with connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:
-        page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
-        ear.until(lambda: listeners(ear)["pose"] == pages + 1, "another page that listens to the node")
-    commands = [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in descendants(second.process.pid)]
-    assert len(commands) == 1 and b"workbench.main" in commands[0]
-    assert second.end() == 0
-    # The node isn't its own: it flies on.
-    assert bench.process.process.poll() is None
-    ear.now_ns()
+    def workbench(node: str, log: str) -> RosProcess:
+        arguments = ("workbench", "--node", node, "--port", port, "--no-browser")
+        return RosProcess("rigid_proto", *arguments, environment=environment, log=tmp_path / log)
+
+    with held_domain() as domain:
+        environment, port = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}, any_free_port()
+        remapped = ("--ros-args", "-r", "__node:=brick", "-r", "__ns:=/lab", "-p", "mesh:=book")
+        with running_node(*remapped, environment=environment, log=tmp_path / "node"):
+            ear = Ear(environment, "/lab/brick")
+            missing = workbench("/lab/brik", "missing")
+            second = workbench("lab/brick", "second")
+            second.wait_for("The workbench is at")
+            with bare_page(port) as page:
+                ear.until(lambda: listeners(ear)["twist"] == 1, "a page that listens to the node")
+                page.send(drag_message("start", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
+                ear.event("string_target")
+            ear.event("string_release")
+            commands = [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in descendants(second.process.pid)]
+            assert len(commands) == 1 and b"workbench.main" in commands[0]
+            assert second.end() == 0
+            assert missing.process.wait(READY_S) == 2
+            assert (
+                missing.errors.count("\n") == 1 and "'/lab/brik'" in missing.errors and "(/lab/brick)" in missing.errors
+            )
+            # The node isn't theirs: it flies on.
+            ear.now_ns()
+            ear.close()
 
 
-def test_a_killed_page_server_in_mid_drag_lets_the_string_go_by_its_timeout(page, ear, bench) -> None:
-    before = len(ear.events())
-    page.drag(*page.middle, -60.0, 0.0, steps=1)
-    ear.event("string_target", before)
-    os.kill(bench.children()["page"], signal.SIGKILL)
-    # Nobody releases it; a body on a string is drawn back and forth, a loose one flies straight.
-    ear.until(lambda: flies_straight(ear), "a body that the string has let go")
+def test_with_the_page_closed_the_node_has_the_subscribers_that_it_had_before(page, ear) -> None:
+    assert listeners(ear) == WITH_A_PAGE
+    page.page.goto("about:blank")
+    without = {"pose": 1, "twist": 0, "events": 1, "scene": 1}
+    ear.until(lambda: listeners(ear) == without, "a node that only this test listens to")
+
+
+def test_a_killed_page_server_in_mid_drag_lets_the_string_go_by_its_timeout(ear, bench) -> None:
+    bench.wait()
+    ear.trigger("reset")
+    before, killed = len(ear.events()), bench.children()["page"]
+    with bare_page(bench.port) as page:
+
+        def pulled() -> bool:
+            # A server that has drawn nothing yet lets nothing be grabbed.
+            page.send(drag_message("start", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
+            page.send(drag_message("update", (0.0, 0.0, 0.1), (0.2, 0.0, 0.1)))
+            return any(event["kind"] == "string_target" for event in ear.events()[before:])
+
+        ear.until(pulled, "a string")
+        ear.until(lambda: ear.heard("pose", last=1)[0]["pose"]["position"]["x"] > 1e-3, "a body that it pulls")
+        os.kill(killed, signal.SIGKILL)
+        # Nobody releases it; a body on a string is drawn back and forth, a loose one flies straight.
+        ear.until(lambda: flies_straight(ear), "a body that the string has let go")
     assert "string_release" not in [event["kind"] for event in ear.events()[before:]]
-    page.page.mouse.up()
-    # The command starts another page server, and the browser finds it.
-    page.until(lambda: bench.children().get("page"), "another page server")
+    # The command starts another page server.
+    ear.until(lambda: bench.children().get("page", killed) != killed, "another page server")
 
 
 def flies_straight(ear: Ear) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shutil
 import time
 from pathlib import Path
@@ -18,6 +19,12 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
+DRAWN_MS = 120
+"""[ms] Between two pictures: each is 30 ms of a core's time in software WebGL, which would draw as often as it is let."""
+
+SAID_S = 0.06
+"""[s] A page says at most every 0.05 s where the pointer is."""
+
 CAMERA, FIELD_OF_VIEW = np.array([1.3, -2.2, 1.1]), math.radians(40.0)
 """Where a page looks from at first, to its middle, in units of the picture."""
 
@@ -25,13 +32,20 @@ CAMERA, FIELD_OF_VIEW = np.array([1.3, -2.2, 1.1]), math.radians(40.0)
 class Bench:
     """``rigid_proto workbench`` in a ROS domain of its own."""
 
-    def __init__(self, environment: dict[str, str], folder: Path, port: int, *arguments: str) -> None:
+    def __init__(
+        self, environment: dict[str, str], folder: Path, port: int, *arguments: str, wait: bool = True
+    ) -> None:
         self.port = port
         self.process = RosProcess(
             *("rigid_proto", "workbench", "--port", port, "--no-browser", *arguments),
             environment={**environment, "TMPDIR": str(folder)},
             log=folder / "workbench",
         )
+        if wait:
+            self.wait()
+
+    def wait(self) -> None:
+        """Until page and node are there."""
         self.process.wait_for("The workbench is at")
         self.process.wait_for("is flying")
 
@@ -54,11 +68,11 @@ class Page:
     """One browser page. The body is at the middle of the canvas while it rests at the world's origin."""
 
     def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
-        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
+        self._fingers = None
         self.page.set_default_timeout(PATIENCE_S * 1e3)
-        # Software WebGL draws as often as it is let, and leaves the page no time for anything else.
         self.page.add_init_script(
-            "const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), 50)"
+            f"const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), {DRAWN_MS})"
         )
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
@@ -69,6 +83,12 @@ class Page:
         )
         self.page.add_style_tag(content=see_through)
         self.until(lambda: "is flying" in self.text or "is sleeping" in self.text, "a node on the page")
+
+    @property
+    def readout(self) -> tuple[float, float]:
+        """Time [s] and energy [J] as the page shows them."""
+        text = self.text
+        return tuple(float(re.search(rf"^{name}\s+(\S+) \w", text, re.M)[1]) for name in ("time", "energy"))
 
     @property
     def text(self) -> str:
@@ -127,32 +147,31 @@ class Page:
         return CAMERA, direction / np.linalg.norm(direction)
 
     def click(self, x: float, y: float, modifier: str = "") -> None:
-        """Press and release soon: a poke. Software WebGL needs its time to see what the pointer is over."""
-        mouse = self.page.mouse
-        mouse.move(x - 2.0, y)
-        mouse.move(x, y)
-        time.sleep(0.4)
+        """Press and release at one place: a poke."""
         if modifier:
             self.page.keyboard.down(modifier)
-        mouse.down()
-        time.sleep(0.1)
-        mouse.up()
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.up()
         if modifier:
             self.page.keyboard.up(modifier)
 
-    def grab(self, x: float, y: float) -> None:
-        self.page.mouse.move(x - 2.0, y)
-        self.page.mouse.move(x, y)
-        time.sleep(0.4)
-        self.page.mouse.down()
-        time.sleep(0.6)
-
     def drag(self, x: float, y: float, dx: float, dy: float, steps: int = 3) -> None:
         """Press at a point and move on from there in steps; the button stays down."""
-        self.grab(x, y)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
         for k in range(1, steps + 1):
             self.page.mouse.move(x + dx * k / steps, y + dy * k / steps)
-            time.sleep(0.4)
+            time.sleep(SAID_S)
+
+    def touch(self, phase: str, *points: tuple[float, float]) -> None:
+        """Fingers on the glass: phase touchStart, touchMove or touchEnd, all points where they are."""
+        if self._fingers is None:
+            self._fingers = self.page.context.new_cdp_session(self.page)
+        self._fingers.send(
+            "Input.dispatchTouchEvent",
+            {"type": phase, "touchPoints": [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]},
+        )
 
     def release(self) -> None:
         self.page.mouse.up()
@@ -161,8 +180,10 @@ class Page:
 class Ear(RosClient):
     """Listens to the node of a bench."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
-        super().__init__(environment)
+    def __init__(self, environment: dict[str, str], node: str = "/rigid_body", wait=lambda: None) -> None:
+        """wait(): until the node is there, while the client's own process starts."""
+        super().__init__(environment, node)
+        wait()
         self.listen("pose", "events", "scene")
 
     def event(self, kind: str, after: int = 0) -> dict:

@@ -52,6 +52,7 @@ def draw_pull(page: Page, picture: Path) -> None:
     x, y = page.middle
     # Slow, so that the picture is taken before the body has followed and the string is long.
     page.drag(x, y, -150.0, -60.0, steps=2)
+    time.sleep(0.8)
     page.page.screenshot(path=picture)
     page.release()
 

@@ -55,6 +55,7 @@ def _stay(args: argparse.Namespace) -> int:
     page_arguments += ["--lesson", scene] if not args.mesh and not args.node and scene in scene_names() else []
     page_arguments += ["--link", args.link] if args.link else []
     page_arguments += [] if args.no_browser else ["--open"]
+    page_arguments += ["--running"] if args.node else []
     page_command = [*own_executable("workbench"), *page_arguments]
     with Processes() as processes:
         node = None if args.node else processes.start([*own_executable("rigid_body_node"), *node_arguments])
@@ -64,6 +65,8 @@ def _stay(args: argparse.Namespace) -> int:
             if node is not None and node.poll() is not None:
                 return _ended("rigid_body_node", node.returncode)
             if page.poll() is not None:
+                if page.returncode == 2:
+                    return 2  # it has said what was refused
                 if page.returncode >= 0 or time.monotonic() < began + RESTART_S:
                     return _ended("the page", page.returncode)
                 # Killed: the body flies on, and the browsers find the next page by themselves.

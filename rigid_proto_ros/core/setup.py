@@ -21,6 +21,7 @@ class Setup:
     """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the mesh.
     contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m s].
     wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps. initial (13,): the state row at time 0.
+    initial_string_mass [kg]: what settles a string that is tied at time 0; 0 for the effective mass of the body as it is then.
     """
 
     body: Body
@@ -41,6 +42,7 @@ class Setup:
     body_frame: str = "body"
     accuracy: float = 1e-9
     string: StringSettings = StringSettings()
+    initial_string_mass: float = 0.0
 
     @property
     def length(self) -> float:

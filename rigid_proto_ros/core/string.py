@@ -52,7 +52,7 @@ class StringSettings:
 class Tied:
     """A tied string. attach: the knot in mesh coordinates. The free end goes evenly from ``origin`` at begin_ns to
     ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns: when it lets go,
-    or None. stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as settled.
+    or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as settled.
     """
 
     attach: tuple[float, float, float]
@@ -62,6 +62,7 @@ class Tied:
     end_ns: int
     last_target_ns: int
     release_ns: int | None
+    effective_mass: float
     stiffness: float
     damping: float
     frequency: float
@@ -130,12 +131,14 @@ class Tied:
             release_ns=time_ns + timeout_ns if timeout_ns else None,
         )
 
-    def settled(self, settings: StringSettings, body: Body, state: State) -> Tied:
-        """With stiffness and damping taken anew from the settings and the effective mass of the body as it is."""
-        mass = effective_mass(body, self.arm(body), state, self.span(body, state))
+    def settled(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> Tied:
+        """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the effective
+        mass of the body as it is."""
+        mass = mass or effective_mass(body, self.arm(body), state, self.span(body, state))
         stiffness = mass * settings.frequency**2 if settings.frequency > 0.0 else settings.stiffness
         return replace(
             self,
+            effective_mass=mass,
             stiffness=stiffness,
             damping=2.0 * settings.damping_ratio * math.sqrt(stiffness * mass),
             frequency=math.sqrt(stiffness / mass),
@@ -144,10 +147,10 @@ class Tied:
         )
 
 
-def tie(settings: StringSettings, attach, target, body: Body, state: State, timeout_ns: int) -> Tied:
+def tie(settings: StringSettings, attach, target, body: Body, state: State, timeout_ns: int, mass: float = 0.0) -> Tied:
     """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
 
-    timeout_ns 0 never lets go.
+    timeout_ns 0 never lets go. mass: as ``settled`` takes it.
     """
     now_ns = state.time_ns
     point = np.asarray(target, dtype=float)
@@ -159,13 +162,14 @@ def tie(settings: StringSettings, attach, target, body: Body, state: State, time
         end_ns=now_ns,
         last_target_ns=now_ns,
         release_ns=now_ns + timeout_ns if timeout_ns else None,
+        effective_mass=0.0,
         stiffness=0.0,
         damping=0.0,
         frequency=0.0,
         rest_length=settings.rest_length,
         bilateral=settings.bilateral,
     )
-    return tied.settled(settings, body, state)
+    return tied.settled(settings, body, state, mass)
 
 
 def effective_mass(body: Body, arm, state: State, span) -> float:

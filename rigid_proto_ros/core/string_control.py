@@ -24,7 +24,8 @@ class StringControl:
         self.attach = settings.attach
         self.tied: Tied | None = None
         if settings.attached:
-            self.tied = tie(settings, settings.attach, settings.target, setup.body, state, 0)
+            mass = setup.initial_string_mass
+            self.tied = tie(settings, settings.attach, settings.target, setup.body, state, 0, mass)
 
     def next_event_ns(self, now_ns: int, never: int) -> int:
         """When the free end arrives or the string lets go, whichever is first after ``now_ns``."""

@@ -17,17 +17,30 @@ from ..core.string_control import StringControl
 from ..poke_script import string_attach, string_target
 from ..scenario import Scenario, nanoseconds
 
-SHOWN_AT_LEAST_NS = 400_000_000
-"""[ns of simulated time] A poke is over before a page has drawn it twice; its arrow stays this long."""
+SHOWN_AT_LEAST_NS = 800_000_000
+"""[ns, of a body that flies in real time] A poke is over before a page has drawn it twice; its arrow stays this long."""
 
 SHORTEST, LONGEST = 0.3, 1.0
 """Arrow lengths in body sizes: that of a vanishing and of an infinite force."""
 
 
 @dataclass(frozen=True)
+class Hit:
+    """The last poke: where it attacks (3,) [m, world], the unit direction of its force (3,) [world], its strength as text,
+    and its age, 0 as it begins and 1 when it is forgotten."""
+
+    point: np.ndarray
+    direction: np.ndarray
+    text: str
+    age: float
+
+
+@dataclass(frozen=True)
 class _Acting:
     held: bool
     load: Load
+    text: str
+    began_ns: int
     until_ns: int
 
 
@@ -88,8 +101,11 @@ class Acting:
         else:
             lasting_ns = nanoseconds(frame.duration_s)
         if not load.is_zero:
-            until_ns = time_ns + (lasting_ns if held else max(lasting_ns, SHOWN_AT_LEAST_NS))
-            self._acting.append(_Acting(held, load, until_ns))
+            # Simulated time runs as fast as it is told to, eyes don't.
+            seen_ns = round(SHOWN_AT_LEAST_NS * (scenario.values["real_time_factor"] or 1.0))
+            until_ns = time_ns + (lasting_ns if held else max(lasting_ns, seen_ns))
+            text = _strength_text(content["force"], frame.impulse)
+            self._acting.append(_Acting(held, load, text, time_ns, until_ns))
 
     def string_ends(self, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray] | None:
         """Knot and free end (3,) in the world, or None."""
@@ -118,15 +134,33 @@ class Acting:
         arrows = []
         middling = setup.body.mass * 2.0 * size
         for acting in self._acting:
-            load = acting.load
-            force = state.rotation @ load.force_body(setup.body, state)
-            strength = float(np.linalg.norm(force))
+            point, force, strength = _attack(acting.load, setup, state)
             if strength > 0.0:
                 length = size * (SHORTEST + (LONGEST - SHORTEST) * strength / (strength + middling))
-                point = state.position + state.rotation @ load.arm(setup.body)
                 vector = force * (length / strength)
                 arrows.append((point - vector, vector))
         return arrows
+
+    def hit(self, setup: Setup, state: State) -> Hit | None:
+        """The last poke that pushes, while its arrow is shown."""
+        for acting in reversed(self._acting):
+            if acting.held or acting.until_ns <= state.time_ns:
+                continue
+            point, force, strength = _attack(acting.load, setup, state)
+            if strength > 0.0:
+                age = (state.time_ns - acting.began_ns) / (acting.until_ns - acting.began_ns)
+                return Hit(point, force / strength, acting.text, max(0.0, age))
+        return None
+
+
+def _attack(load: Load, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray, float]:
+    """Point of attack (3,) [m, world], force (3,) [world] and its size."""
+    force = state.rotation @ load.force_body(setup.body, state)
+    return state.position + state.rotation @ load.arm(setup.body), force, float(np.linalg.norm(force))
+
+
+def _strength_text(force, impulse: bool) -> str:
+    return f"{float(np.linalg.norm(force)):.3g} {'N s' if impulse else 'N'}"
 
 
 def _not_before(tied: Tied, state: State) -> State:

@@ -13,11 +13,15 @@ from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
 from ..ros.ending import Ending
 
+PATIENCE_S = 10.0
+"""[s] For a node that is said to be running: discovery takes less than one of them."""
+
 
 def main(argv: list[str] | None = None) -> int:
     """Serve the page; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
     parser = argparse.ArgumentParser(prog="workbench page")
     parser.add_argument("--node", default="/rigid_body")
+    parser.add_argument("--running", action="store_true", help="the node is there already, or it is a mistake")
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--host", default=LOOPBACK)
     parser.add_argument("--open", action="store_true")
@@ -38,8 +42,10 @@ def serve(args: argparse.Namespace, ending: Ending) -> int:
     from rclpy.signals import SignalHandlerOptions
 
     from .page import Page
+    from .ros_link import full_name
     from .server import make_server, stop_server
 
+    full_name(args.node)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     address = f"http://{args.host}:{args.port}"
     pages: list[Page] = []
@@ -51,13 +57,15 @@ def serve(args: argparse.Namespace, ending: Ending) -> int:
     server = make_server(args.host, args.port, on_link)
     page = Page(server, args.node, address, args.lesson)
     pages.append(page)
-    if args.link:
-        page.deliver(page.follow_link, args.link)
     running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
-    print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
-    if args.open and has_display():
-        webbrowser.open(address)
     try:
+        if args.running:
+            page.link.wait_for_node(PATIENCE_S, lambda: ending.asked)
+        if args.link:
+            page.deliver(page.follow_link, args.link)
+        print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
+        if args.open and has_display():
+            webbrowser.open(address)
         ending.wait()
     finally:
         running.cancel()

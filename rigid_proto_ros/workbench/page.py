@@ -352,6 +352,7 @@ class Page:
             view.place_grid()
             view.show_string(None if looking else self.acting.string_ends(setup, state))
             view.show_loads([] if looking else self.acting.arrows(setup, state, size))
+            view.show_hit(None if looking else self.acting.hit(setup, state))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
             # ω reaches beyond L, for they are parallel where the body turns about a principal axis.
             view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.85 * size))

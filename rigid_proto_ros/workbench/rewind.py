@@ -119,6 +119,7 @@ def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, obj
             values |= content
     numbers = row.tolist()
     cuts = ((0, 3), (3, 7), (7, 10), (10, 13))
+    values["initial.string_mass"] = 0.0
     return {**values, **{name: numbers[i:j] for name, (i, j) in zip(_START, cuts, strict=True)}}
 
 

@@ -8,7 +8,8 @@ given to the executor: the page takes them itself, all that have come since the 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,8 +17,10 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped, WrenchStamped
 from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -55,7 +58,7 @@ class RosLink:
         on_scene: Callable[[str], None],
         on_diagnostics: Callable[[dict[str, str]], None],
     ) -> None:
-        self.target = target if target.startswith("/") else f"/{target}"
+        self.target = full_name(target)
         self._deliver = deliver
         self._on_scene = on_scene
         self._on_diagnostics = on_diagnostics
@@ -79,6 +82,18 @@ class RosLink:
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
         self._thread.start()
+
+    def wait_for_node(self, patience_s: float, given_up: Callable[[], bool] = lambda: False) -> None:
+        """Wait until the node is there, or ``given_up``. Raises InputError, with the names of those that are, when it doesn't
+        come."""
+        deadline = time.monotonic() + patience_s
+        while not self._set.service_is_ready() and not given_up():
+            if time.monotonic() > deadline:
+                found = ", ".join(flying_nodes(self.node.get_topic_names_and_types())) or "none is running"
+                raise InputError(
+                    "--node", self.target, f"a node that is there within {patience_s:g} s, with its namespace ({found})"
+                )
+            time.sleep(0.02)
 
     def _spin(self) -> None:
         try:
@@ -204,6 +219,24 @@ class RosLink:
     def _answer(self, done: Callable[[bool, str], None] | None, success: bool, message: str) -> None:
         if done is not None:
             self._deliver(done, success, message)
+
+
+def full_name(node: str) -> str:
+    """A node's name with its namespace and a leading slash. Raises InputError for what no node can be called."""
+    name = f"/{node.removeprefix('/')}"
+    try:
+        validate_full_topic_name(name)
+    except InvalidTopicNameException:
+        raise InputError("--node", node, "letters, digits and _, and slashes between them, as in /lab/body") from None
+    return name
+
+
+def flying_nodes(topics: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
+    """Full names of the nodes that fly a body, by the topics (name, types) that they have."""
+    names = {name for name, _ in topics}
+    own = ("poke", "string/target", "inertia")
+    bases = (name.removesuffix("/pose") for name in names if name.endswith("/pose"))
+    return sorted(base for base in bases if all(f"{base}/{topic}" in names for topic in own))
 
 
 def _drain(subscription, message_type) -> list:

@@ -19,16 +19,20 @@ from ..core.rotation import quaternion_from_matrix
 from ..core.surface import Surface
 from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
+from .acting import Hit
+from .poke_mark import PokeMark
 
 BODY_COLOUR, GHOST_COLOUR = (214, 205, 190), (120, 180, 255)
 STRING_COLOUR, HAND_COLOUR = (250, 180, 60), (250, 130, 40)
-LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (235, 85, 85), (190, 120, 245), (60, 190, 190)
+LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (205, 25, 25), (190, 120, 245), (60, 190, 190)
 AXES_COLOURS = np.array([(235, 85, 85), (90, 200, 110), (85, 150, 250)])
 
 SWITCHES = {
     "See through the body": False,
     "COM": True,
     "Principal axes": False,
+    "Body axes": False,
+    "World axes": False,
     "Inertia ellipsoid": False,
     "Box of equal inertia": False,
     "Bounding box": False,
@@ -86,11 +90,18 @@ class SceneView:
             shadow_opacity=0.0,
         )
         self._handles["Grid"] = [self._grid]
+        # Length 1 is the picture's unit; the body's own are scaled to it.
+        triad: dict[str, Any] = {"axes_radius": 0.008, "origin_radius": 0.0, "visible": False}
+        self._world_axes = scene.add_frame("/world", axes_length=0.8, **triad)
+        self._body_axes = scene.add_frame("/body/own_axes", **triad)
+        self._handles["World axes"], self._handles["Body axes"] = [self._world_axes], [self._body_axes]
         none = np.zeros((1, 2, 3))
         self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
         self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
         thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
-        self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thin)
+        thick: dict[str, Any] = {"shaft_radius": 0.013, "head_radius": 0.034, "head_length": 0.09, "visible": False}
+        self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thick)
+        self._poke = PokeMark(scene, LOAD_COLOUR)
         self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
         self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
 
@@ -169,6 +180,7 @@ class SceneView:
     def _draw_inertia(self, scenario: Scenario, box, ellipsoid, corners) -> None:
         body, unit, scene = scenario.setup.body, self.unit, self._scene
         size = 2.0 * self._radius / unit
+        self._body_axes.axes_length = 0.7 * size
         turned = _wxyz(quaternion_from_matrix(body.principal_axes))
         axes = np.zeros((3, 2, 3))
         # All end outside the body, or the shortest would lie inside a rod.
@@ -210,9 +222,11 @@ class SceneView:
         self._body_frame.wxyz = _wxyz(row[3:7])
 
     def place_grid(self) -> None:
-        """The grid stands still in the world while the picture follows the body: by whole sections, it has no end."""
+        """Grid and world axes stand still in the world while the picture follows the body; the grid has no end, it moves by
+        whole sections."""
         section = 2.5
         shift = -(self.origin / self.unit)
+        self._world_axes.position = shift
         self._grid.position = (shift[0] % section, shift[1] % section, shift[2] - 1.2 if abs(shift[2]) < 3.0 else -1.2)
 
     def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None) -> None:
@@ -228,6 +242,14 @@ class SceneView:
     def show_loads(self, arrows: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
         """Forces: point of attack and drawn vector, both in the world [m]."""
         self._show_arrows(self._loads, arrows, "Forces")
+
+    def show_hit(self, hit: Hit | None) -> None:
+        """Where the last poke hit, and how hard; None for no poke."""
+        if hit is None or not self._shown["Forces"]:
+            self._poke.hide()
+        else:
+            size = 2.0 * self._radius / self.unit
+            self._poke.show(self._drawn(hit.point), hit.direction, hit.text, hit.age, size)
 
     def show_momentum(self, position, momentum, omega) -> None:
         """L and ω at the COM, drawn vectors [m]."""
