@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import yaml
 from hand_session import SCENE, HandSession, random_hand_session
 
 from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.core.state import State
 from rigid_proto_ros.offline import OfflineRun
 from rigid_proto_ros.poke_script import ScriptCommand, parse_script
 from rigid_proto_ros.scenario import make_scenario
@@ -17,17 +19,22 @@ from rigid_proto_ros.workbench.save_as_script import SavedScript, flow, save_as_
 SECOND = 10**9
 
 
-def flown(saved: SavedScript, until_ns: int) -> str:
-    """The state hash of ``simulate SCENE --script SCRIPT``."""
+def flown(saved: SavedScript, until_ns: int) -> State:
+    """The last state of ``simulate SCENE --script SCRIPT``."""
     run = OfflineRun(make_scenario(read_scene_text(saved.scene).values), parse_script(saved.script))
     assert run.advance(until_ns)
     assert not run.simulation.refused
-    return run.simulation.state.sha256()
+    return run.simulation.state
 
 
 def assert_flies_again(hand: HandSession) -> SavedScript:
     saved = save_as_script(hand.session())
-    assert flown(saved, hand.now_ns) == hand.simulation.state.sha256()
+    again, first = flown(saved, hand.now_ns), hand.simulation.state
+    if saved.notes:
+        # Said to differ in the order of one instant: a rounding, and what the motion makes of it.
+        assert np.abs(again.row - first.row).max() < 1e-9
+    else:
+        assert again.sha256() == first.sha256()
     return saved
 
 
