@@ -116,3 +116,5 @@ def rig(commanded):
     commanded.restore()
     yield commanded
     assert commanded.node_process.alive, commanded.node_process.log.read_text()
+    # Flying on, perhaps at the test's own rates, node and client would take half a core from all tests to come.
+    commanded.pause(True)

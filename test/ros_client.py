@@ -95,6 +95,7 @@ class Client:
         rclpy.init()
         self.node = rclpy.create_node("tester", start_parameter_services=False, enable_rosout=False)
         self.received: dict[str, list] = {}
+        self.subscriptions: dict = {}
         self.publishers = {}
         self.clients = {}
         self.executor = SingleThreadedExecutor()
@@ -102,9 +103,13 @@ class Client:
         threading.Thread(target=self.executor.spin, daemon=True).start()
 
     def listen(self, topic, type, wait=True, **qos):
-        """Collect what comes on a topic, in order."""
+        """Collect what comes on a topic, in order; again, and a new subscription takes the place of the one before."""
         messages = self.received.setdefault(topic, [])
-        subscription = self.node.create_subscription(TYPES[type], topic, messages.append, profile(**qos))
+        if topic in self.subscriptions:
+            self.node.destroy_subscription(self.subscriptions[topic])
+        subscription = self.subscriptions[topic] = self.node.create_subscription(
+            TYPES[type], topic, messages.append, profile(**qos)
+        )
         if wait:
             _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}")
 
