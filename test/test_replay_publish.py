@@ -90,6 +90,11 @@ def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environmen
         RosClient(ros_environment, "/other") as client,
         running_node(*arguments, environment=ros_environment, log=tmp_path / "node"),
     ):
+        # What is said before the recorder is known to the node is said to nobody.
+        client.until(
+            lambda: client.pause(False)["success"] and any(m.topic.endswith("events") for m in list(other.messages)),
+            "an event that the recorder hears",
+        )
         done = run(
             *("rigid_proto", "replay", session, "--publish", "commands", "--node", "/other"),
             environment=ros_environment,
