@@ -57,8 +57,8 @@ bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU a
 soak: setup ## an hour of random commands, guests and changes; MINUTES=5 for the short form
 	$(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
 
-stress: setup ## long and hostile tests
-	$(PY) -m pytest -m stress $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen
+stress: setup ## long and hostile tests, and those of random examples with new ones
+	RIGID_PROTO_EXAMPLES=new $(PY) -m pytest -m "stress or hypothesis" $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen
 
 clean: ## everything that was made here, the environments included
 	rm -rf .venv .venv-bench build install log out *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage

@@ -8,7 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from ros_domain import hold_domain
+
+settings.register_profile("the same examples every time", derandomize=True)
+settings.register_profile("new examples every time")
+settings.load_profile(f"{os.environ.get('RIGID_PROTO_EXAMPLES', 'the same')} examples every time")
 
 NEEDED = {"rerun": ["test_demo.py", "test_rerun_*.py", "test_snapshot.py"]}
 """Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""

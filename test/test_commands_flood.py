@@ -2,7 +2,6 @@
 """Floods of commands: all received, or the loss told."""
 
 import signal
-import time
 from contextlib import contextmanager
 
 import pytest
@@ -110,11 +109,8 @@ def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(rig)
     before = rig.counters()
     push(rig, 2)
     told(rig, before, lambda gained: gained["poke_received"] == 2)
-    began = time.monotonic()
     with held_up(rig):
         push(rig, 12_000)
-    if time.monotonic() - began > 10.0:
-        pytest.skip("the machine took so long that the middleware took the node for gone, and its return for another's")
     rig.do("acknowledged", topic=rig.name("poke"))
     # The last one shows what was lost before it.
     push(rig, 1)

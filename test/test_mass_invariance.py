@@ -126,8 +126,8 @@ def test_the_order_of_vertices_faces_and_corners_is_of_no_matter(mesh, seed, mod
 @settings(PROFILE)
 def test_every_computed_tensor_meets_the_triangle_inequality(mesh, exponents, model):
     scale = 10.0 ** np.array(exponents) / np.max(10.0 ** np.array(exponents))
-    if np.min(scale) < 1e-5:  # C/A beyond 1e12 is refused as a line
-        scale = np.maximum(scale, 1e-5)
+    # C/A beyond 1e12 is refused as a line, and the body itself may be thirty times as long as it is wide.
+    scale = np.maximum(scale, 1e-4)
     a, b, c = principal_axes(properties(mesh, model, scale=scale).inertia)[0]
     assert a > 0.0
     assert a + b >= c * (1.0 - 1e-14)

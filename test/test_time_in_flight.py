@@ -118,7 +118,8 @@ def test_stamps_zero_and_past_mean_now_and_one_of_the_systems_clock_is_told_apar
     assert rig.node_process.log.read_text().count("stamped by the system's clock") == 1
     pokes = rig.wait_event("poke", 5)
     assert len(pokes) == 5
-    assert all(sent_after <= event["time_ns"] < sent_after + 600 * SECOND for event in pokes)
+    acted_before = int(rig.diagnostics()["sim_time_ns"])
+    assert all(sent_after <= event["time_ns"] <= acted_before for event in pokes)
     assert {event["content"]["stamp_ns"] for event in pokes} == set(stamps.values())
 
 
@@ -146,8 +147,8 @@ def test_publication_k_is_at_the_rounded_kth_period(rig, rate):
     stamps = [stamp_ns(m) for m in rig.heard("pose")]
     assert all(stamp == publication_ns(round(stamp * rate / SECOND), rate) for stamp in stamps)
     # Time goes as fast as it can: a busy client misses some of them, but not every second one.
-    gaps = {b - a for a, b in itertools.pairwise(sorted(set(stamps)))}
-    assert abs(min(gaps) - SECOND / rate) <= 1.0
+    gaps = sorted(b - a for a, b in itertools.pairwise(sorted(set(stamps))))
+    assert abs(gaps[0] - SECOND / rate) <= 1.0 and abs(gaps[len(gaps) // 2] - SECOND / rate) <= 1.0
 
 
 def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
@@ -159,7 +160,7 @@ def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
         return (int(then["sim_time_ns"]) - int(first["sim_time_ns"])) / (then["stamp_ns"] - first["stamp_ns"])
 
     # On a busy machine time is lost, so any second that goes as it should will do.
-    for factor, slowest, fastest in ((0.25, 0.125, 0.5), (4.0, 2.0, 8.0), (0.0, 10.0, math.inf)):
+    for factor, slowest, fastest in ((0.25, 0.2, 0.3), (4.0, 3.2, 4.8), (0.0, 10.0, math.inf)):
         rig.set(real_time_factor=factor)
         rig.start_over(paused=False)
         states.append(rig.state_at(200 * MS))

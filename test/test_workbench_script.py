@@ -29,12 +29,7 @@ def flown(saved: SavedScript, until_ns: int) -> State:
 
 def assert_flies_again(hand: HandSession) -> SavedScript:
     saved = save_as_script(hand.session())
-    again, first = flown(saved, hand.now_ns), hand.simulation.state
-    if saved.notes:
-        # Said to differ in the order of one instant: a rounding, and what the motion makes of it.
-        assert np.abs(again.row - first.row).max() < 1e-9
-    else:
-        assert again.sha256() == first.sha256()
+    assert flown(saved, hand.now_ns).sha256() == hand.simulation.state.sha256()
     return saved
 
 
@@ -47,10 +42,18 @@ def test_a_hand_session_saved_as_a_script_flies_again_to_the_bit(seed: int) -> N
 
 @pytest.mark.stress
 def test_three_hundred_hand_sessions_fly_again_to_the_bit() -> None:
-    noted = 0
+    noted, other = 0, []
     for seed in range(100, 400):
-        noted += bool(assert_flies_again(random_hand_session(seed, seconds=5.0)).notes)
-    assert noted < 30  # impulses along normals in one paused instant, whose order a script can't keep; measured 15
+        hand = random_hand_session(seed, seconds=5.0)
+        saved = save_as_script(hand.session())
+        again, first = flown(saved, hand.now_ns), hand.simulation.state
+        if again.sha256() != first.sha256():
+            # A rounding, and what the motion makes of it; and the script said so.
+            assert saved.notes and np.abs(again.row - first.row).max() < 1e-9
+            other.append(seed)
+        noted += bool(saved.notes)
+    # Impulses along normals in one paused instant, whose order a script can't keep: it rarely matters.
+    assert noted < 30 and other == [331]
 
 
 def test_what_was_done_before_a_reset_is_no_part_of_it() -> None:
