@@ -36,9 +36,13 @@ class Mark:
 
 @dataclass
 class Block:
-    """States in the order of their publication, with what happened between them."""
+    """States in the order of their publication, with what happened between them.
+
+    handed_over: by the producer, full or in a hurry, so that others follow it; else it was taken while it was filling.
+    """
 
     count: int = 0
+    handed_over: bool = False
     times: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.int64))
     walls: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.int64))
     rows: np.ndarray = field(default_factory=lambda: np.empty((BLOCK_ROWS, 13)))
@@ -64,6 +68,7 @@ class Mailbox:
         self._spare: list[Block] = []
         self._closed = False
         self._woken = False
+        self._hurried = False
 
     def put(self, time_ns: int, row: np.ndarray) -> None:
         """Copy one state row (13,)."""
@@ -74,7 +79,7 @@ class Mailbox:
             block.walls[i] = _wall_ns()
             block.rows[i] = row
             block.count = i + 1
-            if i + 1 == BLOCK_ROWS:
+            if self._hurried or i + 1 == BLOCK_ROWS:
                 self._hand_over()
 
     def mark(self, time_ns: int, kind: str, *content: Any) -> None:
@@ -82,7 +87,13 @@ class Mailbox:
         with self._changed:
             self._filling.marks.append(Mark(self._filling.count, time_ns, _wall_ns(), kind, content))
 
+    def hurry(self) -> None:
+        """Hand the next row over at once, with all that comes before it: how a run begins should be on disk from its start."""
+        with self._lock:
+            self._hurried = True
+
     def _hand_over(self) -> None:
+        self._hurried = False
         while len(self._waiting) >= BLOCKS_WAITING_MAX and not self._closed and not self._given_up:
             rest = self._taken_at + PATIENCE_S - time.monotonic()
             if rest <= 0.0:
@@ -90,6 +101,7 @@ class Mailbox:
                 self._on_given_up()
             self._changed.wait(max(0.0, rest))
         if not self._closed and not self._given_up:
+            self._filling.handed_over = True
             self._waiting.append(self._filling)
         self._filling = self._spare.pop() if self._spare and not self._closed else Block()
         self._changed.notify_all()
@@ -111,6 +123,7 @@ class Mailbox:
     def give_back(self, block: Block) -> None:
         """Return a block whose rows were sent."""
         block.count = 0
+        block.handed_over = False
         block.marks.clear()
         with self._changed:
             if len(self._spare) < 2:

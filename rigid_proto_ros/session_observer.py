@@ -23,7 +23,7 @@ from .core.commands import WrenchCommand
 from .core.errors import InputError
 from .core.loads import Load
 from .core.observer import BodySnapshot, Observer
-from .mailbox import BLOCK_ROWS, Block, Mailbox, Mark
+from .mailbox import Block, Mailbox, Mark
 from .mesh_io import resolve_mesh
 from .scene_file import read_scene_text
 from .session_mesh import file_sha256, scene_sha256
@@ -104,6 +104,7 @@ class McapObserver(Observer):
     def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
         """Write the scene, and the mesh's file once."""
         self._mailbox.mark(0, "scene", scene)
+        self._mailbox.hurry()
 
     def scene_changed(self, time_ns: int, scene: str) -> None:
         """Write the scene unless it is the one written last."""
@@ -137,6 +138,7 @@ class McapObserver(Observer):
     def reset(self) -> None:
         """The next run begins; its first event says so."""
         self._mailbox.mark(0, "reset")
+        self._mailbox.hurry()
 
     def close(self) -> None:
         """Write what is buffered and finish the file."""
@@ -169,12 +171,12 @@ class McapObserver(Observer):
             mailbox.wait(FLUSH_PERIOD_S)
 
     def _write_waiting(self) -> None:
-        full = True
-        while full:
+        more = True
+        while more:
             block, _ = self._mailbox.take()
             if block is None:
                 break
-            full = block.count == BLOCK_ROWS
+            more = block.handed_over
             if self._file is not None:
                 self._write(block)
                 self._file.flush()

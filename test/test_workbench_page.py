@@ -446,6 +446,35 @@ def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_en
             ear.close()
 
 
+def test_wheel_and_pinch_bring_the_view_nearer_and_a_click_still_pokes_where_it_points(page, ear) -> None:
+    x, y = page.middle[0] + 20.0, page.middle[1] - 10.0
+    setup = teapot()
+    size = float(np.linalg.norm(setup.surface.extent))
+    start, direction = page.ray(x, y)
+
+    def nearness() -> float:
+        """Of the camera: its distance from the middle against that of before, from where a click is seen to poke."""
+        ear.trigger("reset")
+        before = len(ear.events())
+        page.click(x, y)
+        frame, _, text = ear.event("poke", before)["content"]["frame_id"].partition("point/")
+        assert frame == "world@"
+        point = np.array(text.split(","), float)
+        seen = (point * setup.body.scale - setup.body.center_of_mass) / UNIT
+        (factor, _), *_ = np.linalg.lstsq(np.stack([start, direction], axis=1), seen, rcond=None)
+        hit, _ = setup.surface.ray_hit(setup.body.mesh_point(UNIT * factor * start), direction / setup.body.scale)
+        assert np.linalg.norm(hit - point) <= 0.01 * size
+        assert not [event for event in ear.events()[before:] if event["kind"].startswith("string")]
+        return factor
+
+    assert nearness() == pytest.approx(1.0, abs=0.02)
+    page.wheel(3)
+    page.until(lambda: nearness() < 0.9, "a nearer view")
+    by_wheel = nearness()
+    page.pinch(120.0, 220.0)
+    page.until(lambda: nearness() < 0.9 * by_wheel, "a view that is nearer still")
+
+
 def test_with_the_page_closed_the_node_has_the_subscribers_that_it_had_before(page, ear) -> None:
     assert listeners(ear) == WITH_A_PAGE
     page.page.goto("about:blank")

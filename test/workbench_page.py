@@ -103,7 +103,14 @@ class Page:
         return found
 
     def tab(self, name: str) -> None:
-        self.page.get_by_role("tab", name=name, exact=True).click(force=True)
+        """Open a tab; a click may fall between two pictures of the panel."""
+        tab = self.page.get_by_role("tab", name=name, exact=True)
+
+        def opened() -> bool:
+            tab.click(force=True)
+            return tab.get_attribute("aria-selected") == "true"
+
+        self.until(opened, f"tab {name}")
 
     def button(self, name: str) -> None:
         self.page.get_by_role("button", name=name, exact=True).click()
@@ -172,6 +179,22 @@ class Page:
             "Input.dispatchTouchEvent",
             {"type": phase, "touchPoints": [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]},
         )
+
+    def wheel(self, notches: int) -> None:
+        """Turn the wheel over the picture's middle, away from the hand."""
+        self.page.mouse.move(*self.middle)
+        for _ in range(notches):
+            self.page.mouse.wheel(0.0, -100.0)
+            time.sleep(SAID_S)
+
+    def pinch(self, begin: float, end: float) -> None:
+        """Move two fingers from one distance [pixels] beside the picture's middle to another."""
+        x, y = self.middle
+        for k in range(6):
+            away = begin + (end - begin) * k / 5
+            self.touch("touchMove" if k else "touchStart", (x - away, y), (x + away, y))
+            time.sleep(2.0 * SAID_S)
+        self.touch("touchEnd")
 
     def release(self) -> None:
         self.page.mouse.up()

@@ -91,7 +91,7 @@ def _length(x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
-def angle_between(a, b):
+def attitude_angle(a, b):
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
@@ -124,7 +124,7 @@ def quantity(code, row, context):
     if code == DISTANCE:
         return _length(row[0] - context[START], row[1] - context[START + 1], row[2] - context[START + 2])
     if code == TURNED:
-        return angle_between(context[START + 3 : START + 7], row[3:7])
+        return attitude_angle(context[START + 3 : START + 7], row[3:7])
     if code == KINETIC:
         return _kinetic(row, context)
     if code == POTENTIAL:
@@ -147,7 +147,7 @@ def quantity(code, row, context):
 def difference(code, a, b):
     """The difference number ``code`` of DIFFERENCES between two state rows."""
     if code == 0:
-        return angle_between(a[3:7], b[3:7])
+        return attitude_angle(a[3:7], b[3:7])
     if code == 1:
         return _length(a[0] - b[0], a[1] - b[1], a[2] - b[2])
     if code == 2:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..core.errors import InputError
-from ..mailbox import BLOCK_ROWS, Block, Mailbox, Mark
+from ..mailbox import Block, Mailbox, Mark
 from .streams import FileStream, LiveServer, LiveStream, end_without_waiting, forget_closed_recordings
 from .writer import SceneWriter
 
@@ -62,6 +62,7 @@ class Flusher:
         self.error = ""
         self.file = file
         self.mailbox.mark(-1, "record", file, threading.Event())
+        self.mailbox.hurry()
 
     def close_file(self) -> None:
         """Finish the file, if there is one; returns when it is whole."""
@@ -119,13 +120,13 @@ class Flusher:
                 end_without_waiting()
 
     def _flush(self) -> None:
-        """Send the full blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
-        full = True
-        while full:
+        """Send the blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
+        more = True
+        while more:
             block, waiting = self.mailbox.take()
             if block is None:
                 break
-            full = block.count == BLOCK_ROWS
+            more = block.handed_over
             self._writer.write(block, self._on_mark, skip_live=waiting > 1)
             self.mailbox.give_back(block)
         self._flush_ghost()

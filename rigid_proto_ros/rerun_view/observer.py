@@ -100,6 +100,8 @@ class RerunObserver(Observer):
         """Take copies of the scene and the mesh; they are logged once a run."""
         copies = [None if a is None else np.array(a) for a in (vertices, triangles)]
         self._mark(-1, "started", scene, *copies, mesh_sha256)
+        if self._flusher is not None:
+            self._flusher.mailbox.hurry()
 
     def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
         """Note the body from ``time_ns`` on."""
@@ -162,7 +164,8 @@ class RerunObserver(Observer):
         """Begin a new run."""
         if self._flusher is not None:
             self._flusher.ghosts.mark(-1, "reset")
-        self._mark(-1, "reset")
+            self._flusher.mailbox.mark(-1, "reset")
+            self._flusher.mailbox.hurry()
 
     def close(self) -> None:
         """Send what is buffered, finish the file, end the viewers that were started here."""

@@ -57,7 +57,7 @@ def _run(argv: list[str], ending: Ending) -> int:
         crashed.set()
         ending.ask()
 
-    physics = None
+    physics, status = None, 1
     try:
         with told_when_compiling(_say_that_it_compiles):
             if bodies:
@@ -91,6 +91,7 @@ def _run(argv: list[str], ending: Ending) -> int:
         for node in nodes:
             node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
         ending.wait()
+        status = 1 if crashed.is_set() else 0
     finally:
         if physics is not None:
             begin_closing()
@@ -98,14 +99,14 @@ def _run(argv: list[str], ending: Ending) -> int:
         for node in nodes:
             node.close()
         if physics is not None:
-            begin_teardown(1 if crashed.is_set() else 0)
+            begin_teardown(status)
         executor.shutdown(timeout_sec=0.5)
         if executor_thread is not None:
             executor_thread.join(timeout=0.5)
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 1 if crashed.is_set() else 0
+    return status
 
 
 def _warn(warning: str) -> None:

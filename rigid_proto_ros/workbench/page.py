@@ -18,9 +18,7 @@ import viser
 
 from ..core.errors import InputError
 from ..core.state import State
-from ..parameters import READ_ONLY, parameter_named
-from ..scenario import Scenario, make_scenario
-from ..scene_file import read_scene_text
+from ..scenario import Scenario
 from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
@@ -30,6 +28,7 @@ from .pointer import Pointer, Tools
 from .readout_panel import ReadoutPanel
 from .rewind import Rewind, core_row
 from .ros_link import RosLink
+from .scene_loader import SceneLoader
 from .scene_view import SceneView
 from .session_tab import SessionTab
 from .shadow import Shadow
@@ -54,7 +53,7 @@ POKE_TRAVEL = 0.3
 
 
 class Page:
-    """Follows one node. state: the last one heard; scenario: the parameters in force, as the node said last.
+    """Follows one node. state: the last one heard.
 
     address: of this page. lesson: name of the bundled scene that it was started with, or empty.
     """
@@ -63,7 +62,6 @@ class Page:
         self.server = server
         self.address = address
         self.loop = server.get_event_loop()
-        self.scenario: Scenario | None = None
         self.state: State | None = None
         self.tools = Tools()
         self.usual_force = 1.0
@@ -75,6 +73,7 @@ class Page:
         self._paused_before_looking = False
         self.diagnostics: dict[str, str] = {}
         self.link = RosLink(target, self.deliver, self._on_scene, self._on_diagnostics)
+        self._scenes = SceneLoader(self.loop, self._take_on, self._unshown)
         self.view = SceneView(server)
         self.sightings = Sightings()
         self.acting = Acting()
@@ -93,13 +92,16 @@ class Page:
         self._session.show_lesson_named(lesson)
         self._open = asyncio.Event()
         self._known = asyncio.Event()
-        self._scene_text = self._loaded_text = ""
-        self._loading: asyncio.Task | None = None
         self._another_body = True
         self._doing = ""
         self._heard_s = self._slow_due_s = 0.0
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
+
+    @property
+    def scenario(self) -> Scenario | None:
+        """The parameters in force, as the node said last; None before it has."""
+        return self._scenes.scenario
 
     def deliver(self, function, *arguments) -> None:
         """Run a function on the page's thread soon; from any thread."""
@@ -140,7 +142,7 @@ class Page:
             self.history = History(self.link.target.strip("/"), self._attachments)
             self.sightings.forget()
             self._readouts.restart()
-            self._scene_text = self._loaded_text = ""
+            self._scenes.forget()
             self._known.clear()  # somebody may change it meanwhile, and a link sets what differs from it
 
     # What the tabs ask for
@@ -240,36 +242,12 @@ class Page:
 
     def _on_scene(self, text: str) -> None:
         self.history.scene(text)
-        self._scene_text = text
-        if self._loading is None:
-            self._loading = self.loop.create_task(self._load_scene())
+        self._scenes.load(text)
 
-    async def _load_scene(self) -> None:
-        """Take on what the node flies; a big mesh is read beside the loop."""
-        try:
-            while self._scene_text != self._loaded_text:
-                text = self._scene_text
-                scenario = await asyncio.to_thread(self._scenario, read_scene_text(text).values)
-                self._loaded_text = text
-                self._take_on(scenario)
-        except InputError as error:
-            self.say(f"The node's scene can't be shown: {error}")
-        finally:
-            self._loading = None
+    def _unshown(self, error: InputError) -> None:
+        self.say(f"The node's scene can't be shown: {error}")
 
-    def _scenario(self, values) -> Scenario:
-        present = self.scenario
-        if present is None or present.values.keys() != values.keys():
-            return make_scenario(values)
-        changes = {name: value for name, value in values.items() if present.values[name] != value}
-        if any(parameter_named(name).changes == READ_ONLY for name in changes):
-            return make_scenario(values)
-        if "density" in changes and "mass" not in changes:
-            changes["mass"] = values["mass"]
-        return present.with_changes(changes)
-
-    def _take_on(self, scenario: Scenario) -> None:
-        old, self.scenario = self.scenario, scenario
+    def _take_on(self, old: Scenario | None, scenario: Scenario) -> None:
         if self.view.set_body(scenario, zoom=self._another_body):
             self.sightings.forget()
             self.pointer.attach(self.view.body)

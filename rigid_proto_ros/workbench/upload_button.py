@@ -66,6 +66,7 @@ class UploadButton:
             self._flown = ""
 
     async def _take(self, name: str, content: bytes) -> None:
+        await self._page.known()
         values = self._page.scenario.values
         repair, fallback = values["mesh_repair"], values["mesh_fallback"]
         try:

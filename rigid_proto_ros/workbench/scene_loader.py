@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""From the scene's text, as the node says it, to the scenario that it flies."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+
+from ..core.errors import InputError
+from ..parameters import READ_ONLY, parameter_named
+from ..scenario import Scenario, make_scenario
+from ..scene_file import read_scene_text
+
+
+class SceneLoader:
+    """Takes on the newest text, one after the other: a big mesh is read beside the loop that this runs on.
+
+    scenario: the last one that was taken on; take_on is told of each, and refused of what can't be taken on.
+    """
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        take_on: Callable[[Scenario | None, Scenario], None],
+        refused: Callable[[InputError], None],
+    ) -> None:
+        self.scenario: Scenario | None = None
+        self._loop = loop
+        self._take_on = take_on
+        self._refused = refused
+        self._newest = self._loaded = ""
+        self._loading: asyncio.Task | None = None
+
+    def load(self, text: str) -> None:
+        """Take this on, unless a newer one comes first."""
+        self._newest = text
+        if self._loading is None:
+            self._loading = self._loop.create_task(self._load())
+
+    def forget(self) -> None:
+        """Take on the next text even if it says what the last one did."""
+        self._newest = self._loaded = ""
+
+    async def _load(self) -> None:
+        try:
+            while self._newest != self._loaded:
+                text = self._loaded = self._newest
+                try:
+                    scenario = await asyncio.to_thread(_scenario, self.scenario, read_scene_text(text).values)
+                except InputError as error:
+                    self._refused(error)
+                    continue
+                before, self.scenario = self.scenario, scenario
+                self._take_on(before, scenario)
+        finally:
+            self._loading = None
+
+
+def _scenario(present: Scenario | None, values: Mapping[str, object]) -> Scenario:
+    """What the values describe; from the present one's mesh and moments where they are the same."""
+    if present is None or present.values.keys() != values.keys():
+        return make_scenario(values)
+    changes = {name: value for name, value in values.items() if present.values[name] != value}
+    if any(parameter_named(name).changes == READ_ONLY for name in changes):
+        return make_scenario(values)
+    if "density" in changes and "mass" not in changes:
+        changes["mass"] = values["mass"]
+    return present.with_changes(changes)
