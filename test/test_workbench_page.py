@@ -83,17 +83,22 @@ def shared_page(linked_page, ear) -> Page:
 @pytest.fixture
 def page(shared_page, ear) -> Page:
     """The page with the body at rest at the origin, in the middle of the picture, and the Play tab open."""
-    ear.trigger("reset")
     ear.trigger("string/release")
     shared_page.tab("Play")
+    put_at_rest(shared_page, ear)
+    return shared_page
+
+
+def put_at_rest(page: Page, ear: Ear) -> None:
+    """Reset, and wait until the page shows it."""
+    ear.trigger("reset")
 
     def as_reset() -> bool:
         # One that moved before is shown at rest, or the page shows a time that isn't there yet.
-        time_s, energy = shared_page.readout
+        time_s, energy = page.readout
         return energy == 0.0 and time_s <= ear.now_ns() * 1e-9
 
-    shared_page.until(as_reset, "the body at rest")
-    return shared_page
+    page.until(as_reset, "the body at rest")
 
 
 def teapot():
@@ -447,14 +452,14 @@ def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_en
 
 
 def test_wheel_and_pinch_bring_the_view_nearer_and_a_click_still_pokes_where_it_points(page, ear) -> None:
-    x, y = page.middle[0] + 20.0, page.middle[1] - 10.0
+    x, y = page.middle[0] + 30.0, page.middle[1]
     setup = teapot()
     size = float(np.linalg.norm(setup.surface.extent))
     start, direction = page.ray(x, y)
 
     def nearness() -> float:
         """Of the camera: its distance from the middle against that of before, from where a click is seen to poke."""
-        ear.trigger("reset")
+        put_at_rest(page, ear)
         before = len(ear.events())
         page.click(x, y)
         frame, _, text = ear.event("poke", before)["content"]["frame_id"].partition("point/")
