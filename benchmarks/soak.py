@@ -91,7 +91,7 @@ def _guest(flying: Process) -> Process | subprocess.Popen:
     address = next((word for line in flying.errors for word in line.split() if word.startswith("rerun+http")), "")
     return subprocess.Popen(
         # The program itself: the script of that name would be killed and leave it alive.
-        [str(viewer_program()), address, "--headless"],
+        [str(viewer_program()), "--connect", address, "--headless"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env=environment(),

@@ -148,6 +148,15 @@ def test_a_missing_viewer_is_a_warning_and_the_run_is_recorded(tmp_path, monkeyp
         assert len(read_session(path).times) == 10
 
 
+def test_without_a_display_the_command_that_opens_a_viewer_elsewhere_is_told(monkeypatch):
+    monkeypatch.setattr(viewers, "has_display", lambda: False)
+    lines = []
+    observer = RerunObserver(viewer="native", report=lines.append)
+    observer.close()
+    # Without --connect the program would pour the stream back into the server that it reads it from.
+    assert any(line.endswith(f": rerun --connect {observer.live_address}") for line in lines)
+
+
 def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(viewer):
     observer = RerunObserver(viewer="serve")
     flight.fly(observer, flight.rows(80))

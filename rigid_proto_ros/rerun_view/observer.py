@@ -241,8 +241,10 @@ class RerunObserver(Observer):
             elif viewer == "native" and viewers.has_display():
                 self._processes.append(viewers.open_native(self.live_address))
             elif viewer == "native":
+                # Without --connect the program takes the server at its usual port for a viewer, and pours what it
+                # reads there back into it.
                 self._report(
-                    f"no display for the viewer; open one elsewhere on this machine: rerun {self.live_address}"
+                    f"no display for the viewer; open one elsewhere on this machine: rerun --connect {self.live_address}"
                 )
         except OSError as error:
             self.web_address = ""
