@@ -21,13 +21,15 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from node_processes import Process, client, node
+from node_processes import Process, client, node, viewer
 from node_skips import skips
 from result_table import ResultTable
 
 RESULTS = Path(__file__).parent / "results"
 SPIN = "initial.angular_velocity:=[0.05, 0.1, 12.0]"
 KILOHERTZ = "publish_rate:=1000.0"
+VIEWER_S = 4.0
+"""A viewer's life: it takes two seconds to connect."""
 COLUMNS = ("what", "figure", "value", "unit", "load_1min", "cores")
 SKIP_COLUMNS = ("skipped", "unit", "done", "as_it_is", "load_1min")
 
@@ -41,6 +43,7 @@ def main() -> None:
         "rate": rate,
         "latency": latency,
         "recording": recording,
+        "viewers": viewers,
         "flood": flood,
         "bodies": bodies,
     }
@@ -140,6 +143,23 @@ def recording(note, seconds: float) -> None:
     """What a recording at 1 kHz costs."""
     with node(KILOHERTZ, SPIN, f"record:={_recording()}") as process:
         note("1 kHz, recording, nobody listens", "cpu", process.cpu_share(seconds), "%")
+
+
+def viewers(note, seconds: float) -> None:
+    """The rate that is held at 1 kHz while nobody watches the live stream, and while viewers are killed one after the other."""
+    with node(KILOHERTZ, SPIN, "viewer:=web") as process:
+        for what, count in (("nobody watches", 0), ("20 viewers are killed", 20)):
+            lost = float(diagnostics()["real_time_lost_s"])
+            with client("subscribe", "twist", str(2.0 + (count * VIEWER_S or seconds))) as listener:
+                for _ in range(count):
+                    watching = viewer(process)
+                    time.sleep(VIEWER_S)
+                    watching.kill()
+                    watching.wait()
+                what = f"1 kHz, live stream, {what}"
+                note(what, "rate", result_of(listener)["rate"], "1/s")
+            note(what, "lost time", float(diagnostics()["real_time_lost_s"]) - lost, "s")
+            note(what, "rss", process.memory_mb(), "MB")
 
 
 def _recording() -> str:

@@ -16,9 +16,11 @@ from pathlib import Path
 import psutil
 
 FOLDER = Path(__file__).parent
-sys.path.append(str(FOLDER.parent / "test"))
+sys.path[:0] = [str(FOLDER.parent), str(FOLDER.parent / "test")]
 
 from ros_domain import hold_domain
+
+from rigid_proto_ros.rerun_view.viewers import viewer_program
 
 _held: list[socket.socket] = []
 
@@ -106,6 +108,18 @@ def node(*parameters: str, settle_s: float = 1.0) -> Process:
         raise
     time.sleep(settle_s)
     return process
+
+
+def viewer(flying: Process) -> subprocess.Popen:
+    """A viewer without a window that watches the node's live stream."""
+    address = next(word for line in flying.errors for word in line.split() if word.startswith("rerun+http"))
+    return subprocess.Popen(
+        # The program itself: the script of that name would be killed and leave it alive.
+        [str(viewer_program()), "--port", "auto", "--connect", address, "--headless"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=environment(),
+    )
 
 
 def client(name: str, *arguments: str) -> Process:

@@ -19,9 +19,8 @@ from pathlib import Path
 
 import psutil
 
-from node_processes import Process, client, environment, node
+from node_processes import Process, client, node, viewer
 from result_table import ResultTable
-from rigid_proto_ros.rerun_view.viewers import viewer_program
 
 RESULTS = Path(__file__).parent / "results"
 MEMORY_GROWTH_MB = 30.0
@@ -88,14 +87,7 @@ def _guest(flying: Process) -> Process | subprocess.Popen:
     """A subscriber, or a viewer of the live stream, that will leave by itself, be asked to, or be killed."""
     if random.random() < 0.85:
         return client("subscribe", random.choice(["pose", "twist"]))
-    address = next((word for line in flying.errors for word in line.split() if word.startswith("rerun+http")), "")
-    return subprocess.Popen(
-        # The program itself: the script of that name would be killed and leave it alive.
-        [str(viewer_program()), "--connect", address, "--headless"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=environment(),
-    )
+    return viewer(flying)
 
 
 def _shown_out(guest: tuple[float, Process | subprocess.Popen], now: float) -> bool:
