@@ -25,6 +25,7 @@ from .poke_mark import PokeMark
 BODY_COLOUR, GHOST_COLOUR = (214, 205, 190), (120, 180, 255)
 STRING_COLOUR, HAND_COLOUR = (250, 180, 60), (250, 130, 40)
 LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (205, 25, 25), (190, 120, 245), (60, 190, 190)
+BOUNDS_COLOUR = (90, 90, 90)
 AXES_COLOURS = np.array([(235, 85, 85), (90, 200, 110), (85, 150, 250)])
 
 SWITCHES = {
@@ -205,9 +206,8 @@ class SceneView:
             ),
         }
         if scenario.setup.surface is not None:
-            middle = (0.5 * (corners[0] + corners[1]) - body.center_of_mass) / unit
-            sides = tuple(((corners[1] - corners[0]) / unit).tolist())
-            made["Bounding box"] = scene.add_box("/body/bounds", (90, 90, 90), sides, position=middle, wireframe=True)
+            edges = _box_edges((corners - body.center_of_mass) / unit)
+            made["Bounding box"] = scene.add_line_segments("/body/bounds", edges, BOUNDS_COLOUR, thickness=0.005)
         else:
             self._handles["Bounding box"] = []
         for name, handle in made.items():
@@ -281,6 +281,12 @@ def nice_length(length: float) -> float:
     """1, 2 or 5 times a power of ten, the next above a length [m]."""
     power = 10.0 ** math.floor(math.log10(length))
     return next(nice for nice in (power, 2.0 * power, 5.0 * power, 10.0 * power) if nice >= length)
+
+
+def _box_edges(corners: np.ndarray) -> np.ndarray:
+    """The twelve edges (12, 2, 3) of the box between two corners (2, 3)."""
+    ends = [(k, k | 1 << axis) for axis in range(3) for k in range(8) if not k >> axis & 1]
+    return np.array([[[corners[k >> axis & 1, axis] for axis in range(3)] for k in pair] for pair in ends])
 
 
 def _box_corners(surface, scale) -> np.ndarray:
