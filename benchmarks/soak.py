@@ -108,7 +108,11 @@ def _shown_out(guest: tuple[float, Process | subprocess.Popen], now: float) -> b
 
 def _report(flying: Process, minute: float) -> dict:
     with client("subscribe", "pose", "3") as listener:
-        listener.popen.wait(60)
+        try:
+            listener.popen.wait(60)
+        except subprocess.TimeoutExpired:
+            # Counted in the verdict: the run goes on and shows whether others hear the node.
+            print("a listener that heard nothing in 60 s", flush=True)
         heard = listener.end().splitlines()[1:]
         rate = json.loads(heard[0])["rate"] if heard else math.nan
     figures = {
@@ -132,6 +136,7 @@ def _counters() -> dict[str, str]:
 def _verdict(history: list[dict], sent: dict, counters: dict[str, str]) -> int:
     settled, last = history[len(history) // 3], history[-1]
     rates = sorted(report["rate"] for report in history if math.isfinite(report["rate"]))
+    unheard = len(history) - len(rates)
     received = int(counters["commands_received"])
     checks = {
         f"memory {settled['rss']:.1f} to {last['rss']:.1f} MB": last["rss"] - settled["rss"] <= MEMORY_GROWTH_MB,
@@ -141,6 +146,7 @@ def _verdict(history: list[dict], sent: dict, counters: dict[str, str]) -> int:
             rates[len(rates) // 2] - 500.0
         )
         < 5.0,
+        f"{unheard} of {len(history)} listeners heard nothing": unheard == 0,
         f"messages {received} received + {counters['sequence_gaps']} gaps of {sent['messages']} sent": received
         + int(counters["sequence_gaps"])
         == sent["messages"],
