@@ -26,11 +26,15 @@ up: setup ## node and viewer; stays until Ctrl-C
 workbench: setup ## node and interactive page; stays until Ctrl-C
 	@.venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
 
+# A wait that has run out says that the machine was busy or that a process wasn't discovered, and nothing about values: such a
+# test, and no other, is tried once more, and the report says which.
+AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rR
+
 # Hundreds of processes are started: none of them should read our source anew.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
 	@$(PY) test/warm_kernels.py
-	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not stress and not bench and not soak" $(ARGS)
+	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
 	$(PY) -m ruff check .

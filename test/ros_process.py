@@ -100,7 +100,7 @@ class RosProcess:
         while text not in self.output + self.errors:
             ended = self.process.poll()
             assert ended is None, f"ended with {ended}: {self.output}{self.errors}"
-            assert time.monotonic() < deadline, f"no {text!r} in {self.output}{self.errors}"
+            assert time.monotonic() < deadline, f"no {text!r} within {READY_S} s: {self.output}{self.errors}"
             time.sleep(0.02)
 
     def end(self, number: int = signal.SIGINT, within_s: float = READY_S) -> int:
