@@ -81,6 +81,16 @@ def resolve_mesh(name: str) -> Path:
 
     Raises MeshError when there is none, with the bundled names and the one most like it.
     """
+    try:
+        return _found_mesh(name)
+    except (OSError, RuntimeError) as error:  # a name too long, a folder that may not be read, a user's home unknown
+        reason = getattr(error, "strerror", None) or str(error).rstrip(".")
+        raise MeshError(
+            "mesh", name, f"a file that can be read, package://<package>/<path>, or a bundled name ({reason})"
+        ) from None
+
+
+def _found_mesh(name: str) -> Path:
     if name.startswith("package://"):
         package, _, inside = name[len("package://") :].partition("/")
         folder = _package_folder(package)
@@ -183,8 +193,10 @@ def _read(data: bytes, path: Path, max_triangles: int) -> tuple[np.ndarray, np.n
 
 def _read_with_trimesh(path: Path, max_triangles: int) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and triangles of the scene in a file that trimesh reads, its nodes' transforms applied."""
-    import trimesh
-
+    try:
+        import trimesh
+    except ImportError:
+        raise MeshError("mesh", path.name, "trimesh installed for this format: pip install trimesh") from None
     try:
         mesh = trimesh.load(path, process=False, maintain_order=True, skip_materials=True, force="mesh")
         vertices = np.array(mesh.vertices, dtype=np.float64)

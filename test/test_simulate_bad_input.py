@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Refused input: exit status 2 and one line that names what, where and what would be accepted; through the real commands."""
 
+import errno
 import os
+import sys
+from pathlib import Path
 
 import pytest
 from ros_process import READY_S, refusal, run
 
 from rigid_proto_ros.bundled import scene_path
 from rigid_proto_ros.cli.main import main as rigid_proto
+from rigid_proto_ros.core.errors import MeshError
+from rigid_proto_ros.mesh_io import resolve_mesh
 from rigid_proto_ros.ros.main import main as rigid_body_node
 from rigid_proto_ros.ros.poke_client import main as poke_client
 
@@ -130,6 +135,29 @@ def test_an_unreadable_mesh_or_a_folder_is_refused(tmp_path, capfd):
     if os.access(unreadable, os.R_OK):
         pytest.skip("root reads everything")
     assert "cow.obj" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={unreadable}"])
+
+
+@pytest.mark.parametrize("name", ["~nosuchuser/part.obj", "x" * 300 + ".obj", "package://rigid_proto_ros/" + "x" * 300])
+def test_a_mesh_name_that_the_system_itself_refuses_is_refused(name, capfd):
+    for arguments in (["inspect", name], ["simulate", "t_handle", "--set", f"mesh={name}"]):
+        line = one_line(capfd, rigid_proto, arguments)
+        assert "mesh: got" in line and name in line and "accepted: a file that can be read" in line
+
+
+@pytest.mark.parametrize("method", ["is_file", "iterdir"])
+def test_a_mesh_in_a_folder_that_may_not_be_read_is_refused(method, monkeypatch):
+    def denied(path):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, method, denied)  # root, who may run this, is denied nothing
+    with pytest.raises(MeshError, match="Permission denied"):
+        resolve_mesh("/tmp/nowhere.obj")
+
+
+def test_a_format_that_needs_trimesh_says_so_where_it_is_not_installed(tmp_path, monkeypatch, capfd):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    (tmp_path / "part.glb").write_bytes(b"glTF" + bytes(100))
+    assert "pip install trimesh" in one_line(capfd, rigid_proto, ["inspect", str(tmp_path / "part.glb")])
 
 
 @pytest.mark.parametrize("name", SCENES)
