@@ -3,10 +3,12 @@
 
 Blank or tab separated, negative indices counted back from the vertices read so far (also when v and f lines
 interleave), continued lines, ``v/vt/vn`` corners. Lines that carry no geometry of the surface (vt, vn, l, p, groups,
-materials) are skipped.
+materials) are skipped, and so is a byte order mark, which would hide the first line.
 """
 
 from __future__ import annotations
+
+import codecs
 
 import numpy as np
 
@@ -116,6 +118,7 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
 
     Raises MeshError with the file's name and line.
     """
+    data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data[:4096]:
         raise MeshError(name, "binary content", "an .obj file, which is text")
     if b"\\\n" in data or b"\\\r\n" in data:

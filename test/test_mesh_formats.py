@@ -82,6 +82,11 @@ def test_obj_corners_with_texture_and_normal_numbers_tabs_and_continued_lines(tm
     assert mesh.polygons == 6
 
 
+def test_a_byte_order_mark_hides_no_vertex_of_an_obj(tmp_path):
+    mesh = load(tmp_path, "marked.obj", b"\xef\xbb\xbf" + obj())
+    assert np.array_equal(mesh.vertices, CUBE_VERTICES) and volume(mesh) == 1.0
+
+
 def test_obj_vertices_with_weights_or_colours_keep_their_coordinates(tmp_path):
     text = "\n".join(line + " 0.1 0.2 0.3" if line.startswith("v ") else line for line in obj().decode().splitlines())
     assert volume(load(tmp_path, "colours.obj", text.encode())) == 1.0
