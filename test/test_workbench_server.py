@@ -14,8 +14,11 @@ import pytest
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
 from rigid_proto_ros.cli.main import main  # noqa: E402
+from rigid_proto_ros.cli.processes import Processes  # noqa: E402
+from rigid_proto_ros.core.errors import InputError  # noqa: E402
 from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
 from rigid_proto_ros.workbench.controls import Controls  # noqa: E402
+from rigid_proto_ros.workbench.listening import choose_page_port  # noqa: E402
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server  # noqa: E402
 from rigid_proto_ros.workbench.upload import MAX_BYTES  # noqa: E402
 from rigid_proto_ros.workbench.upload_button import MAX_TRANSFERS, PART_BYTES, guard_uploads  # noqa: E402
@@ -28,6 +31,48 @@ def server() -> Iterator:
     server = make_server(LOOPBACK, any_free_port(), OPENED.append)
     yield server
     stop_server(server)
+
+
+NOT_HERE = "203.0.113.7"
+"""An address that documents are written about: no machine has it."""
+
+
+@pytest.mark.parametrize("host", [NOT_HERE, "a..b", "http://127.0.0.1"])
+def test_a_host_that_nothing_can_listen_on_is_refused_by_name(host: str) -> None:
+    with pytest.raises(InputError, match="--host: got"):
+        make_server(host, any_free_port(), OPENED.append)
+
+
+def test_a_taken_port_is_refused_and_never_another_one(server, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = server.get_port()
+    for host in (LOOPBACK, "0.0.0.0"):
+        with pytest.raises(InputError, match=f"--port: got {taken}"):
+            make_server(host, taken, OPENED.append)
+    # Somebody takes it after the first look, and viser goes on to the next one.
+    monkeypatch.setattr("rigid_proto_ros.workbench.server.check_address", lambda host, port: None)
+    with pytest.raises(InputError, match=f"--port: got {taken}"):
+        make_server(LOOPBACK, taken, OPENED.append)
+
+
+def test_without_a_port_asked_for_the_next_free_one_is_taken_on_the_host_that_is_served() -> None:
+    with socket.create_server(("127.0.0.2", 0)) as other:
+        taken = other.getsockname()[1]
+        assert choose_page_port("127.0.0.2", None, taken) > taken
+        with pytest.raises(InputError, match=f"--port: got {taken}"):
+            choose_page_port("127.0.0.2", taken, taken)
+
+
+@pytest.mark.parametrize(
+    "arguments, named",
+    [(["--host", NOT_HERE], "--host"), (["--port", "0"], "--port"), (["--port", "65536"], "--port")],
+)
+def test_an_address_that_cannot_be_served_is_refused_before_anything_starts(
+    arguments, named, monkeypatch, capsys
+) -> None:
+    monkeypatch.setattr(Processes, "start", lambda self, command: pytest.fail(f"started {command}"))
+    assert main(["workbench", *arguments]) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and told.err.count("\n") == 1 and f"{named}: got" in told.err
 
 
 def status(server, path: str = "/", **headers: str) -> int:

@@ -45,13 +45,15 @@ def run(args: argparse.Namespace) -> int:
 def _stay(args: argparse.Namespace) -> int:
     from ..bundled import scene_names
     from ..parameters import PARAMETERS
-    from ..rerun_view.ports import LOOPBACK, choose_port
+    from ..rerun_view.ports import LOOPBACK
+    from ..workbench.listening import choose_page_port
     from .processes import Processes, own_executable
 
     scene = args.scene or "t_handle"
     node_arguments, asked = ([], None) if args.node else _node_arguments(scene, args.mesh)
-    port = choose_port("--port", args.port or asked, PARAMETERS["workbench_port"].default)
-    page_arguments = ["--port", str(port), "--host", args.host or LOOPBACK, "--node", args.node or "/rigid_body"]
+    host = args.host or LOOPBACK
+    port = choose_page_port(host, asked if args.port is None else args.port, PARAMETERS["workbench_port"].default)
+    page_arguments = ["--port", str(port), "--host", host, "--node", args.node or "/rigid_body"]
     page_arguments += ["--lesson", scene] if not args.mesh and not args.node and scene in scene_names() else []
     page_arguments += ["--link", args.link] if args.link else []
     page_arguments += [] if args.no_browser else ["--open"]

@@ -15,18 +15,29 @@ import viser
 import websockets.asyncio.server
 from viser import _messages
 
+from ..core.errors import InputError
+from .listening import check_address
+
 PANEL_PIXELS = 380
 TITLE = "rigid_proto workbench"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "::1")
 
 
 def make_server(host: str, port: int, on_link: Callable[[str], None]) -> viser.ViserServer:
-    """A server that listens on exactly this port. on_link(text) is called when a page is opened with ``/?<link>``."""
+    """A server that listens on exactly this port. on_link(text) is called when a page is opened with ``/?<link>``.
+
+    Raises InputError naming ``--host`` or ``--port`` where nothing can listen there.
+    """
+    check_address(host, port)
     # Whoever knocks and goes, a port scan or a browser that thought better of it, is no error of ours.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     # Its greeting would stand between the lines that the command prints.
     with contextlib.redirect_stdout(io.StringIO()), _requests_go_through(_gate(host, on_link)):
         server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
+    if server.get_port() != port:
+        # Somebody took it in between, and viser went on to the next.
+        stop_server(server)
+        raise InputError("--port", port, f"a port on {host} that no other program listens on")
     # A browser could ask for a public tunnel to this server: nobody asked us for that.
     for request in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(request)
