@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import ENDINGS
 from ros_process import READY_S, refusal, run
 
 from rigid_proto_ros.bundled import scene_path
@@ -201,6 +202,24 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
 )
 def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
     assert part in one_line(capfd, rigid_proto, arguments)
+
+
+@pytest.mark.parametrize("option", ["--record", "--bag", "--set"])
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_is_refused_overwrites_no_recording(option, ending, tmp_path, capfd):
+    kept, script = tmp_path / f"kept{ending}", tmp_path / "pokes.yaml"
+    kept.write_bytes(b"an earlier flight")
+    script.write_text(SCRIPTS["contact"][0])
+    recorded = [option, f"record={kept}" if option == "--set" else str(kept)]
+    elsewhere = ["--record", str(tmp_path / "nowhere" / "x.mcap")] if option == "--bag" else []
+    for refused in (["--script", str(script)], elsewhere or ["--set", "mass=-1"], ["--duration", "-1"]):
+        one_line(capfd, rigid_proto, ["simulate", "t_handle", *recorded, *refused])
+        assert kept.read_bytes() == b"an earlier flight"
+
+
+def test_two_recordings_of_one_flight_are_two_files(tmp_path, capfd):
+    file = str(tmp_path / "x.mcap")
+    assert "another file" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--record", file, "--bag", file])
 
 
 def test_a_binary_file_is_no_scene_script_or_session(tmp_path, capfd):

@@ -7,6 +7,7 @@ import argparse
 import json
 import math
 import sys
+from pathlib import Path
 
 from ..core.errors import InputError
 
@@ -40,6 +41,10 @@ def run(args: argparse.Namespace) -> int:
     recordings = [file for file in (args.record or scenario.values["record"], args.bag) if file]
     if args.bag and not is_mcap(args.bag):
         raise InputError("--bag", args.bag, "a file that ends in .mcap")
+    if recordings:
+        # Whatever is refused is refused here, before a recording of an earlier run is overwritten.
+        OfflineRun(scenario, script)
+        _check_places(recordings)
     observer = _recorder(recordings, scenario.values)
     try:
         flight = OfflineRun(scenario, script, observer)
@@ -58,6 +63,14 @@ def run(args: argparse.Namespace) -> int:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1
     return 0
+
+
+def _check_places(files: list[str]) -> None:
+    for file in files:
+        if Path(file).is_dir() or not Path(file).parent.is_dir():
+            raise InputError("record", file, "a file in an existing folder")
+    if len({Path(file).resolve() for file in files}) < len(files):
+        raise InputError("--bag", files[-1], "another file than that of --record")
 
 
 def _recorder(files: list[str], values):
