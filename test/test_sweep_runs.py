@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from conftest import ENDINGS
 from sweep_studies import POKES, PULLED, study
 
 from rigid_proto_ros.cli.main import main
@@ -125,6 +126,43 @@ def test_a_study_that_is_refused_is_one_line_and_exit_2(tmp_path, capsys) -> Non
     assert said.count("\n") == 1 and "vary.mass.uniform" in said and "a < b" in said
     assert main(["sweep", "flip_map", "--row", "4653"]) == 2
     assert "0 to 4652" in capsys.readouterr().err
+
+
+NUDGED = {
+    "scene": "t_handle",
+    "script": [{"t": 0.1, "at": {"vertex": 0}, "impulse": [0.001, 0.0, 0.0]}],
+    "duration": 0.2,
+    "vary": {"script.1.at.vertex": {"grid": [0, 5, 10, 10**6]}},
+    "measure": {"final": ["spin"], "flips": True},
+}
+"""The last row fails: the body has no such vertex."""
+
+
+def test_vertices_of_a_grid_are_flown_and_failed_rows_are_counted(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(yaml.safe_dump(NUDGED))
+    assert main(["sweep", "s.yaml"]) == 0
+    said = capsys.readouterr().out
+    assert "4 rows in s.parquet" in said and "1 of them failed" in said
+    assert main(["sweep", "s.yaml", "--resume", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rows_failed"] == 1
+    rows = content(Path("s.parquet"))
+    assert [reason is None for reason in rows["failure"]] == [True, True, True, False]
+    assert "vertex/0 to vertex/" in rows["failure"][3]
+    assert len(set(rows["spin.z"][:3])) == 3
+    spaced = study(NUDGED, vary={"script.1.at.vertex": {"grid": {"from": 0, "to": 10, "count": 3}}})
+    assert run_chunk(spaced, 0, 3).columns["spin.z"].tolist() == rows["spin.z"][:3]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_row_that_is_refused_overwrites_nothing(ending, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(yaml.safe_dump(NUDGED))
+    kept = Path(f"kept{ending}")
+    kept.write_bytes(b"an earlier flight")
+    assert main(["sweep", "s.yaml", "--row", "3", "--record", str(kept)]) == 2
+    assert "vertex/0 to vertex/" in capsys.readouterr().err
+    assert kept.read_bytes() == b"an earlier flight"
 
 
 def test_pictures_of_a_table_are_the_same_file_again(tmp_path, monkeypatch) -> None:

@@ -14,6 +14,7 @@ from rigid_proto_ros.sweep.study import read_study
 from rigid_proto_ros.sweep.variation import variation
 
 PLAIN = {"scene": "t_handle", "duration": 1.0, "vary": {"mass": {"grid": [1.0, 2.0]}}}
+NUDGE = {"script": [{"t": 0.1, "at": {"vertex": 0}, "impulse": [0.1, 0.0, 0.0]}]}
 TWELVE = {"from": 1, "to": 2, "count": 10**6}
 
 
@@ -48,6 +49,8 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"reference": {"publish_clok": True}}, "parameter", "did you mean publish_clock"),
         ({"script": [{"t": 0.1, "at": "tipp", "force": [0, 0, 1]}]}, "script, command 1", "tip"),
         ({"script": [{"t": 0.1, "at": "tip", "froce": [0, 0, 1]}]}, "entry 1", "force"),
+        ({**NUDGE, "vary": {"script.1.at.vertex": {"grid": [0, 0.5]}}}, "vary.script.1.at.vertex", "{vertex: i}"),
+        ({**NUDGE, "vary": {"script.1.at.vertex": {"uniform": [0, 5]}}, "samples": 2}, "vertex", "random_vertex"),
     ],
 )
 def test_a_bad_study_is_refused_with_its_field(changes, field: str, words: str) -> None:

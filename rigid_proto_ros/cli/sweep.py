@@ -73,6 +73,8 @@ def _whole(study, args) -> int:
         print(f"{metadata['rows']} rows in {file}")
         if metadata["rows_by_simulation"]:
             print(f"{metadata['rows_by_simulation']} of them were flown or refused one by one")
+        if metadata.get("rows_failed"):  # a table of an earlier version doesn't say
+            print(f"{metadata['rows_failed']} of them failed; the column failure says why")
         if plot:
             print(f"picture in {plot.file}")
     return 0

@@ -36,10 +36,11 @@ def row_summary(study: Study, row: int) -> dict:
 def write_scene(study: Study, row: Variation, file: Path, time: float | None) -> dict:
     """Write the row as a scene, its script beside it as NAME_script.yaml; returns the files and the command that flies them."""
     duration = time if time is not None else study.duration_ns / 1e9
+    scenario, commands = row.scenario, row.commands
     try:
-        file.write_text(row.scenario.text, encoding="utf-8")
+        file.write_text(scenario.text, encoding="utf-8")
         words = ["rigid_proto", "simulate", str(file), "--duration", repr(duration)]
-        if row.commands:
+        if commands:
             script = file.with_name(f"{file.stem}_script.yaml")
             script.write_text(row.script_text, encoding="utf-8")
             words += ["--script", str(script)]
@@ -50,9 +51,11 @@ def write_scene(study: Study, row: Variation, file: Path, time: float | None) ->
 
 def record_row(study: Study, row: Variation, file: str, tell: Callable[[str], None]) -> None:
     """Fly the row once more with a recorder that sees everything."""
+    scenario, commands = row.scenario, row.commands
+    OfflineRun(scenario, commands)  # a row that is refused overwrites no recording
     observer = make_recorder(file, values=row.values, on_error=tell, simulated_log=True)
     try:
-        OfflineRun(row.scenario, row.commands, observer).advance(study.duration_ns)
+        OfflineRun(scenario, commands, observer).advance(study.duration_ns)
     finally:
         observer.close()
 

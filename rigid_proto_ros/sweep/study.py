@@ -226,6 +226,9 @@ def _vary(spec, name: str, values, entries: list) -> tuple[Vary, ...]:
         field = f"{name}, vary.{key}"
         target = read_target(str(key), f"{name}, vary", values, entries)
         form = read_form(how, field)
+        if target.is_vertex and isinstance(form, Draw):
+            whole_point = target.name.removesuffix(".vertex")
+            raise InputError(field, how, f"a grid or list of whole numbers, or {whole_point}: random_vertex")
         for probe in form.probes:
             _check_value(target, probe, field, values, entries)
         found.append(Vary(target, form))

@@ -132,29 +132,30 @@ class Parts:
         pa, pq = arrow()
         finished = self.finished()
         if not finished:
-            return self._metadata(0, 0)
+            return self._metadata(0, 0, 0)
         rows = sum(last - first for first, last in map(self.bounds, finished))
         beside = self.file.with_name(self.file.name + ".tmp")
         gathered: list = []
-        simulated = 0
+        simulated = failed = 0
         schema = self._read(finished[0]).schema.remove_metadata()
         text = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.string()]
         with pq.ParquetWriter(beside, schema, use_dictionary=text) as writer:
             for k in finished:
                 part = self._read(k)
                 simulated += json.loads(part.schema.metadata[KEY])["simulated"]
+                failed += len(part) - part["failure"].null_count
                 gathered.append(part.replace_schema_metadata(None))
                 if sum(map(len, gathered)) >= GROUP_ROWS or k == finished[-1]:
                     writer.write_table(pa.concat_tables(gathered))
                     gathered = []
-            metadata = self._metadata(rows, simulated)
+            metadata = self._metadata(rows, simulated, failed)
             writer.add_key_value_metadata({KEY: json.dumps(metadata).encode()})
         os.replace(beside, self.file)
         if metadata["complete"]:
             shutil.rmtree(self.folder)
         return metadata
 
-    def _metadata(self, rows: int, simulated: int) -> dict:
+    def _metadata(self, rows: int, simulated: int, failed: int) -> dict:
         study = self.study
         return {
             "study": study.name,
@@ -164,6 +165,7 @@ class Parts:
             "rows": study.rows,
             "rows_done": rows,
             "complete": rows == study.rows,
+            "rows_failed": failed,
             "rows_by_simulation": simulated,
             "rows_by_compiled_batch": rows - simulated,
             "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),

@@ -46,7 +46,14 @@ class Target:
             if not isinstance(place.get(key), (dict, list)):
                 place[key] = [0.0, 0.0, 0.0] if isinstance(following, int) else {}
             place = place[key]
+        if self.is_vertex and isinstance(value, float) and value.is_integer():
+            value = int(value)  # numbers of a grid come as doubles
         place[self.path[-1]] = copy.deepcopy(value)
+
+    @property
+    def is_vertex(self) -> bool:
+        """Whether it is the number of a vertex."""
+        return bool(self.entry) and self.path[-1] == "vertex"
 
     def component_names(self, count: int) -> list[str]:
         """Names of ``count`` columns for a vector value."""
