@@ -179,6 +179,38 @@ def test_pictures_of_a_table_are_the_same_file_again(tmp_path, monkeypatch) -> N
     assert main(["sweep", "s.yaml", "-o", "t.parquet", "--resume", "--plot", "x=mass,y=nothing"]) == 2
 
 
+@pytest.mark.parametrize(
+    ("plot", "words"),
+    [
+        ("x=nope,y=spin.z", "x=nope"),
+        ("x=row,y=spin.z,color=nope", "color=nope"),
+        ("x=failure,y=spin.z,log=x", "failure is text"),
+    ],
+)
+def test_a_picture_that_no_table_can_give_is_refused_before_anything_flies(
+    plot, words, tmp_path, monkeypatch, capsys
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(yaml.safe_dump(NUDGED))
+    assert main(["sweep", "s.yaml", "--plot", plot]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and words in said
+    assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
+
+
+@pytest.mark.parametrize("axis", ["x", "color"])
+def test_nothing_above_zero_has_no_logarithmic_axis(axis, tmp_path, monkeypatch, capsys) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(yaml.safe_dump(NUDGED))
+    plot = "x=flips,y=spin.z" if axis == "x" else "x=row,y=spin.z,color=flips"
+    assert main(["sweep", "s.yaml", "--plot", f"{plot},log={axis}"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"log={axis}" in said and "flips in s.parquet has none" in said
+    assert Path("s.parquet").exists() and not Path("s.svg").exists()
+
+
 def test_rows_are_recorded_side_by_side(tmp_path) -> None:
     chunk = pytest.importorskip("rerun.chunk")
     file = tmp_path / "ghosts.rrd"

@@ -42,6 +42,7 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"sampler": "halton"}, "sampler", "sobol"),
         ({"measure": {"max": ["sped"]}}, "measure.max", "did you mean speed"),
         ({"measure": {"difference": ["attitude"]}}, "reference", "parameters of a reference"),
+        ({"measure": {"samples": None}}, "measure.samples", "at, of"),
         ({"measure": {"samples": {"at": [2.0], "of": ["speed"]}}}, "measure.samples, at", "to 1"),
         ({"stop": {"far": {"quantity": "distance", "above": 1, "below": 2}}}, "stop.far", "one of above, below"),
         ({"watch": 1e6, "measure": {"max": ["spin"]}}, "watch", "looks"),

@@ -52,13 +52,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _whole(study, args) -> int:
     from ..core.compilation import told_when_compiling
-    from ..sweep.plot import plot_table, read_plot
+    from ..sweep.chunk import run_chunk
+    from ..sweep.plot import check_plot, plot_table, read_plot
     from ..sweep.run import Interrupted, run_study
 
     file = Path(args.output or Path(study.name).stem + ".parquet")
     plot = read_plot(args.plot, file) if args.plot else None
     try:
         with told_when_compiling(lambda: _tell("kernels are being compiled, which takes a while the first time")):
+            if plot:
+                check_plot(plot, run_chunk(study, 0, 0).columns)
             metadata = run_study(study, file, workers=args.threads, dask=args.dask, resume=args.resume)
     except Interrupted as stopped:
         done = stopped.metadata["rows_done"]

@@ -42,7 +42,7 @@ def read_measures(spec, stop, watch: float, duration_s: float, field: str) -> Me
     """What ``measure`` and ``stop`` of a study say; raises InputError naming the field."""
     spec = mapping({"final": ["position", "orientation", "velocity", "spin"]} if spec is None else spec, field, KINDS)
     duration_ns = nanoseconds(duration_s)
-    samples_ns = _sample_times(spec.get("samples"), duration_s, f"{field}.samples")
+    samples_ns = _sample_times(spec["samples"], duration_s, f"{field}.samples") if "samples" in spec else []
     stops = _conditions({} if stop is None else stop, field.replace("measure", "stop"))
     watching = bool(stops) or bool({"max", "min", "flips", "first", "max_difference"} & set(spec))
     if watching and duration_s * watch > MAX_LOOKS:
@@ -72,8 +72,6 @@ def _looks(watch: float, samples_ns: list[int], duration_ns: int) -> tuple[np.nd
 
 
 def _sample_times(spec, duration_s: float, field: str) -> list[int]:
-    if spec is None:
-        return []
     spec = mapping(spec, field, ("at", "of"), ("at", "of"))
     times = spec["at"] if isinstance(spec["at"], list) else [spec["at"]]
     if not times:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,19 @@ def read_plot(text: str, table: Path) -> Plot:
     return Plot(given["x"], given["y"], given.get("color", ""), log, file)
 
 
+def check_plot(plot: Plot, columns: Mapping[str, np.ndarray]) -> None:
+    """Whether the table that will be has these columns, with numbers for what is logarithmic; any rows of it do."""
+    for axis, name in _axes(plot):
+        if name not in columns:
+            raise InputError("--plot", f"{axis}={name}", f"a column of the table: {', '.join(columns)}")
+        if axis in plot.log and columns[name].dtype == object:
+            raise InputError("--plot", f"log={axis}", f"a column of numbers; {name} is text")
+
+
+def _axes(plot: Plot) -> list[tuple[str, str]]:
+    return [(axis, name) for axis, name in (("x", plot.x), ("y", plot.y), ("color", plot.color)) if name]
+
+
 def _figure():
     try:
         from matplotlib import rcParams
@@ -62,8 +76,11 @@ def plot_table(plot: Plot, table: Path) -> None:
     """Draw the table and write the picture."""
     from matplotlib.colors import LogNorm
 
-    names = [name for name in (plot.x, plot.y, plot.color) if name]
-    columns = read_columns(table, names)
+    columns = read_columns(table, [name for _, name in _axes(plot)])
+    check_plot(plot, columns)
+    for axis, name in _axes(plot):
+        if axis in plot.log and not (np.isfinite(columns[name]) & (columns[name] > 0)).any():
+            raise InputError("--plot", f"log={axis}", f"a column with numbers above 0; {name} in {table} has none")
     x, y = columns[plot.x], columns[plot.y]
     color = columns[plot.color] if plot.color else None
     figure = _figure()
