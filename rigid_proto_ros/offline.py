@@ -34,9 +34,13 @@ def read_scene(
 ) -> Scenario:
     """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
 
-    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of.
+    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the settings
+    sets the scene's mass, which would win, to 0, as it does in flight.
     """
-    return make_scenario({**scene_values(scene_file(name), warn), **(settings or {})})
+    values = {**scene_values(scene_file(name), warn), **(settings or {})}
+    if settings and "density" in settings and "mass" not in settings:
+        values["mass"] = 0.0
+    return make_scenario(values)
 
 
 def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, object]:

@@ -93,5 +93,19 @@ def test_the_state_hash_is_that_of_time_and_state_as_little_endian_numbers(capsy
     assert simulated(capsys, "t_handle", "--duration", "0.25")["state_hash"] == said["state_hash"]
 
 
+def test_a_density_that_is_set_wins_over_the_mass_of_the_scene(tmp_path, capsys):
+    scene = tmp_path / "m.yaml"
+    scene.write_text("rigid_body: {ros__parameters: {mass: 2.0, initial.linear_velocity: [1.0, 0.0, 0.0]}}\n")
+
+    def mass(*settings: str) -> float:
+        words = [word for setting in settings for word in ("--set", setting)]
+        said = simulated(capsys, str(scene), "--duration", "0", *words)
+        return 2.0 * said["kinetic_energy"]  # at 1 m/s, without spin
+
+    assert mass() == 2.0
+    assert mass("density=5000") == make_scenario({"mesh": "t_handle", "density": 5000.0}).setup.body.mass != 2.0
+    assert mass("density=5000", "mass=3") == mass("mass=3", "density=5000") == 3.0
+
+
 def test_every_scene_begins_with_the_same_defaults():
     assert {name: PARAMETERS[name].default for name in DEFAULTS} == DEFAULTS
