@@ -196,3 +196,23 @@ def test_the_printed_diagnosis_says_cause_and_remedy(capsys, tmp_path, truth):
     for part in ("head (hammer): off", "kg mm^2", "expected: mass 0.7", "density"):
         assert part in out
     assert main(["inspect", "--compare", str(tmp_path / "robot.urdf"), "--verify"]) == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--model", "shell"),
+        ("--ballast", "1", "0", "0", "0"),
+        ("--scale", "0.001"),
+        ("hammer", "--model", "shell"),
+        ("hammer", "--ballast", "1", "0", "0", "0"),
+        ("hammer", "--scale", "0"),
+    ],
+)
+def test_what_a_comparison_would_pass_over_is_refused(capsys, tmp_path, truth, arguments):
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf(*truth))
+    assert main(["inspect", *arguments, "--compare", str(path)]) == 2
+    said = capsys.readouterr()
+    option = next(word for word in arguments if word.startswith("--"))
+    assert not said.out and said.err.count("\n") == 1 and option.lstrip("-") in said.err

@@ -144,6 +144,15 @@ def test_an_open_mesh_has_its_other_models_with_a_given_mass(capsys, tmp_path):
     assert report(capsys, path, "--fallback", "box", "--verify")["verification"]["volume_error"] <= 1e-15
 
 
+def test_an_open_mesh_that_is_to_be_verified_is_refused_with_its_report(capsys, tmp_path):
+    path = tmp_path / "open.obj"
+    path.write_bytes(obj(faces=CUBE_TRIANGLES[:-1]))
+    status, out, err = inspect(capsys, str(path), "--mass", "1", "--model", "points", "--verify", "--json")
+    assert status == 2 and err.count("\n") == 1 and out.count("\n") == 1
+    found = json.loads(out)
+    assert found["verification"] is None and found["mass"] == 1.0 and found["verdict"]
+
+
 def test_millimetres_are_suspected(capsys, meshes):
     found = report(capsys, str(meshes / "nefertiti_lowres.obj"))
     assert [f["code"] for f in found["verdict"]] == ["unit_suspicion"]

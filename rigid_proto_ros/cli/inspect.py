@@ -146,13 +146,13 @@ def run(args: argparse.Namespace) -> int:
     _check_amount("mass", args.mass, zero=True)
     density = DENSITY if args.density is None else args.density
     _check_amount("density", density, zero=False)
+    scale_vector(scale)
+    if args.max_triangles < 1:
+        raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
     if args.compare is not None:
         return _compare(args, mesh_name, scale)
     if mesh_name is None:
         raise InputError("MESH", None, "a mesh (path, package:// URI or bundled name), or --compare ROBOT")
-    scale_vector(scale)
-    if args.max_triangles < 1:
-        raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
     path = resolve_mesh(mesh_name)
     with Progress(f"reading {mesh_name}", path.stat().st_size > LARGE_FILE):
         mesh = load_mesh(mesh_name, max_triangles=args.max_triangles)
@@ -166,13 +166,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print(json.dumps(report))
         raise inspection.refusal
-    status = 0
-    if args.verify:
-        with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
-            report["verification"] = verify(body, inspection.scale, progress.fraction)
-        if max(report["verification"].values()) > VERIFIED:
-            print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)
-            status = 1
+    status = _verify(inspection, report, args.json) if args.verify else 0
     if args.record:
         from rigid_proto_ros.inspect_view import record_inspection
 
@@ -192,6 +186,23 @@ def run(args: argparse.Namespace) -> int:
             if finding.severity != "info":
                 print(f"{finding.severity}: {finding.message}", file=sys.stderr)
     return status
+
+
+def _verify(inspection: Inspection, report: dict, to_json: bool) -> int:
+    """Put the ``verification`` into the report, null (and, as JSON, printed) where it is refused; returns the exit status."""
+    report["verification"] = None
+    body = inspection.body
+    try:
+        with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
+            report["verification"] = verify(body, inspection.scale, progress.fraction)
+    except InputError:
+        if to_json:
+            print(json.dumps(report))
+        raise
+    if max(report["verification"].values()) <= VERIFIED:
+        return 0
+    print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)
+    return 1
 
 
 def _check_amount(name: str, value: float, *, zero: bool) -> None:
@@ -223,6 +234,12 @@ def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> 
     for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
         if getattr(args, flag):
             raise InputError(f"--{flag}", "given with --compare", "--compare alone or with --json")
+    # Solids of one density are what a robot's inertials are compared with.
+    if args.model != "solid" or args.ballast:
+        flag, received = ("ballast", args.ballast) if args.ballast else ("model", args.model)
+        raise InputError(f"--{flag}", received, "--compare with plain solids: without --model and --ballast")
+    if mesh is None and scale != [1.0]:
+        raise InputError("--scale", scale, "the MESH of one link with it; without, the robot's file says each scale")
     chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
     density = args.density or 0.0
     diagnoses = compare_robot(
