@@ -27,6 +27,16 @@ MAX_BYTES = 16 << 20
 """Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
 
 
+class _Loader(yaml.SafeLoader):
+    """Without aliases, which rcl doesn't read either: one that holds itself has no end."""
+
+    def compose_node(self, parent, index):
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            raise yaml.MarkedYAMLError(problem=f"the alias *{event.anchor}", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
+
+
 @dataclass
 class SceneFile:
     """values: parameters by name for the node; wildcard: names that only ``/**`` sections gave."""
@@ -81,19 +91,20 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
     sections = {"/**", node_name, f"/{node_name}", f"/**/{node_name}"}
     named: set[str] = set()
     for key, section in root.value:
+        name = _name(path, key)
         if not isinstance(section, yaml.MappingNode):
             raise _refused(path, section, "a section such as rigid_body: {ros__parameters: {...}}")
         for inner, parameters in section.value:
-            if inner.value != "ros__parameters":
+            if _name(path, inner) != "ros__parameters":
                 if isinstance(parameters, yaml.MappingNode):
                     continue  # a node in a namespace: not this one
                 raise _refused(path, inner, "ros__parameters: under the node's name")
             values: dict[str, object] = {}
             _collect(path, parameters, "", values)
-            if key.value not in sections:
+            if name not in sections:
                 continue
             scene.values.update(values)
-            if key.value != "/**":
+            if name != "/**":
                 named |= values.keys()
     scene.wildcard = scene.values.keys() - named
     return scene
@@ -115,12 +126,12 @@ def compose_yaml(path: Path) -> yaml.Node | None:
 def compose_text(text: str, name: str) -> yaml.Node | None:
     """The YAML tree of a text; ``name`` stands in errors."""
     try:
-        return yaml.compose(text, Loader=yaml.SafeLoader)
+        return yaml.compose(text, Loader=_Loader)
     except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         problem = getattr(error, "problem", None) or str(error).splitlines()[0]
         where = f"{name}, line {mark.line + 1}" if mark else name
-        raise InputError(where, problem, "valid YAML") from None
+        raise InputError(where, problem, "valid YAML without aliases") from None
 
 
 def typed_value(text: str, name: str):
@@ -137,7 +148,7 @@ def _collect(path, node, prefix, values) -> None:
     if not isinstance(node, yaml.MappingNode):
         raise _refused(path, node, "name: value lines under ros__parameters")
     for key, value in node.value:
-        name = f"{prefix}{key.value}"
+        name = f"{prefix}{_name(path, key)}"
         if isinstance(value, yaml.MappingNode):
             _collect(path, value, f"{name}.", values)
         elif isinstance(value, yaml.SequenceNode):
@@ -146,6 +157,12 @@ def _collect(path, node, prefix, values) -> None:
             raise _refused(path, key, f"a value behind {name}:")
         else:
             values[name] = _typed(value)
+
+
+def _name(path, key: yaml.Node) -> str:
+    if not isinstance(key, yaml.ScalarNode):
+        raise _refused(path, key, "a name")
+    return key.value
 
 
 def _typed(node: yaml.ScalarNode):

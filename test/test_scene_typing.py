@@ -91,5 +91,23 @@ def test_a_mixed_list_is_refused_with_file_line_and_remedy(tmp_path):
         read_scene_file(path)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("\n[a]: {ros__parameters: {}}", "line 2: got '[a]'; accepted: a name"),
+        ("? {a: b}\n: {ros__parameters: {}}", "line 1: got 'map'; accepted: a name"),
+        ("rigid_body: {? [a] : {mass: 1.0}}", "line 1: got '[a]'; accepted: a name"),
+        ("rigid_body: {ros__parameters: {? [a] : 1.0}}", "line 1: got '[a]'; accepted: a name"),
+        ("rigid_body:\n  ros__parameters: {mass: &a [*a]}", "line 2: got 'the alias *a'"),
+        ("rigid_body:\n  ros__parameters: &a\n    b: *a", "line 3: got 'the alias *a'"),
+        ("a: &a {ros__parameters: {}}\nrigid_body: *a", "line 2: got 'the alias *a'"),
+    ],
+)
+def test_names_that_are_none_and_aliases_are_refused_with_their_line(text, words):
+    with pytest.raises(InputError) as refused:
+        read_scene_text(text)
+    assert words in str(refused.value)
+
+
 def test_a_huge_whole_number_is_a_double():
     assert scalar("9223372036854775808") == 9.223372036854775808e18
