@@ -10,6 +10,8 @@ from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from .core.errors import CommandRefused, InputError
 from .core.frames import check_contact_name
 from .core.integrators import INTEGRATORS
@@ -85,7 +87,10 @@ def _to_double(value):
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):
-        return float(value) if abs(value) <= 1.7976931348623157e308 or not math.isfinite(value) else None
+        try:
+            return float(value)
+        except OverflowError:
+            return None
     if isinstance(value, str) and _NUMBER.match(value.strip()):
         return float(value)
     return None
@@ -98,7 +103,7 @@ def _to_doubles(value):
             value = [item.strip(" '\"") for item in text[1:-1].split(",")]
     if _to_double(value) is not None:
         value = [value]
-    if isinstance(value, (str, bytes, Mapping)) or not hasattr(value, "__iter__"):
+    if not isinstance(value, (list, tuple, array, np.ndarray)):
         return None
     numbers = [_to_double(v) for v in value]
     return None if None in numbers else numbers
@@ -174,8 +179,8 @@ _DECLARED = (
     Parameter("publish_clock", "bool", False, "Publish simulated time on /clock."),
     Parameter("publish_tf", "bool", False, "Publish the body's frame on /tf (where tf2_msgs is installed)."),
     Parameter("imu_contact", "string", "", "Contact at which ~/imu measures; empty means the centre of mass."),
-    Parameter("ghost.inertia_model", "string", "", "Show a ghost beside the body that gets the same commands under this inertia model.", choices=("", *INERTIA_MODELS)),
-    Parameter("ghost.integrator", "string", "", "Show a ghost that gets the same commands under this integrator.", choices=("", *INTEGRATORS)),
+    Parameter("ghost.inertia_model", "string", "", "Show a ghost beside the body, from time 0 or the next reset on, that gets the same commands under this inertia model.", choices=("", *INERTIA_MODELS)),
+    Parameter("ghost.integrator", "string", "", "Show a ghost, from time 0 or the next reset on, that gets the same commands under this integrator.", choices=("", *INTEGRATORS)),
     Parameter("world_frame", "string", "world", "Name of the world frame in published messages.", changes=READ_ONLY),
     Parameter("body_frame", "string", "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY),
     Parameter("record", "string", "", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty records nothing."),

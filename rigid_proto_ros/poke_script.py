@@ -18,6 +18,7 @@ from . import cdr
 from .core.commands import Change, ClearWrench, Command, MoveString, ReleaseString, TieString, WrenchCommand
 from .core.errors import CommandRefused, InputError
 from .core.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
+from .plain_yaml import load_plain_yaml
 from .scenario import nanoseconds
 from .scene_file import MAX_BYTES
 
@@ -104,13 +105,8 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
 
 
 def script_entries(text: str, name: str = "script"):
-    """What a script's YAML says, nothing of it checked yet; raises InputError for what is no YAML."""
-    try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{name}, line {mark.line + 1}" if mark else name
-        raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
+    """What a script's YAML says, nothing of it checked yet; raises InputError for what is no plain YAML."""
+    return load_plain_yaml(text, name)
 
 
 def expand_script(
@@ -183,6 +179,12 @@ def _expand(
         _check_keys(entry, _TIMING_KEYS | {"set"}, where)
         if not isinstance(entry["set"], dict) or not entry["set"]:
             raise InputError(f"{where}, set", entry["set"], "{parameter: value, ...}")
+        if "record" in entry["set"]:
+            raise InputError(
+                f"{where}, set, record",
+                entry["set"]["record"],
+                "parameters of the motion; ros2 param set switches record",
+            )
         return [ScriptCommand(t_ns, "set", changes={str(k): v for k, v in entry["set"].items()})]
     if "service" in entry:
         _check_keys(entry, _TIMING_KEYS | {"service"}, where)

@@ -17,10 +17,11 @@ from . import parameters
 from .core.body import make_body
 from .core.errors import CommandRefused, InputError, MeshError
 from .core.inertia_tensor import check_tensor
-from .core.integrators import integrator_named
+from .core.integrators import check_carried, integrator_named
 from .core.mass_properties import MeshMoments, explicit_mass_properties, scale_vector
 from .core.rotation import matrix_from_quaternion, unit_quaternion
 from .core.setup import Setup
+from .core.simulation import needs_of
 from .core.state import state_row
 from .core.string import StringSettings
 from .core.surface import Surface
@@ -127,6 +128,11 @@ def build_scenario(values: Mapping[str, object], body_mesh: BodyMesh | None) -> 
     setup, warnings = _setup(values, body_mesh)
     ghost = {name: values[f"ghost.{name}"] for name in ("inertia_model", "integrator") if values[f"ghost.{name}"]}
     ghost_setup = _setup({**values, **ghost}, body_mesh)[0] if ghost else None
+    if "integrator" in ghost:
+        try:
+            check_carried(ghost_setup.integrator, needs_of(ghost_setup, (), ghost_setup.string.attached))
+        except CommandRefused as refusal:
+            raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
     return Scenario(values, body_mesh, setup, warnings, ghost_setup)
 
 

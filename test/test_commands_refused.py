@@ -113,6 +113,24 @@ REFUSED = {
         ("string/target", point_message(0, "", (1e60, 0, 0))),
         ("string/attach", point_message(0, "body", (1e308, 0, 0))),
     ],
+    "schedule": [
+        ("schedule", {"data": text})
+        for text in (
+            "{t: 0, set: {gyroscopic: !!bool x}}",
+            "{t: !!int '', set: {density: 2}}",
+            "{t: 0, set: {gravity: !!set {1, 2, 3}}}",
+            "{t: 0, set: {gravity: {1, 2, 3}}}",
+            "{t: 1, set: {gravity: [&a [1, 1, 1], &b [*a, *a, *a], [*b, *b, *b]]}}",
+            "{t: 1, set: &a {density: 2, <<: *a}}",
+            "{t: 0, set: {density: 2}, repeat: 1000000, every: 0.001}",
+            "{t: 0, wrench: {force: [0, 0, 1], duration: 700000}}",
+            "{t: 0, set: {record: /tmp/somewhere.mcap}}",
+            "{t: 0, set: {mesh: '~nosuchuser/part.obj'}}",
+            "{t: 0, set: {mesh: " + 300 * "a" + "}}",
+            "{t: 2026-13-45, set: {density: 2}}",
+            "[]",
+        )
+    ],
     "ray_miss": [
         ("poke", wrench_message(0, "ray/10,10,10/1,0,0", (1e-3, 0, 0))),
         ("wrench", wrench_message(0, "world@ray/0,0,3/0,0,1", (1e-3, 0, 0))),
@@ -190,6 +208,16 @@ def test_refusals_are_warned_of_at_most_once_a_second(rig):
     assert 2 <= log.read_text().count("refused:") - warned <= 1 + elapsed_s
 
 
+def test_what_is_refused_when_it_is_to_act_is_warned_of_too(rig):
+    log = rig.node_process.log
+    rig.pause(True)
+    rig.publish("poke", wrench_message(0, "world@ray/5,5,5/1,0,0", (1e-3, 0.0, 0.0)))
+    rig.until_received(rig.sent)
+    warned = log.read_text().count("refused: ray")
+    rig.pause(False)
+    rig.until(lambda: log.read_text().count("refused: ") > warned and "5.0,5.0,5.0" in log.read_text(), "a warning")
+
+
 def test_a_change_that_the_integrator_cant_carry_is_refused_and_counted_naming_those_that_can(rig):
     rig.start_over(paused=False)
     ((accepted, reason),) = rig.set(integrator="free_body")
@@ -239,6 +267,8 @@ def test_a_change_that_the_integrator_cant_carry_is_refused_and_counted_naming_t
         ({"world_frame": "map"}, "world_frame"),
         ({"contacts.tip": [0.0, 0.0, 0.0]}, "contacts.tip"),
         ({"rerun_port": 9999}, "rerun_port"),
+        ({"use_sim_time": True}, "use_sim_time"),
+        ({"string.attached": True, "ghost.integrator": "free_body"}, "ghost.integrator"),
     ],
     ids=str,
 )
@@ -356,6 +386,9 @@ def random_message(numbers: random.Random, topic: str) -> bytes:
             "{t: 1, set: {mass: .nan}}",
             "\x00x",
             "- - - -",
+            "{t: 0, set: {gyroscopic: !!bool x}}",
+            "{t: !!timestamp abc}",
+            "{t: 0, set: {gravity: !!set {1, 2, 3}}}",
         )
         text = numbers.choice(
             (*texts, random_frame(numbers), "{" * 2000, "t: 0\nset: {scale: [0, 0, 0]}", "{t: -1, service: reset}")

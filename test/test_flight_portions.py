@@ -91,6 +91,22 @@ def test_a_step_that_takes_years_is_begun_and_given_up_by_resuming():
     assert not rig.flight.stepping
 
 
+@pytest.mark.parametrize("listeners", [True, False])
+def test_a_flight_pauses_at_the_last_time_that_a_stamp_can_say(monkeypatch, listeners):
+    from rigid_proto_ros.ros import flight
+
+    monkeypatch.setattr(flight, "LAST_STAMP_NS", 3 * SECOND)
+    rig = Rig({"real_time_factor": 0.0 if listeners else 1e6, "publish_rate": 1.0})
+    rig.flight._anybody_listens = lambda: listeners
+    while not rig.flight.timekeeping.paused:
+        rig.flight.tick()
+    assert "the last that a stamp can say" in rig.flight.simulation.failure
+    assert rig.flight.simulation.time_ns <= 3 * SECOND
+    assert max(rig.published, default=0) <= 3 * SECOND
+    rig.flight.reset()
+    assert not rig.flight.simulation.failure
+
+
 def test_without_listeners_a_motion_that_is_too_dear_gives_time_up_and_says_so(monkeypatch):
     rig = Rig({**ENDLESS, "publish_rate": 1000.0, "real_time_factor": 1.0})
     monkeypatch.setattr("rigid_proto_ros.ros.flight.MAX_LAG_NS", 10_000_000)

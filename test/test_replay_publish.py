@@ -26,7 +26,7 @@ SCRIPT = """
 - {t: 0.1, at: tip, force: [0.0, 0.01, 0.0], duration: 0.3}
 - {t: 0.2, at: {vertex: 3}, impulse: [0.0, 0.0, 0.002]}
 - {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-5, 0.0], axes: body, duration: 0.5}}
-- {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5], record: elsewhere.rrd}}
+- {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5]}}
 - {t: 0.6, string: {attach: tip, target: [0.1, 0.0, 0.2]}}
 - {t: 0.9, string: release}
 - {t: 1.0, service: clear_wrench}
@@ -180,6 +180,14 @@ def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_r
         late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
         assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
         assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
+        # A change that is refused leaves the file of that name as it is.
+        before = path.read_bytes()
+        client.set(wrench_timeout=0.0)
+        client.publish("wrench", wrench_message(0, "body@point/0.0,0.1,0.0", (0.0, 0.0, 1e-3)))
+        client.until_received(1, "wrench")
+        ((accepted, reason),) = client.set(record=str(path), integrator="free_body", atomically=True)
+        assert not accepted and "free_body" in reason
+        assert path.read_bytes() == before
         client.set(record=str(path))
         client.reset()
         client.fly_until(SECOND // 2)

@@ -111,6 +111,15 @@ def test_a_released_string_pulls_no_more_and_ties_again_at_the_next_target(comma
     assert simulation.string.free_end(201 * MS).tolist() == [0.5, 0.0, 0.0]
 
 
+def test_a_string_that_a_reset_ties_again_counts_for_the_integrator_though_it_was_let_go():
+    simulation, scenario = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
+    simulation.submit(ReleaseString(), 100 * MS)
+    simulation.advance(SECOND)
+    with pytest.raises(CommandRefused, match="free_body"):
+        simulation.check_change(scenario.with_changes({"integrator": "free_body"}).setup)
+    simulation.check_change(scenario.with_changes({"integrator": "free_body", "string.attached": False}).setup)
+
+
 def test_clear_wrench_leaves_the_string_tied():
     simulation, _ = simulated(string__attached=True)
     simulation.submit(ClearWrench())

@@ -56,7 +56,8 @@ class Readings:
         setup = self.setup
         limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
         spin = float((self.state.angular_velocity_body**2).sum()) ** 0.5 * h
-        swing = self.string.frequency * h if self.string else 0.0
+        string = self.string
+        swing = string.frequency * h if string else 0.0
         if spin > limit:
             return f"{setup.integrator.name}: |w| step = {spin:.3g}, good up to {limit:g}"
         if swing > limit and not setup.integrator.stiff:
@@ -82,8 +83,10 @@ class Readings:
     def potential_energy(self) -> float:
         """−m g·x, and the string's [J]."""
         setup = self.setup
+        # Read once: another thread may let it go meanwhile.
+        string = self.string
         energy = -setup.body.mass * float((setup.gravity * self.state.position).sum())
-        return energy + (self.string.potential_energy(setup.body, self.state) if self.string else 0.0)
+        return energy + (string.potential_energy(setup.body, self.state) if string else 0.0)
 
     @property
     def kinetic_energy(self) -> float:

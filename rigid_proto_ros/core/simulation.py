@@ -63,7 +63,7 @@ class Simulation(Readings):
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self._load_ids = 0
-        check_carried(setup.integrator, _needs(setup, (), setup.string.attached))
+        check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
         self._start_over()
 
     # Who watches
@@ -123,8 +123,10 @@ class Simulation(Readings):
 
     def check_change(self, new: Setup) -> None:
         """Raises CommandRefused (``integrator``) when the new setup's integrator can't carry what acts, or will."""
-        tied = self.string is not None if new.string.attached == self.setup.string.attached else new.string.attached
-        check_carried(new.integrator, _needs(new, (acting.load for acting in self.acting), tied))
+        # A string that is to be tied at time 0 will be, at the next reset, though it was let go since.
+        kept = new.string.attached == self.setup.string.attached and self.string is not None
+        tied = kept or new.string.attached
+        check_carried(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
 
     def reset(self, setup: Setup | None = None) -> None:
         """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
@@ -324,7 +326,7 @@ class Simulation(Readings):
         self._finish_segment()
 
 
-def _needs(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
+def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
     """What the scene asks of its integrator."""
     needs = set().union(*(needs_of_load(load) for load in loads))
     if not setup.gyroscopic:

@@ -89,10 +89,15 @@ class RerunObserver(Observer):
         self._processes: list[ViewerProcess] = []
         self._remembered: list[tuple[Any, ...]] = []
         self._closed = False
-        if viewer != "none":
-            self._open_server(viewer, rerun_port, web_port, live_memory_limit)
-        if record:
-            self.start_recording(record)
+        try:
+            if viewer != "none":
+                self._open_server(viewer, rerun_port, web_port, live_memory_limit)
+            if record:
+                self.start_recording(record)
+        except InputError:
+            # Nobody has it yet, so nobody else would end its thread.
+            self.close()
+            raise
 
     # The Observer's interface: called from the stepping thread
 

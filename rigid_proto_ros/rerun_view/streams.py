@@ -102,7 +102,7 @@ class FileStream(Stream):
         self.path = path
         self._open_ended = open_ended
         if path.suffix != ".rrd":
-            raise InputError("record", str(path), "the path of an .rrd file")
+            raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
         try:
             super().__init__(recording_id, rr.FileSink(path, write_footer=not open_ended), name)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)

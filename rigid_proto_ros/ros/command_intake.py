@@ -11,7 +11,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-import yaml
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.node import Node
 from std_msgs.msg import String
@@ -20,11 +19,13 @@ from .. import cdr
 from ..core.commands import Change, Rank, WrenchCommand
 from ..core.errors import CommandRefused, InputError
 from ..core.frames import Frame, parse_frame
+from ..plain_yaml import load_plain_yaml
 from ..poke_script import (
     MAX_SCHEDULE_LENGTH,
     MESH_FRAME,
+    ScriptCommand,
     core_command,
-    parse_script,
+    expand_script,
     string_attach,
     string_target,
 )
@@ -67,7 +68,6 @@ class CommandIntake:
         frames: tuple[str, str],
         apply_changes: Callable,
         apply_inertia: Callable,
-        on_refusal: Callable,
     ) -> None:
         self.received: Counter[str] = Counter()
         self.late = 0
@@ -81,7 +81,6 @@ class CommandIntake:
         self._next_publishers_look_ns = 0
         self._read_frames: dict[str, Frame] = {}
         self._logger = node.get_logger()
-        self._on_refusal = on_refusal
         group = TakenByHand()
 
         def subscribe(message_type, topic):
@@ -108,7 +107,7 @@ class CommandIntake:
         self._gaps = [SequenceGaps(subscription) for _, subscription, _, _ in self._sources]
 
     def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None]) -> bool:
-        """Submit everything that has arrived; what is refused is counted and told, and the rest goes on. Returns whether
+        """Submit everything that has arrived; what is refused is counted and the observer told, and the rest goes on. Returns whether
         something has arrived within the last LIVELY_NS.
 
         catch_up() is called before the first message of a tick, so that now is the tick's own time. Topics that carried something lately are looked at in every tick, quiet ones every QUIET_NS.
@@ -143,7 +142,6 @@ class CommandIntake:
                         read(taken[0], simulation, scenario)
                     except CommandRefused as refusal:
                         simulation.refuse(refusal)
-                        self._on_refusal(refusal)
                     # Last: a message that counts as received counts as late or refused too, if it is.
                     self.received[topic] += 1
         return wall_ns < max(self._lively_until_ns)
@@ -203,20 +201,14 @@ class CommandIntake:
         if text.count("[") + text.count("{") > MAX_BRACKETS:
             raise CommandRefused("schedule", "schedule", text[:80], f"at most {MAX_BRACKETS} opening brackets")
         try:
-            entry = yaml.safe_load(text)
-            (command,) = parse_script(yaml.safe_dump([entry]), "schedule") if isinstance(entry, dict) else (None,)
-            if command is None or command.topic != "schedule":
-                accepted = "one entry {t, set}, {t, string: release} or {t, service: clear_wrench}"
-                raise InputError("schedule", text[:80], accepted)
-            stamp_ns = command.t_ns
+            command = _scheduled(text)
             if command.kind == "set":
                 scenario.with_changes(command.changes)
         except CommandRefused:
             raise
         except InputError as error:
             raise CommandRefused("schedule", error.field, error.received, error.accepted) from None
-        except (yaml.YAMLError, ValueError, TypeError, RecursionError, OverflowError):
-            raise CommandRefused("schedule", "schedule", text[:80], "one entry as YAML") from None
+        stamp_ns = command.t_ns
         core = core_command(command, stamp_ns, simulation.setup.contacts, self._apply_changes)
         simulation.submit(core, self._when(stamp_ns, simulation, scenario))
 
@@ -232,6 +224,17 @@ class CommandIntake:
                     "a command is stamped by the system's clock: it acts now, as others like it will; stamps are simulated time"
                 )
         return when_ns
+
+
+def _scheduled(text: str) -> ScriptCommand:
+    """The one command of an entry on the schedule topic; raises InputError."""
+    entry = load_plain_yaml(text, "schedule")
+    # At most one, so that a repeat or a long wrench isn't written out first: the body waits for this.
+    commands = expand_script([entry], "schedule", max_commands=1) if isinstance(entry, dict) else []
+    if len(commands) != 1 or commands[0].topic != "schedule":
+        accepted = "one entry {t, set}, {t, string: release} or {t, service: clear_wrench}"
+        raise InputError("schedule", text[:80], accepted)
+    return commands[0]
 
 
 def _read_point_stamped(data: bytes) -> tuple[int, str, tuple[float, float, float]]:

@@ -27,6 +27,7 @@ class EventPublisher(Observer):
                 message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE
             )
 
+        self._logger = node.get_logger()
         self._mesh_frame = f"{body_frame}/mesh"
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
         self._scene = publisher(String, "scene", qos.LATCHED)
@@ -57,6 +58,10 @@ class EventPublisher(Observer):
             force = load.force if load.axes == "world" else load.own_force(body).tolist()
             frame_id = load.frame_id + command.frame.options
             self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
+
+    def refused(self, time_ns: int, reason: str, message: str) -> None:
+        """A warning, for what is refused when it comes and for what turns out impossible when it is to act."""
+        self._logger.warning(f"refused: {message}", throttle_duration_sec=1.0)
 
     def event(self, time_ns: int, line: str) -> None:
         """A line of the event log."""

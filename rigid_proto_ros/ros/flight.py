@@ -33,6 +33,9 @@ PAUSED_NS = 100_000_000
 FOLLOW_NS = 1_000_000
 """A followed clock is looked at this often [ns of wall time]."""
 
+LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
+"""A message's stamp counts seconds in 32 bits."""
+
 MAX_LAG_NS = 250_000_000
 """A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
 
@@ -94,10 +97,9 @@ class Flight:
         rate_changed = scenario.values["publish_rate"] != self.scenario.values["publish_rate"]
         pace_changed = scenario.values["real_time_factor"] != self.scenario.values["real_time_factor"]
         self.scenario = scenario
+        # One that isn't there would have missed what was commanded so far: it begins at the next reset.
         if self._ghost is not None:
             self._ghost.change(self.simulation.time_ns, scenario)
-        elif self._is_viewed() and scenario.ghost is not None:
-            self._ghost = ghost_of(scenario, self.simulation, self.observer)
         if rate_changed:
             self._find_next_publication()
         if pace_changed:
@@ -109,8 +111,6 @@ class Flight:
         self.simulation.watch(observer)
         if self._ghost is not None:
             self._ghost.watch(observer)
-        elif self._is_viewed():
-            self._ghost = ghost_of(self.scenario, self.simulation, observer)
 
     def pause(self, paused: bool) -> None:
         """Stop or resume simulated time."""
@@ -149,6 +149,8 @@ class Flight:
         self.simulation.reset(self.scenario.setup)
         if self._ghost is not None:
             self._ghost.reset(self.scenario)
+        elif self._is_viewed():
+            self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
         self._publication = 0
         self._stepping = False
         self._anchor()
@@ -173,7 +175,7 @@ class Flight:
         """Bring simulated time up to now for a request, unless a publication comes first."""
         self._portions.begin_tick()
         if not self.timekeeping.paused:
-            self._present_ns = self._simulated_present_ns()
+            self._present_ns = min(self._simulated_present_ns(), LAST_STAMP_NS)
             if self._present_ns < self._publication_ns():
                 self.catch_up()
 
@@ -184,6 +186,9 @@ class Flight:
             self._next_look_ns = wall_ns + DRAIN_NS
             self._look_for_listeners()
         present_ns = self._simulated_present_ns()
+        if present_ns > LAST_STAMP_NS:
+            self._stop_at_the_last_stamp()
+            return
         if not self._listeners and self._caught_up:
             self._pass_over(present_ns)
         due_ns = self._publication_ns()
@@ -231,6 +236,9 @@ class Flight:
 
     def _publish_next(self) -> bool:
         """Advance to the next publication and make it; False when the tick's time is over before, or the motion stopped."""
+        if self._publication_ns() > LAST_STAMP_NS:
+            self._stop_at_the_last_stamp()
+            return False
         self._caught_up = self._portions.advance(self.simulation, self._publication_ns())
         if self._check_failure() or not self._caught_up:
             return False
@@ -242,6 +250,13 @@ class Flight:
             self._ghost.advance(state.time_ns)
         self._publish(state)
         return True
+
+    def _stop_at_the_last_stamp(self) -> None:
+        self.simulation.failure = (
+            f"simulated time beyond {LAST_STAMP_NS // 1_000_000_000} s, the last that a stamp can say"
+        )
+        self._stepping = False
+        self._check_failure()
 
     def _check_failure(self) -> bool:
         if not self.simulation.failure:

@@ -81,28 +81,40 @@ class LiveParameters:
         planned = present.with_changes(changes)
         if planned.setup.integrator is not present.setup.integrator:
             _warm_up(planned)
-        recorder = None
-        if "record" in changes:
-            if changes["record"] == present.values["record"]:
-                changes = {name: value for name, value in changes.items() if name != "record"}
-            else:
-                recorder = node.open_recorder(planned)
+        if changes.get("record", "") == present.values["record"]:
+            changes = {name: value for name, value in changes.items() if name != "record"}
 
-        def change() -> None:
+        def check() -> Scenario:
             scenario = flight.scenario.with_changes(changes)
             try:
-                flight.simulation.check_change(scenario.setup)
+                node.check_change(scenario)
             except CommandRefused as refusal:
                 if counted:
                     flight.simulation.refuse(refusal)
                 raise
+            return scenario
+
+        def change() -> None:
+            scenario = check()
             flight.change(scenario)
             flight.simulation.submit(Change(changes, lambda: scenario.setup))
             node.tell_scene(scenario)
 
-        node.call(change)
+        recorder = None
         if "record" in changes:
-            node.call(lambda: node.switch_recording(recorder))
+            # Opened last: a refused change must leave the file of that name as it is.
+            node.call(check)
+            recorder = node.open_recorder(planned)
+        try:
+            node.call(change)
+        except InputError:
+            if recorder is not None:
+                recorder.close()
+            raise
+        if "record" in changes:
+            finished = node.call(lambda: node.switch_recording(recorder))
+            if finished is not None:
+                finished.close()
         node.states.configure(flight.scenario.values)
 
     def _follow(self) -> None:

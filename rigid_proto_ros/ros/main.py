@@ -62,7 +62,8 @@ def _run(argv: list[str], ending: Ending) -> int:
         with told_when_compiling(_say_that_it_compiles):
             if bodies:
                 for body_name, values in bodies.items():
-                    overrides = given_parameters(values)
+                    # What the command line gives is for all of them, and comes after the files.
+                    overrides = given_parameters({**values, **given})
                     nodes.append(RigidBodyNode(_make_viewer, body_name, parameter_overrides=overrides))
             else:
                 nodes.append(RigidBodyNode(_make_viewer, parameter_overrides=given_parameters(given)))

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from ..core.commands import ClearWrench, ReleaseString
-from ..core.errors import CommandRefused, InputError
+from ..core.errors import InputError
 from ..core.observer import Observer, Observers
 from ..offline import tell_start
 from ..scenario import Scenario, check_inertia, make_scenario
@@ -47,6 +47,7 @@ class RigidBodyNode(Node):
     ) -> None:
         super().__init__(node_name, start_parameter_services=False, **node_options)
         self.thread: PhysicsThread | None = None
+        self.follows_clock = False
         scenario = make_scenario(declare_parameters(self))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
@@ -73,7 +74,6 @@ class RigidBodyNode(Node):
             (self.world_frame, self.body_frame),
             self._apply_scheduled,
             self._apply_inertia,
-            self._command_refused,
         )
         self._live_parameters = LiveParameters(self)
         self.create_service(Trigger, "~/reset", _answering(self._on_reset))
@@ -116,8 +116,8 @@ class RigidBodyNode(Node):
     def _recording_failed(self, message: str) -> None:
         print(f"{self.get_name()}: {message}", file=sys.stderr)
 
-    def switch_recording(self, recorder: Observer | None) -> None:
-        """On the physics thread: the old recording is finished, the new one is told what flies."""
+    def switch_recording(self, recorder: Observer | None) -> Observer | None:
+        """On the physics thread: the new recording is told what flies. Returns the old one, to be closed by whom nobody waits for."""
         finished, self._recorder = self._recorder, recorder
         self.observer = self._observers()
         self.flight.watch(self.observer)
@@ -125,13 +125,13 @@ class RigidBodyNode(Node):
             tell_start(recorder, self.flight.scenario)
             recorder.scene_changed(self.flight.simulation.time_ns, self.flight.scenario.text)
             self.flight.simulation.introduce(recorder)
-        if finished is not None:
-            finished.close()
+        return finished
 
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
         """/clock, when use_sim_time asks for it and it isn't our own."""
         if not self.get_parameter("use_sim_time").value or scenario.values["publish_clock"]:
             return None
+        self.follows_clock = True
         clock = self.get_clock()
         return lambda: clock.now().nanoseconds
 
@@ -142,9 +142,6 @@ class RigidBodyNode(Node):
 
     def _take_commands(self, wall_ns: int) -> bool:
         return self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
-
-    def _command_refused(self, refusal: CommandRefused) -> None:
-        self.get_logger().warning(f"refused: {refusal}", throttle_duration_sec=1.0)
 
     def _motion_failed(self, message: str) -> None:
         self.get_logger().error(f"paused in the last good state: {message}")
@@ -171,8 +168,16 @@ class RigidBodyNode(Node):
     def tell_scene(self, scenario: Scenario) -> None:
         self.observer.scene_changed(self.flight.simulation.time_ns, scenario.text)
 
-    def _take_on(self, scenario: Scenario):
+    def check_change(self, scenario: Scenario) -> None:
+        """On the physics thread: raises InputError where this scenario can't follow the present one."""
+        if self.follows_clock and scenario.values["publish_clock"]:
+            raise InputError(
+                "publish_clock", True, "false, while simulated time follows the /clock of another (use_sim_time)"
+            )
         self.flight.simulation.check_change(scenario.setup)
+
+    def _take_on(self, scenario: Scenario):
+        self.check_change(scenario)
         self.flight.change(scenario)
         self.tell_scene(scenario)
         self._live_parameters.changed()
@@ -243,7 +248,7 @@ class RigidBodyNode(Node):
             "steps": simulation.steps,
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
-            "recording": "" if getattr(self._recorder, "error", "") else flight.scenario.values["record"],
+            "recording": "" if getattr(self._recorder, "error", "not recording") else flight.scenario.values["record"],
             "warning": simulation.failure or simulation.too_coarse,
         }
 

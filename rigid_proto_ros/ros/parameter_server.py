@@ -94,4 +94,4 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
 
 def is_read_only(name: str) -> bool:
     """Whether a parameter counts at start only, ours or one that every rclpy node has."""
-    return name != "use_sim_time" if is_ros_parameter(name) else parameter_named(name).changes == READ_ONLY
+    return is_ros_parameter(name) or parameter_named(name).changes == READ_ONLY

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""The ghost gets all the commands that the body gets, or isn't there yet."""
+
+from __future__ import annotations
+
+import pytest
+from flights import SECOND
+
+from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.core.observer import BodySnapshot, Observer
+from rigid_proto_ros.scenario import make_scenario
+
+MOVING = {
+    "initial.linear_velocity": [1.0, 0.0, 0.0],
+    "initial.angular_velocity": [0.1, 5.0, 0.2],
+    "real_time_factor": 0.0,
+}
+
+
+class Watcher(Observer):
+    """Notes when ghosts begin, and where body and ghost are."""
+
+    def __init__(self) -> None:
+        self.began: list[int] = []
+        self.body: dict[int, list[float]] = {}
+        self.ghost: dict[int, list[float]] = {}
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        self.began.append(time_ns)
+
+    def state(self, time_ns: int, row) -> None:
+        self.body[time_ns] = row.tolist()
+
+    def ghost_state(self, time_ns: int, row) -> None:
+        self.ghost[time_ns] = row.tolist()
+
+
+def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():
+    with pytest.raises(InputError, match=r"ghost\.integrator"):
+        make_scenario({"string.attached": True, "ghost.integrator": "free_body"})
+    scenario = make_scenario({"string.attached": True})
+    with pytest.raises(InputError, match=r"ghost\.integrator"):
+        scenario.with_changes({"ghost.integrator": "free_body"})
+
+
+def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
+    pytest.importorskip("rclpy")
+    from rigid_proto_ros.ros.flight import Flight
+
+    watcher = Watcher()
+    flight = Flight(
+        make_scenario(MOVING), watcher, lambda s: None, lambda wall_ns: False, print, is_viewed=lambda: True
+    )
+    flight.start()
+    while flight.simulation.time_ns < SECOND:
+        flight.tick()
+    flight.change(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
+    while flight.simulation.time_ns < 2 * SECOND:
+        flight.tick()
+    assert not watcher.began and not watcher.ghost
+    flight.reset()
+    watcher.body.clear()
+    while flight.simulation.time_ns < SECOND:
+        flight.tick()
+    assert watcher.began == [0]
+    assert watcher.ghost.keys() == watcher.body.keys()
+    # No force acts, so the COMs stay together; the tensors part the attitudes.
+    last = max(watcher.body)
+    assert watcher.ghost[last][:3] == watcher.body[last][:3] and watcher.ghost[last][3:7] != watcher.body[last][3:7]
