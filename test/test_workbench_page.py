@@ -10,14 +10,13 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import held_domain
 from ros_process import READY_S, RosProcess, descendants, running_node
-from workbench_page import CHROMIUM, FLAGS, SAID_S, Bench, Ear, Page
+from workbench_page import CHROMIUM, FLAGS, SAID_S, Bench, Ear, Page, bare_page
 
 from rigid_proto_ros.offline import read_scene
 from rigid_proto_ros.poke_script import parse_script
@@ -363,32 +362,6 @@ def test_what_was_done_by_hand_is_saved_as_scene_and_script_and_as_a_link(page, 
     scene, script = decode(link.partition("?")[2])
     assert parse_script(script) == commands
     assert read_scene_text(scene).values == read_scene_text(files["scene.yaml"]).values
-
-
-CAMERA_MESSAGE = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (1.0, 0.0, 0.0),
-    "fov": 0.7,
-    "near": 0.01,
-    "far": 100.0,
-    "image_height": 4,
-    "image_width": 4,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
-"""What viser waits for before it calls a page open."""
-
-
-@contextmanager
-def bare_page(port: int) -> Iterator:
-    """A second page without a browser: a socket as a page opens it."""
-    import msgspec.msgpack
-    from websockets.sync.client import connect
-
-    with connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:
-        page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
-        yield page
 
 
 def drag_message(phase: str, start: tuple, end: tuple) -> bytes:

@@ -8,6 +8,8 @@ import os
 import re
 import shutil
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -224,3 +226,30 @@ class Ear(RosClient):
     def until_value(self, name: str, condition):
         """Wait until a parameter meets a condition; returns it."""
         return self.until(lambda: condition(value := self.values().get(name)) and [value], f"{name} as asked for")[0]
+
+
+CAMERA_MESSAGE = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (1.0, 0.0, 0.0),
+    "fov": 0.7,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 4,
+    "image_width": 4,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+"""What viser waits for before it calls a page open."""
+
+
+@contextmanager
+def bare_page(port: int) -> Iterator:
+    """A page without a browser: a socket as a page opens it."""
+    import msgspec.msgpack
+    import viser
+    from websockets.sync.client import connect
+
+    with connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:
+        page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
+        yield page

@@ -24,7 +24,7 @@ from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
 from .history import History
 from .panel import Panel, show_tab
-from .pointer import Pointer, Tools
+from .pointer import Pointer, Tools, suggested_force
 from .readout_panel import ReadoutPanel
 from .rewind import Rewind, core_row
 from .ros_link import RosLink
@@ -47,9 +47,6 @@ SILENT_S = 1.5
 
 LEASH = 1.0
 """Body sizes that the body may fly from the picture's middle before the picture follows."""
-
-POKE_TRAVEL = 0.3
-"""Body sizes a second: what the suggested poke gives the body."""
 
 
 class Page:
@@ -112,14 +109,20 @@ class Page:
 
     async def run(self) -> None:
         """Follow the node for as long as the server runs."""
-        while True:
-            await self._open.wait()
-            started = time.monotonic()
-            self.tick(started)
-            await asyncio.sleep(max(0.002, started + FRAME_S - time.monotonic()))
+        try:
+            while True:
+                await self._open.wait()
+                started = time.monotonic()
+                self.tick(started)
+                await asyncio.sleep(max(0.002, started + FRAME_S - time.monotonic()))
+        except asyncio.CancelledError:
+            self._open.clear()  # the browsers that go now are no reason to do anything: close is
+            raise
 
     def close(self) -> None:
-        """Leave ROS, and nothing on the disk."""
+        """Leave ROS, the node as it was before somebody looked back, and nothing on the disk."""
+        if self.looking_at is not None:
+            self.link.call("pause", self._paused_before_looking)
         self.link.close()
         self._upload.close()
 
@@ -135,9 +138,9 @@ class Page:
         if not self.server.get_clients() and self._open.is_set():
             self._open.clear()
             self.pointer.let_go()
+            self.resume_after_looking()
             self.link.stop_listening()
             # What happens from now on isn't heard: the memory of the flight ends here.
-            self.end_looking()
             self.state = None
             self.history = History(self.link.target.strip("/"), self._attachments)
             self.sightings.forget()
@@ -191,6 +194,7 @@ class Page:
             self.history.rewinding(rewind)
             if rewind is None:
                 self.history.forget_ghost()
+                self.end_looking()  # the past was another body's
 
         def received() -> int:
             return int(self.diagnostics.get("commands_received", 0))
@@ -199,8 +203,10 @@ class Page:
             await bring_about(self.link, situation, paused, received, before_reset)
         except InputError:
             self.history.rewinding(None)
+            self.resume_after_looking()
             raise
         self.paused = paused
+        self.end_looking()
 
     def follow_link(self, link: str) -> None:
         """Bring the node where a link leads, once a page is open."""
@@ -230,6 +236,7 @@ class Page:
     def end_looking(self) -> None:
         """Show what is."""
         self.looking_at = self.looking_from = None
+        self._session.show_now()
 
     # What the node says
 
@@ -377,12 +384,6 @@ class Page:
                 status += f"  \n⚠ {warning}"
         if self._status.content != status:
             self._status.content = status
-
-
-def suggested_force(scenario: Scenario, size: float) -> float:
-    """A poke [N] that gives the body a part of its size a second: two digits are enough."""
-    duration_s = scenario.values["poke_duration"]
-    return float(f"{POKE_TRAVEL * size * scenario.setup.body.mass / duration_s:.2g}")
 
 
 def _direction(vector: np.ndarray, length: float) -> np.ndarray:

@@ -26,6 +26,9 @@ SAME_TICK_S = 0.03
 """Commands this far apart aren't taken in the same tick, where they act by kind and bytes: a release would act before a
 target, and the target would tie the string again."""
 
+POKE_TRAVEL = 0.3
+"""Body sizes a second: what the suggested poke gives the body."""
+
 POKE, PUSH = "Poke along the view", "Push inward"
 
 
@@ -196,3 +199,9 @@ class Pointer:
         self._link.call("string/release")
         if self._drag is drag:
             self._drag = None
+
+
+def suggested_force(scenario: Scenario, size: float) -> float:
+    """A poke [N] that gives the body a part of its size a second: two digits are enough."""
+    duration_s = scenario.values["poke_duration"]
+    return float(f"{POKE_TRAVEL * size * scenario.setup.body.mass / duration_s:.2g}")

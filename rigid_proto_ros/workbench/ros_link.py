@@ -20,6 +20,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -33,6 +34,9 @@ from ..ros.parameter_server import ros_parameter
 from ..ros.taken_by_hand import TakenByHand
 
 _TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
+
+LAST_WORD_S = 1.0
+"""[s] That a node may take to answer the last call before the link closes; a running one takes milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,7 @@ class RosLink:
         self._taken: dict[str, object] = {}
         self._served: list = []
         self._poses: dict[int, PoseStamped] = {}
+        self._last_call: Future | None = None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
@@ -102,7 +107,10 @@ class RosLink:
             pass
 
     def close(self) -> None:
-        """Leave ROS."""
+        """Leave ROS, once the last call is answered: a request that nobody waits for may never leave."""
+        deadline = time.monotonic() + LAST_WORD_S
+        while self._last_call is not None and not self._last_call.done() and time.monotonic() < deadline:
+            time.sleep(0.01)
         self._executor.shutdown(timeout_sec=0.5)
         self._thread.join(timeout=0.5)
         self.node.destroy_node()
@@ -197,7 +205,8 @@ class RosLink:
             self._answer(done, False, f"{client.srv_name} doesn't answer: is the node running?")
             return
         request = Trigger.Request() if data is None else SetBool.Request(data=data)
-        client.call_async(request).add_done_callback(
+        self._last_call = client.call_async(request)
+        self._last_call.add_done_callback(
             lambda future: self._answer(done, future.result().success, future.result().message)
         )
 

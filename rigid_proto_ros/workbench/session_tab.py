@@ -125,14 +125,14 @@ class SessionTab:
     def _look(self, back_s: float) -> None:
         page = self._page
         if back_s <= 0.0:
-            self._stop_looking()
             page.resume_after_looking()
             return
         page.look_at(page.history.span[1] if page.looking_from is None else page.looking_from, back_s)
         self._go_on.disabled = False
         self._looking.content = f"Looking at {page.history.simulated_ns(page.looking_at) * 1e-9:.2f} s"
 
-    def _stop_looking(self) -> None:
+    def show_now(self) -> None:
+        """Nobody looks back any more."""
         self._go_on.disabled = True
         self._looking.content = ""
         self._back.value = 0.0
@@ -148,8 +148,7 @@ class SessionTab:
             for note in rewind.notes:
                 page.say(note)
         finally:
-            self._stop_looking()
-            page.end_looking()
+            page.resume_after_looking()
 
     # Save
 

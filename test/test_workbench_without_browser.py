@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""The page's logic, with a socket for a browser and a stand-in for the link to ROS: what the node is told, and when."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from workbench_page import bare_page
+
+viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
+pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
+
+from rigid_proto_ros.offline import read_scene  # noqa: E402
+from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
+from rigid_proto_ros.workbench import page as page_module  # noqa: E402
+from rigid_proto_ros.workbench.page import Page  # noqa: E402
+from rigid_proto_ros.workbench.ros_link import Heard  # noqa: E402
+from rigid_proto_ros.workbench.save_as_script import kept_scene  # noqa: E402
+from rigid_proto_ros.workbench.server import make_server, stop_server  # noqa: E402
+
+PATIENCE_S = 60.0
+STEP_NS = 100_000_000
+
+
+class StandIn:
+    """For RosLink: a node that takes whatever it is told, at once. told: what it was, in order."""
+
+    def __init__(self, target, deliver, on_scene, on_diagnostics) -> None:
+        self.target = target
+        self.told: list[tuple] = []
+        self.taken = True
+        self._deliver, self._on_scene = deliver, on_scene
+        self._heard = Heard()
+
+    def listen(self) -> None:
+        self.told.append(("listen",))
+        self._deliver(self._on_scene, kept_scene(read_scene("t_handle", {})))
+
+    def stop_listening(self) -> None:
+        self.told.append(("stop_listening",))
+
+    def say(self, states=(), events=()) -> None:
+        """On the page's thread: what the page hears at its next look."""
+        self._heard.states.extend(states)
+        self._heard.events.extend(events)
+
+    def take(self) -> Heard:
+        heard, self._heard = self._heard, Heard()
+        return heard
+
+    def call(self, service, data=None, done=None) -> None:
+        self.told.append((service, data))
+        if done is not None:
+            self._deliver(done, True, "")
+
+    def set_parameters(self, changes, done=None) -> None:
+        self.told.append(("set", dict(changes)))
+        self._deliver(done, self.taken, "" if self.taken else "not that")
+
+    def close(self) -> None:
+        self.told.append(("close",))
+
+
+class Desk:
+    """A page, its server and its stand-in. ``do`` runs a function on the page's thread."""
+
+    def __init__(self) -> None:
+        self.server = make_server(LOOPBACK, any_free_port(), lambda link: None)
+        self.page: Page = self.do(lambda: Page(self.server, "/rigid_body", "http://here"))
+        self.link = self.page.link
+        self.said: list[str] = []
+        self.page.say = self.said.append
+        self.running = asyncio.run_coroutine_threadsafe(self.page.run(), self.page.loop)
+
+    def end(self) -> None:
+        """As the page's process ends."""
+        if not self.running.cancelled():
+            self.running.cancel()
+            stop_server(self.server)
+            self.page.close()
+
+    def do(self, function: Callable):
+        async def done():
+            found = function()
+            return await found if asyncio.iscoroutine(found) else found
+
+        return asyncio.run_coroutine_threadsafe(done(), self.server.get_event_loop()).result(PATIENCE_S)
+
+    def until(self, condition: Callable[[], object], what: str):
+        deadline = time.monotonic() + PATIENCE_S
+        while not (found := self.do(condition)):
+            assert time.monotonic() < deadline, f"no {what}; told {self.link.told}, said {self.said}"
+            time.sleep(0.01)
+        return found
+
+    def fly(self, seconds: float = 2.0) -> None:
+        """Let the page hear of so much of a flight."""
+        row = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6])
+        states = [(k * STEP_NS, row) for k in range(round(seconds * 1e9 / STEP_NS) + 1)]
+        self.until(lambda: self.page.scenario is not None, "scene")
+        self.do(lambda: self.link.say(states))
+        self.until(lambda: self.page.history.span[1] == states[-1][0], "flight")
+
+    def input(self, label: str):
+        inputs = self.server.gui._gui_input_handle_from_uuid.values()
+        (found,) = [handle for handle in inputs if getattr(handle, "label", None) == label]
+        return found
+
+    def drag(self, socket, label: str, value) -> None:
+        """Move an input as a browser says it."""
+        import msgspec.msgpack
+
+        update = {"type": "GuiUpdateMessage", "uuid": self.input(label)._impl.uuid, "updates": {"value": value}}
+        socket.send(msgspec.msgpack.encode(update))
+
+    def look_back(self, socket) -> None:
+        """A page scrubs one second back."""
+        self.drag(socket, "Seconds back", 1.0)
+        self.until(lambda: self.page.looking_at == 1_000_000_000, "looking back")
+        assert self.link.told[-1] == ("pause", True)
+
+    @property
+    def shows_now(self) -> bool:
+        button = self.page._session._go_on
+        return self.page.looking_at is None and self.input("Seconds back").value == 0.0 and button.disabled
+
+
+@pytest.fixture
+def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+    monkeypatch.setattr(page_module, "RosLink", StandIn)
+    monkeypatch.setattr(page_module, "GRACE_S", 0.0)
+    desk = Desk()
+    yield desk
+    desk.end()
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_the_last_page_that_closes_while_it_looks_back_leaves_the_node_as_it_was(desk: Desk, paused: bool) -> None:
+    with bare_page(desk.server.get_port()) as socket:
+        desk.fly()
+        desk.page.paused = paused
+        desk.look_back(socket)
+    desk.until(lambda: ("stop_listening",) in desk.link.told, "end of listening")
+    assert desk.link.told[-2:] == [("pause", paused), ("stop_listening",)]
+    assert desk.shows_now
+
+
+def test_a_page_server_that_ends_while_somebody_looks_back_leaves_the_node_as_it_was(desk: Desk, recwarn) -> None:
+    with bare_page(desk.server.get_port()) as socket:
+        desk.fly()
+        desk.look_back(socket)
+        desk.end()
+    assert desk.link.told[-2:] == [("pause", False), ("close",)]
+    assert not [str(warning.message) for warning in recwarn]
+
+
+def test_a_lesson_chosen_while_looking_back_is_shown_as_it_is_now(desk: Desk) -> None:
+    with bare_page(desk.server.get_port()) as socket:
+        desk.fly()
+        desk.look_back(socket)
+        lesson = desk.input("Lesson").options[-1]
+        desk.drag(socket, "Lesson", lesson)
+        desk.until(lambda: desk.link.told[-1] == ("pause", False), "lesson")
+        assert ("reset", None) in desk.link.told
+        desk.until(lambda: desk.shows_now, "present")
+
+
+def test_a_lesson_that_the_node_refuses_while_somebody_looks_back_leaves_it_running_and_shown_as_it_is(desk) -> None:
+    with bare_page(desk.server.get_port()) as socket:
+        desk.fly()
+        desk.look_back(socket)
+        desk.link.taken = False
+        desk.drag(socket, "Lesson", desk.input("Lesson").options[-1])
+        desk.until(lambda: any("not that" in text for text in desk.said), "refusal")
+        assert desk.shows_now and desk.link.told[-1] == ("pause", False)
