@@ -14,6 +14,7 @@ from rigid_proto_ros.bundled import scene_path
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_io import resolve_mesh
+from rigid_proto_ros.ros.arguments import given_arguments
 from rigid_proto_ros.ros.main import main as rigid_body_node
 from rigid_proto_ros.ros.poke_client import main as poke_client
 
@@ -217,6 +218,14 @@ def test_what_is_refused_overwrites_no_recording(option, ending, tmp_path, capfd
         assert kept.read_bytes() == b"an earlier flight"
 
 
+def test_a_demo_that_is_refused_keeps_the_session_before_it(tmp_path, capfd):
+    session, mesh = tmp_path / "session.rrd", tmp_path / "open.obj"
+    session.write_bytes(b"an earlier flight")
+    mesh.write_text(MESHES["open.obj"])
+    assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--out", str(tmp_path), "--mesh", str(mesh)])
+    assert session.read_bytes() == b"an earlier flight"
+
+
 def test_two_recordings_of_one_flight_are_two_files(tmp_path, capfd):
     file = str(tmp_path / "x.mcap")
     assert "another file" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--record", file, "--bag", file])
@@ -248,6 +257,17 @@ def test_an_unknown_name_under_the_wildcard_is_only_warned_of(tmp_path, capfd):
 )
 def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
     assert part in one_line(capfd, rigid_body_node, ["rigid_body_node", "--ros-args", *arguments])
+
+
+@pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])
+def test_a_mesh_of_any_name_reaches_the_node_that_up_starts(name, tmp_path, monkeypatch, capfd):
+    started = []
+    monkeypatch.setattr("rigid_proto_ros.ros.main.main", lambda argv: started.append(argv) or 0)
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text(TETRAHEDRON)
+    assert rigid_proto(["up", "--mesh", name, "--viewer", "none"]) == 0
+    (argv,) = started
+    assert given_arguments(argv, "rigid_body", pytest.fail)["mesh"] == name
 
 
 @pytest.mark.parametrize(

@@ -30,13 +30,12 @@ def run(args: argparse.Namespace) -> int:
     """Fly, and say what happened."""
     from ..bundled import example_path, scene_path
     from ..offline import read_scene
-    from .processes import Processes, own_executable
+    from .processes import Processes, own_executable, text_parameter
 
     if not 3.0 <= args.duration <= 3600.0:
         raise InputError("--duration", args.duration, "seconds from 3 to 3600")
     args.out.mkdir(parents=True, exist_ok=True)
     session = args.out / "session.rrd"
-    session.unlink(missing_ok=True)
     if args.mesh:
         from .demo_scene import write_demo
 
@@ -44,11 +43,12 @@ def run(args: argparse.Namespace) -> int:
     else:
         scene, script = scene_path("t_handle"), example_path("flip_and_poke")
     scenario = read_scene(str(scene))
+    session.unlink(missing_ok=True)
     print(f"1. rigid_body_node: {scenario.values['mesh']}, {scenario.setup.body.mass:.6g} kg", flush=True)
     with Processes() as processes:
         node = processes.start(
             [*own_executable("rigid_body_node"), "--ros-args", "--params-file", str(scene)]
-            + ["-p", f"record:={session.resolve()}", "-p", "start_paused:=true"]
+            + [*text_parameter("record", str(session.resolve())), "-p", "start_paused:=true"]
         )
         print(f"2. poke_client --reset {script}", flush=True)
         client = processes.start([*own_executable("poke_client"), str(script), "--reset", "--timeout", "60"])

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Child processes that never outlive their parent's command."""
+"""Child processes that never outlive their parent's command, and how the node is told a text."""
 
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import signal
 import subprocess
@@ -24,6 +25,11 @@ GRACE_S = 5.0
 def own_executable(name: str) -> list[str]:
     """How to start one of this package's executables with the interpreter and packages of this process."""
     return [sys.executable, "-m", _MODULES[name]]
+
+
+def text_parameter(name: str, text: str) -> list[str]:
+    """ROS arguments that give the node a text. Quoted: they are read as YAML, where ``part #2.obj`` is ``part``."""
+    return ["-p", f"{name}:={json.dumps(text, ensure_ascii=False)}"]
 
 
 def _end_with_parent() -> None:

@@ -20,8 +20,9 @@ def add_parser(subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Become the node: signals reach it directly."""
     from ..offline import read_scene, scene_file
+    from .processes import text_parameter
 
-    overrides = ["-p", f"mesh:={args.mesh}"] if args.mesh else []
+    overrides = text_parameter("mesh", args.mesh) if args.mesh else []
     scenario = read_scene(args.scene, {"mesh": args.mesh} if args.mesh else {})
     viewer = args.viewer
     if viewer == "auto":
