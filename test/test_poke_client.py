@@ -131,6 +131,21 @@ def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(r
     assert gained == {"commands_received": len(sent)}
 
 
+@pytest.mark.parametrize(
+    ("values", "later_s"), [({"real_time_factor": 0.0}, 61), ({"real_time_factor": 8.0, "schedule_horizon": 5.0}, 12)]
+)
+def test_with_reset_all_within_the_horizon_is_there_before_time_goes_on_and_the_rest_waits(
+    rig, tmp_path, values, later_s
+):
+    path = tmp_path / "long.yaml"
+    path.write_text("".join(f"- {{t: {t}, impulse: [1.0e-6, 0, 0]}}\n" for t in (0, later_s)))
+    rig.set_named(values)
+    done = client(rig, path, "--reset")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "0 late, 0 refused" in done.stdout
+    rig.sent += 2
+
+
 def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_commands_come_from_the_line(rig, tmp_path):
     rig.set(real_time_factor=4.0)
     (tmp_path / "two.yaml").write_text("- {t: 0.1, impulse: [1.0e-6, 0, 0]}\n- {t: 0.35, impulse: [1.0e-6, 0, 0]}\n")

@@ -18,6 +18,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ..core.errors import InputError
+from ..parameters import PARAMETERS
 from ..poke_script import ScriptCommand, with_contacts
 from ..scenario import nanoseconds
 from . import qos
@@ -26,7 +27,9 @@ MAX_UNCONFIRMED = 500
 """Commands sent beyond what the node has reported as received: far below what its queues hold."""
 
 SEND_AHEAD_NS = 60 * 1_000_000_000
-"""Commands go out at most this far ahead of simulated time; the node's default horizon is an hour."""
+"""Commands to a node that runs go out at most this far ahead of simulated time, so that a client that is ended leaves little
+behind; before it resumes it gets all that its schedule_horizon lets in.
+"""
 
 STALLED_S = 15.0
 """A node that confirms nothing for this long is gone, or receives nothing."""
@@ -99,14 +102,15 @@ class ScriptSender(Node):
         else:
             start_ns = self._now_ns() + nanoseconds(lead_s)
         sent = dict.fromkeys(self._topics, 0)
+        horizon_ns = nanoseconds(float(self.parameter("schedule_horizon") or PARAMETERS["schedule_horizon"].default))
         paused = reset
         for number, command in enumerate(script):
             stamp_ns = start_ns + command.t_ns
-            if paused and stamp_ns > SEND_AHEAD_NS:
+            if paused and stamp_ns > horizon_ns:
                 self._confirm(number)
                 self._call(self._pause_client, SetBool.Request(data=False))
                 paused = False
-            self._hold_back(number, stamp_ns)
+            self._hold_back(number, stamp_ns, horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS))
             self._topics[command.topic].publish(command.message(stamp_ns))
             sent[command.topic] += 1
             self._show(f"sent {number + 1} of {len(script)}")
@@ -172,11 +176,11 @@ class ScriptSender(Node):
         self.destroy_subscription(subscription)
         return self._simulated_ns
 
-    def _hold_back(self, number: int, stamp_ns: int) -> None:
-        """Wait while too much is unconfirmed, or the command lies too far ahead to be sent."""
+    def _hold_back(self, number: int, stamp_ns: int, ahead_ns: int) -> None:
+        """Wait while too much is unconfirmed, or the command lies further ahead than ``ahead_ns``."""
         if number - self._confirmed() >= MAX_UNCONFIRMED:
             self._confirm(number - MAX_UNCONFIRMED + 1)
-        while stamp_ns > self._reported_ns() + SEND_AHEAD_NS:
+        while stamp_ns > self._reported_ns() + ahead_ns:
             rclpy.spin_once(self, timeout_sec=0.5)
             self._show(f"sent {number}, waiting for simulated time")
 
