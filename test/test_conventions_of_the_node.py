@@ -214,6 +214,18 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
             assert (plain.stop(), other.stop()) == (0, 0)
 
 
+def test_a_second_node_of_the_same_name_is_warned_of_by_both(ros_environment, tmp_path):
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        nodes = [NodeProcess(environment, tmp_path / f"{k}.log", {"mesh": "t_handle"}) for k in (1, 2)]
+        said = "somebody else publishes /rigid_body/pose too"
+        try:
+            with RosClient(environment) as client:
+                client.until(lambda: all(node.log.read_text().count(said) == 1 for node in nodes), "a warning of each")
+        finally:
+            assert [node.stop() for node in nodes] == [0, 0]
+
+
 TWO_IN_ONE = """
 import rclpy
 from rigid_proto_ros.ros.node import RigidBodyNode

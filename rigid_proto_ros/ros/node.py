@@ -48,6 +48,7 @@ class RigidBodyNode(Node):
         super().__init__(node_name, start_parameter_services=False, **node_options)
         self.thread: PhysicsThread | None = None
         self.follows_clock = False
+        self._others = 0
         scenario = make_scenario(declare_parameters(self))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
@@ -249,8 +250,18 @@ class RigidBodyNode(Node):
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
             "recording": "" if getattr(self._recorder, "error", "not recording") else flight.scenario.values["record"],
-            "warning": simulation.failure or simulation.too_coarse,
+            "warning": simulation.failure or self._namesake() or simulation.too_coarse,
         }
+
+    def _namesake(self) -> str:
+        """What to say when somebody else publishes the same states; logged when it begins."""
+        before, self._others = self._others, self.count_publishers("~/pose") - 1
+        if self._others <= 0:
+            return ""
+        warning = f"somebody else publishes {self.get_fully_qualified_name()}/pose too: nodes of one name take each other's commands"
+        if before <= 0:
+            self.get_logger().warning(warning)
+        return warning
 
 
 def _answering(callback: Callable) -> Callable:
