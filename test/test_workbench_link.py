@@ -60,6 +60,15 @@ def test_a_hand_session_opens_elsewhere_as_the_same_motion() -> None:
     assert run.simulation.state.sha256() == hand.simulation.state.sha256()
 
 
+@pytest.mark.parametrize("script", [None, [], {"script": None}, {"script": [], "repeat": 2, "every": 1.0}])
+def test_a_link_without_commands_has_an_empty_script(script) -> None:
+    assert parse_script(link.decode(packed({"scene": {}, "script": script}))[1]) == []
+
+
+def test_the_address_that_a_link_stands_in_is_read_as_the_link() -> None:
+    assert link.decode(f"http://127.0.0.1:8080/?{GOOD}") == link.decode(GOOD)
+
+
 GOOD = link.encode(scene_path("t_handle").read_text("utf-8"), "- {t: 1.0, at: tip, push: 0.03}")
 
 

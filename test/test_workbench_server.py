@@ -64,9 +64,16 @@ def test_without_a_port_asked_for_the_next_free_one_is_taken_on_the_host_that_is
 
 @pytest.mark.parametrize(
     "arguments, named",
-    [(["--host", NOT_HERE], "--host"), (["--port", "0"], "--port"), (["--port", "65536"], "--port")],
+    [
+        (["--host", NOT_HERE], "--host"),
+        (["--port", "0"], "--port"),
+        (["--port", "65536"], "--port"),
+        (["--link", "garbage"], "link"),
+        (["--link", ""], "link"),
+        (["--node", "other", "--link", "http://127.0.0.1:8080/?1.AAAA"], "link"),
+    ],
 )
-def test_an_address_that_cannot_be_served_is_refused_before_anything_starts(
+def test_an_address_or_a_link_that_leads_nowhere_is_refused_before_anything_starts(
     arguments, named, monkeypatch, capsys
 ) -> None:
     monkeypatch.setattr(Processes, "start", lambda self, command: pytest.fail(f"started {command}"))

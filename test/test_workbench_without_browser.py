@@ -177,3 +177,10 @@ def test_a_lesson_that_the_node_refuses_while_somebody_looks_back_leaves_it_runn
         desk.drag(socket, "Lesson", desk.input("Lesson").options[-1])
         desk.until(lambda: any("not that" in text for text in desk.said), "refusal")
         assert desk.shows_now and desk.link.told[-1] == ("pause", False)
+
+
+def test_a_damaged_link_that_opens_the_page_is_refused_when_somebody_can_see_it(desk: Desk) -> None:
+    desk.do(lambda: desk.page.follow_link("1.AAAA"))
+    assert desk.said == []
+    with bare_page(desk.server.get_port()):
+        desk.until(lambda: any("damaged" in text for text in desk.said), "refusal")

@@ -34,6 +34,10 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("workbench", f"no package {package}", f"{remedy} (extras [workbench] and [ros])")
     if args.node and (args.scene or args.mesh):
         raise InputError("--node", args.node, "a running node, or a scene to start one with, not both")
+    if args.link is not None:
+        from ..workbench.link import decode
+
+        decode(args.link)  # a page that isn't open yet has nobody to tell of a refusal
     from ..workbench.upload import sweep
 
     try:

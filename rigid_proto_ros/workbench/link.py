@@ -67,8 +67,8 @@ def _too_long(received: str) -> InputError:
 
 
 def decode(link: str) -> tuple[str, str]:
-    """Scene and script of a link, as texts; raises InputError."""
-    link = link.strip()
+    """Scene and script of a link, or of the address that it stands in, as texts; raises InputError."""
+    link = link.rpartition("?")[2].strip()
     if len(link) > MAX_LINK:
         raise InputError("link", f"{len(link)} characters", f"at most {MAX_LINK}")
     version, dot, payload = link.partition(".")
@@ -83,8 +83,8 @@ def decode(link: str) -> tuple[str, str]:
         _check(values, entries)
     except RecursionError:
         raise _damaged("its nesting") from None
-    listed = entries if isinstance(entries, list) else entries["script"]
-    lines = "".join(f"- {flow(entry)}\n" for entry in listed)
+    listed = entries["script"] if isinstance(entries, dict) else entries
+    lines = "".join(f"- {flow(entry)}\n" for entry in listed or [])
     if isinstance(entries, dict):
         head = "".join(f"{key}: {flow(value)}\n" for key, value in entries.items() if key != "script")
         lines = f"{head}script:\n{lines}"

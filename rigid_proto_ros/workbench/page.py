@@ -210,7 +210,12 @@ class Page:
 
     def follow_link(self, link: str) -> None:
         """Bring the node where a link leads, once a page is open."""
-        self._following = self.loop.create_task(self._session.open_link(link))
+
+        async def following() -> None:
+            await self.known()  # before that nobody would see a refusal
+            await self._session.open_link(link)
+
+        self._following = self.loop.create_task(following())
 
     def say(self, text: str) -> None:
         """A line to all pages."""

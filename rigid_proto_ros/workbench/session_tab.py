@@ -195,7 +195,7 @@ class SessionTab:
     async def open_link(self, text: str) -> None:
         """Bring the node where a link leads; a refusal is said on the page."""
         try:
-            scene, script = decode(text.rpartition("?")[2])
+            scene, script = decode(text)
         except InputError as error:
             self._page.say(str(error))
             return
