@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
 from conftest import held_domain
+from ros_process import running_node
 
 from rigid_proto_ros.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scenario import make_scenario
@@ -224,6 +225,16 @@ def test_a_second_node_of_the_same_name_is_warned_of_by_both(ros_environment, tm
                 client.until(lambda: all(node.log.read_text().count(said) == 1 for node in nodes), "a warning of each")
         finally:
             assert [node.stop() for node in nodes] == [0, 0]
+
+
+def test_what_the_command_line_gives_is_for_all_bodies_and_comes_after_their_files(ros_environment, tmp_path):
+    arguments = ("--bodies", "hammer", "book", "--ros-args", "-p", "publish_rate:=40.0")
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        with running_node(*arguments, environment=environment, log=tmp_path / "bodies"):
+            for node in ("/hammer", "/book"):
+                with RosClient(environment, node) as client:
+                    assert client.get("publish_rate", "mesh") == {"publish_rate": 40.0, "mesh": node.strip("/")}
 
 
 TWO_IN_ONE = """
