@@ -3,6 +3,7 @@
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -127,8 +128,9 @@ def test_every_source_file_names_its_licence() -> None:
     assert not lacking
 
 
-ROSDEP_KEYS = {"python3-numba", "python3-numpy", "python3-pytest", "python3-trimesh-pip", "python3-yaml"}
-"""Those of rosdistro's rosdep/python.yaml that this package asks for; ROS packages are keys by their names."""
+ROSDEP_KEYS = {"python3-numba", "python3-numpy", "python3-pytest", "python3-yaml"}
+"""Those of rosdistro's rosdep/python.yaml that this package asks for; ROS packages are keys by their names. None ends in -pip:
+Ubuntu 24.04 lets pip install nothing beside apt (PEP 668), so that rosdep would stop there."""
 
 ROS_PACKAGES = {
     *("diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs"),
@@ -141,6 +143,21 @@ def test_every_dependency_is_a_rosdep_key() -> None:
     tree = ElementTree.parse(SOURCE / "package.xml")
     asked = {element.text for element in tree.iter() if element.tag.endswith("depend")}
     assert asked == ROSDEP_KEYS | ROS_PACKAGES
+
+
+def test_what_pip_is_to_install_has_the_versions_of_setup_py() -> None:
+    declared = set(re.findall(r'"([a-z-]+[><=][^"]*)"', (SOURCE / "setup.py").read_text("utf-8")))
+    install = (SOURCE / "README.md").read_text("utf-8").partition("## Install")[2].partition("\n## ")[0]
+    for text in (install, (SOURCE / "package.xml").read_text("utf-8")):
+        told = re.findall(r'"([a-z-]+[><=][^"]*)"', text)
+        assert [requirement.split(">")[0] for requirement in told] == [
+            "rerun-sdk",
+            "mcap",
+            "viser",
+            "pyarrow",
+            "trimesh",
+        ]
+        assert set(told) <= declared
 
 
 def test_every_ros_package_that_the_code_imports_is_declared() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Child processes that never outlive their parent's command, and how the node is told a text."""
+"""Child processes that never outlive their parent's command."""
 
 from __future__ import annotations
 
