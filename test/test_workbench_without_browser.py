@@ -19,7 +19,6 @@ from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E4
 from rigid_proto_ros.workbench import page as page_module  # noqa: E402
 from rigid_proto_ros.workbench.page import Page  # noqa: E402
 from rigid_proto_ros.workbench.ros_link import Heard  # noqa: E402
-from rigid_proto_ros.workbench.save_as_script import kept_scene  # noqa: E402
 from rigid_proto_ros.workbench.server import make_server, stop_server  # noqa: E402
 
 PATIENCE_S = 60.0
@@ -33,12 +32,16 @@ class StandIn:
         self.target = target
         self.told: list[tuple] = []
         self.taken = True
+        self.values: dict = {}
         self._deliver, self._on_scene = deliver, on_scene
         self._heard = Heard()
 
     def listen(self) -> None:
         self.told.append(("listen",))
-        self._deliver(self._on_scene, kept_scene(read_scene("t_handle", {})))
+        self._say_scene()
+
+    def _say_scene(self) -> None:
+        self._deliver(self._on_scene, read_scene("t_handle", self.values).text)
 
     def stop_listening(self) -> None:
         self.told.append(("stop_listening",))
@@ -59,6 +62,9 @@ class StandIn:
 
     def set_parameters(self, changes, done=None) -> None:
         self.told.append(("set", dict(changes)))
+        if self.taken:
+            self.values |= changes
+            self._say_scene()
         self._deliver(done, self.taken, "" if self.taken else "not that")
 
     def close(self) -> None:
@@ -181,6 +187,31 @@ def test_a_lesson_that_the_node_refuses_while_somebody_looks_back_leaves_it_runn
 
 def test_a_damaged_link_that_opens_the_page_is_refused_when_somebody_can_see_it(desk: Desk) -> None:
     desk.do(lambda: desk.page.follow_link("1.AAAA"))
+    desk.do(lambda: asyncio.sleep(0.0))
     assert desk.said == []
     with bare_page(desk.server.get_port()):
         desk.until(lambda: any("damaged" in text for text in desk.said), "refusal")
+
+
+EXPLICIT = {"inertia_model": "explicit", "explicit_inertia.tensor": [1e-3, 0.0, 0.0, 1e-3, 0.0, 1e-3]}
+
+
+@pytest.mark.parametrize(
+    "model, mass",
+    [
+        ({"mass": 0.4}, "mass"),
+        ({"mass": 0.0}, "mass"),  # by density
+        ({**EXPLICIT, "explicit_inertia.mass": 0.4}, "explicit_inertia.mass"),
+    ],
+)
+def test_times_the_mass_is_that_of_the_body_without_its_ballast(desk: Desk, model: dict, mass: str) -> None:
+    desk.link.values = {**model, "ballast.weight": [0.6, 0.0, 0.0, 0.0]}
+    with bare_page(desk.server.get_port()) as socket:
+        desk.until(lambda: desk.page.scenario is not None, "scene")
+        own = desk.page.scenario.setup.body.mass - 0.6
+        assert desk.input("Mass ×").value == 0.0
+        desk.drag(socket, "Mass ×", 1.0)
+        desk.until(lambda: desk.page.scenario.values[mass] != model[mass], "another mass")
+        assert desk.page.scenario.values[mass] == pytest.approx(10.0 * own, rel=1e-12)
+        desk.do(lambda: desk.page._controls.update(desk.page.scenario.values, at_once=True))
+        assert desk.input("Mass ×").value == 1.0

@@ -45,7 +45,7 @@ class BodyTab:
         body = scenario.setup.body
         if another:
             self._base_scale = float(np.prod(np.abs(body.scale))) ** (1.0 / 3.0)
-            self._base_mass = body.mass
+            self._base_mass = _own_mass(scenario)
         self._table.content = comparison(scenario)
         mesh = str(scenario.values["mesh"])
         self._file.content = "" if mesh in body_names() else f"Mesh file: `{Path(mesh).name}`"
@@ -93,7 +93,11 @@ class BodyTab:
             controls.factor("Size ×", "All three scales together (scale)", 1.0, self._size_factor, self._set_size)
             controls.vector("scale", "Scale x y z", 3)
             controls.factor(
-                "Mass ×", "Times the mass that the body came with (mass)", 2.0, self._mass_factor, self._set_mass
+                "Mass ×",
+                "Times the mass that the body came with, ballast aside (mass)",
+                2.0,
+                self._mass_factor,
+                self._set_mass,
             )
             controls.number("mass", "Mass [kg]; 0: by density")
             controls.number("density", "Density [kg/m³]")
@@ -109,12 +113,10 @@ class BodyTab:
 
     def _mass_factor(self, values) -> float:
         scenario = self._page.scenario
-        return scenario.setup.body.mass / self._base_mass if scenario is not None else 1.0
+        return _own_mass(scenario) / self._base_mass if scenario is not None and self._base_mass > 0.0 else 1.0
 
     def _set_mass(self, factor: float) -> dict:
-        if self._page.scenario.values["inertia_model"] == "explicit":
-            return {"explicit_inertia.mass": factor * self._base_mass}
-        return {"mass": factor * self._base_mass}
+        return {_mass_parameter(self._page.scenario): factor * self._base_mass}
 
     # Inertia
 
@@ -170,6 +172,17 @@ class BodyTab:
                 self._page.say("Ballast: a name of small letters, a mass, and three mesh coordinates")
             else:
                 self._page.set({f"ballast.{name.value}": numbers})
+
+
+def _own_mass(scenario: Scenario) -> float:
+    """Mass [kg] without ballast: as its parameter says, or what the density gives."""
+    given = float(scenario.values[_mass_parameter(scenario)])
+    weights = sum(value[0] for name, value in scenario.values.items() if name.startswith("ballast."))
+    return given if given > 0.0 else scenario.setup.body.mass - weights
+
+
+def _mass_parameter(scenario: Scenario) -> str:
+    return "explicit_inertia.mass" if scenario.values["inertia_model"] == "explicit" else "mass"
 
 
 def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
