@@ -2,6 +2,7 @@
 """A bad study is refused before anything runs, in one line that names the field; a good one says what its rows are."""
 
 import math
+from datetime import date
 
 import numpy as np
 import pytest
@@ -51,6 +52,7 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"script": [{"t": 0.1, "at": "tipp", "force": [0, 0, 1]}]}, "script, command 1", "tip"),
         ({"script": [{"t": 0.1, "at": "tip", "froce": [0, 0, 1]}]}, "entry 1", "force"),
         ({**NUDGE, "vary": {"script.1.at.vertex": {"grid": [0, 0.5]}}}, "vary.script.1.at.vertex", "{vertex: i}"),
+        ({"script": [{"t": 0, "set": {"mass": date(2020, 1, 1)}}], "vary": {"script.1.t": {"grid": [1]}}}, "", "mass"),
         ({**NUDGE, "vary": {"script.1.at.vertex": {"uniform": [0, 5]}}, "samples": 2}, "vertex", "random_vertex"),
     ],
 )
@@ -59,6 +61,19 @@ def test_a_bad_study_is_refused_with_its_field(changes, field: str, words: str) 
         study(PLAIN, **changes)
     assert field in refused.value.field
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("lines", ["vary: {mass: {grid: &a [*a]}}", "vary: &a {mass: {grid: [1.0]}}\nset: *a"])
+def test_a_study_file_has_no_aliases(lines: str, tmp_path) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text(f"scene: t_handle\nduration: 1\n{lines}\n")
+    with pytest.raises(InputError, match=r"s.yaml, line 3: got 'an anchor or alias'"):
+        read_study(str(file))
+
+
+def test_names_that_are_numbers_are_names() -> None:
+    conditions = {1: {"quantity": "turned", "above": 1.0}, "half": {"quantity": "turned", "above": 3.0}}
+    assert study(PLAIN, measure={"first": conditions}).measures.columns == ("first.1", "first.half")
 
 
 def test_ten_to_the_twelve_rows_need_a_yes() -> None:

@@ -7,6 +7,7 @@ another and count as one more grid; each combination is drawn ``samples`` times 
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import math
@@ -15,12 +16,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from ..bundled import example_names, example_path, study_names, study_path
 from ..core.errors import InputError
 from ..offline import OfflineRun, scene_file, scene_values
 from ..parameters import READ_ONLY, convert_all, parameter_named
+from ..plain_yaml import load_plain_yaml
 from ..poke_script import expand_script
 from ..scenario import Scenario, make_scenario, nanoseconds
 from ..scene_file import MAX_BYTES
@@ -136,15 +137,12 @@ def _yaml(path: Path) -> object:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise InputError(str(path), f"{path.stat().st_size} bytes", f"a file of at most {MAX_BYTES} bytes")
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(str(path), error.strerror, "a readable file") from None
     except UnicodeDecodeError:
         raise InputError(str(path), "bytes that aren't UTF-8", "a YAML file") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        raise InputError(where, getattr(error, "problem", None) or "text", "valid YAML") from None
+    return load_plain_yaml(text, str(path))
 
 
 def read_study(name: str, yes: bool = False) -> Study:
@@ -182,8 +180,15 @@ def make_study(spec, name: str = "study", folder: Path = Path(), yes: bool = Fal
     )
     _check_rows(study, f"{name}, samples", yes)
     _check_flyable(study, base)
-    content = json.dumps([spec, dict(base.values), script], sort_keys=True, default=str)
+    content = json.dumps(_with_text_keys([spec, dict(base.values), script]), sort_keys=True, default=str)
     return replace(study, fingerprint=hashlib.sha256(content.encode()).hexdigest())
+
+
+def _with_text_keys(value):
+    """The same for numbers and nothing as keys, which have no order among text."""
+    if isinstance(value, dict):
+        return {str(key): _with_text_keys(inner) for key, inner in value.items()}
+    return [_with_text_keys(inner) for inner in value] if isinstance(value, list) else value
 
 
 def _settings(spec, field: str) -> dict:
@@ -240,7 +245,7 @@ def _vary(spec, name: str, values, entries: list) -> tuple[Vary, ...]:
 
 def _check_value(target: Target, value, field: str, values, entries: list) -> None:
     """Put a value where it will stand, and see whether that is accepted there."""
-    changed, copied = dict(values), json.loads(json.dumps(entries))
+    changed, copied = dict(values), copy.deepcopy(entries)
     try:
         target.put(changed, copied, value)
         if target.entry:
