@@ -24,6 +24,7 @@ ALLOWED = {
     "numba": (f"{PACKAGE}.core.", f"{PACKAGE}.mesh_"),
     "yaml": (
         f"{PACKAGE}.scene_file",
+        f"{PACKAGE}.plain_yaml",
         f"{PACKAGE}.poke_script",
         f"{PACKAGE}.parameters",
         f"{PACKAGE}.session_bag",
