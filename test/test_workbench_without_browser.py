@@ -16,7 +16,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 
 from rigid_proto_ros.offline import read_scene  # noqa: E402
 from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
+from rigid_proto_ros.workbench import controls  # noqa: E402
 from rigid_proto_ros.workbench import page as page_module  # noqa: E402
+from rigid_proto_ros.workbench.controls import ParameterSetter  # noqa: E402
 from rigid_proto_ros.workbench.page import Page  # noqa: E402
 from rigid_proto_ros.workbench.ros_link import Heard  # noqa: E402
 from rigid_proto_ros.workbench.server import make_server, stop_server  # noqa: E402
@@ -103,10 +105,11 @@ class Desk:
             time.sleep(0.01)
         return found
 
-    def fly(self, seconds: float = 2.0) -> None:
-        """Let the page hear of so much of a flight."""
+    def fly(self, seconds: float = 2.0, begin_s: float = 0.0) -> None:
+        """Let the page hear of a flight up to there."""
         row = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6])
-        states = [(k * STEP_NS, row) for k in range(round(seconds * 1e9 / STEP_NS) + 1)]
+        first, last = (round(t * 1e9 / STEP_NS) for t in (begin_s, seconds))
+        states = [(k * STEP_NS, row) for k in range(first, last + 1)]
         self.until(lambda: self.page.scenario is not None, "scene")
         self.do(lambda: self.link.say(states))
         self.until(lambda: self.page.history.span[1] == states[-1][0], "flight")
@@ -215,3 +218,48 @@ def test_times_the_mass_is_that_of_the_body_without_its_ballast(desk: Desk, mode
         assert desk.page.scenario.values[mass] == pytest.approx(10.0 * own, rel=1e-12)
         desk.do(lambda: desk.page._controls.update(desk.page.scenario.values, at_once=True))
         assert desk.input("Mass ×").value == 1.0
+
+
+def test_lines_that_are_no_events_are_passed_over_and_said_once(desk: Desk) -> None:
+    garbage = ["", "{", "[]", '{"time_ns": -1, "kind": "poke", "content": {}}', '{"kind": 5}', "[" * 100_000]
+    without_content = [f'{{"time_ns": 0, "kind": "{kind}", "content": {{}}}}' for kind in ("poke", "string_target")]
+    odd = '{"time_ns": 0, "kind": "poke", "content": {"frame_id": 5, "force": "x", "torque": {}}}'
+    with bare_page(desk.server.get_port()):
+        desk.fly(1.0)
+        desk.do(lambda: desk.link.say(events=[*garbage, *without_content, odd]))
+        desk.do(lambda: desk.link.say(events=garbage))
+        desk.fly(3.0, begin_s=1.1)  # it still listens
+        assert not desk.running.done()
+        assert len([text for text in desk.said if "/rigid_body/events" in text]) == 1
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_parameter_call_that_nobody_answers_is_given_up_and_the_next_one_made(late: bool, monkeypatch) -> None:
+    """As when a node dies in it and is started again: what was set meanwhile goes to the new one."""
+    monkeypatch.setattr(controls, "ANSWER_S", 0.0)
+    sent: list[tuple[dict, Callable]] = []
+    refused: list[str] = []
+    setter = ParameterSetter(lambda changes, done: sent.append((changes, done)), refused.append)
+
+    async def node_dies() -> None:
+        setter.set({"mass": 1.0})
+        monkeypatch.setattr(controls, "ANSWER_S", 1e6)
+        setter.set({"mass": 2.0, "step": 0.01})
+        while len(sent) < 2:
+            await asyncio.sleep(0.01)
+        if late:
+            sent[0][1](False, "late")  # the answer to the call that was given up says nothing about this one
+        setter.set({"mass": 3.0})
+        assert len(sent) == 2
+        sent[1][1](True, "")
+        setter.set({"mass": 4.0})
+        sent[2][1](True, "")
+
+    asyncio.run(asyncio.wait_for(node_dies(), PATIENCE_S))
+    assert [changes for changes, _ in sent] == [
+        {"mass": 1.0},
+        {"mass": 2.0, "step": 0.01},
+        {"mass": 3.0},
+        {"mass": 4.0},
+    ]
+    assert len(refused) == 1 and "no answer of the node" in refused[0]

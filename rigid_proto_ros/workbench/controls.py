@@ -23,17 +23,21 @@ TOUCHED_S = 1.0
 """[s] An input isn't written to this soon after its user touched it: it would jump back under the finger."""
 
 
+ANSWER_S = 10.0
+"""[s] After which a call is given up: its node has died, or another one has its name. Reading a big mesh takes a few."""
+
+
 class ParameterSetter:
     """Sends changes to the node, one call at a time; what comes in meanwhile goes with the next, the newest value winning.
 
-    send(changes, done) as RosLink.set_parameters; on_refusal(reason).
+    send(changes, done) as RosLink.set_parameters; on_refusal(reason). For an event loop's thread.
     """
 
     def __init__(self, send: Callable, on_refusal: Callable[[str], None]) -> None:
         self._send = send
         self._on_refusal = on_refusal
         self._waiting: dict[str, object] = {}
-        self._calling = False
+        self._call: asyncio.TimerHandle | None = None
 
     def set(self, changes: Mapping[str, object]) -> None:
         """Set parameters soon."""
@@ -41,14 +45,20 @@ class ParameterSetter:
         self._go_on()
 
     def _go_on(self) -> None:
-        if self._calling or not self._waiting:
+        if self._call is not None or not self._waiting:
             return
         changes, self._waiting = self._waiting, {}
-        self._calling = True
-        self._send(changes, self._done)
+        call = self._call = asyncio.get_running_loop().call_later(ANSWER_S, self._give_up)
+        self._send(changes, lambda successful, reason: self._done(call, successful, reason))
 
-    def _done(self, successful: bool, reason: str) -> None:
-        self._calling = False
+    def _give_up(self) -> None:
+        self._done(self._call, False, f"no answer of the node within {ANSWER_S:g} s")
+
+    def _done(self, call: asyncio.TimerHandle | None, successful: bool, reason: str) -> None:
+        if call is None or call is not self._call:
+            return  # given up before
+        call.cancel()
+        self._call = None
         if not successful:
             self._on_refusal(reason)
         self._go_on()

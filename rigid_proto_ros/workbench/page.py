@@ -11,7 +11,6 @@ import asyncio
 import json
 import time
 from collections.abc import Awaitable
-from pathlib import Path
 
 import numpy as np
 import viser
@@ -64,7 +63,7 @@ class Page:
         self.usual_force = 1.0
         self.follow = True
         self.paused = False
-        self.history = History(target.strip("/"), self._attachments)
+        self.history = self._new_history(target)
         self.looking_at: int | None = None
         self.looking_from: int | None = None
         self._paused_before_looking = False
@@ -91,6 +90,7 @@ class Page:
         self._known = asyncio.Event()
         self._another_body = True
         self._doing = ""
+        self._odd_line_said = False
         self._heard_s = self._slow_due_s = 0.0
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
@@ -142,7 +142,7 @@ class Page:
             self.link.stop_listening()
             # What happens from now on isn't heard: the memory of the flight ends here.
             self.state = None
-            self.history = History(self.link.target.strip("/"), self._attachments)
+            self.history = self._new_history(self.link.target)
             self.sightings.forget()
             self._readouts.restart()
             self._scenes.forget()
@@ -245,12 +245,8 @@ class Page:
 
     # What the node says
 
-    def _attachments(self) -> list[tuple[str, bytes]]:
-        upload = self._upload.present
-        try:
-            return [] if upload is None else [(upload.name, Path(upload.path).read_bytes())]
-        except OSError:
-            return []  # another one has taken its place
+    def _new_history(self, target: str) -> History:
+        return History(target.strip("/"), lambda: self._upload.attachments())
 
     def _on_scene(self, text: str) -> None:
         self.history.scene(text)
@@ -290,13 +286,12 @@ class Page:
     def tick(self, now_s: float) -> None:
         """Take what the node has said and draw it."""
         heard = self.link.take()
-        for line in heard.events:
-            self.history.event(line)
+        events = [event for line in heard.events if (event := self._event(line)) is not None]
         for time_ns, row in heard.states:
             self.history.state(time_ns, row[:7], row[7:])
         if self.scenario is not None:
-            for line in heard.events:
-                self._hear(json.loads(line))
+            for event in events:
+                self._hear(event)
             if heard.states:
                 self._heard_s = now_s
                 time_ns, row = heard.states[-1]
@@ -311,6 +306,20 @@ class Page:
         if now_s >= self._slow_due_s:
             self._slow_due_s = now_s + 1.0
             self._every_second(now_s)
+
+    def _event(self, line: str) -> dict | None:
+        """A line of ``~/events``, kept; None for one that is none, which anybody may publish."""
+        try:
+            self.history.event(line)
+            return json.loads(line)
+        except InputError as error:
+            self._odd_line(error)
+            return None
+
+    def _odd_line(self, error: Exception) -> None:
+        if not self._odd_line_said:
+            self._odd_line_said = True
+            self.say(f"Lines of {self.link.target}/events are passed over, the first: {error}")
 
     def _hear(self, event: dict) -> None:
         kind = event["kind"]
@@ -327,8 +336,11 @@ class Page:
         elif kind == "string_attach":
             self.pointer.knot_moved()
         if self.state is not None:
-            self.acting.event(event, self.scenario, self.state)
-            self.shadow.event(event, self.scenario)
+            try:
+                self.acting.event(event, self.scenario, self.state)
+                self.shadow.event(event, self.scenario)
+            except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+                self._odd_line(InputError("event", str(event)[:80], f"the content of its kind ({error!r})"))
 
     def _draw(self, now_s: float) -> None:
         state, setup, view = self._shown_state(), self.scenario.setup, self.view

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import viser
@@ -64,6 +65,14 @@ class UploadButton:
         elif self._flown and mesh != self._flown:
             self.uploads.fly(None)
             self._flown = ""
+
+    def attachments(self) -> list[tuple[str, bytes]]:
+        """Name and content of the present file, for a recording of its flight."""
+        present = self.present
+        try:
+            return [] if present is None else [(present.name, Path(present.path).read_bytes())]
+        except OSError:
+            return []  # another one has taken its place
 
     async def _take(self, name: str, content: bytes) -> None:
         await self._page.known()
