@@ -270,6 +270,16 @@ def test_a_mesh_of_any_name_reaches_the_node_that_up_starts(name, tmp_path, monk
     assert given_arguments(argv, "rigid_body", pytest.fail)["mesh"] == name
 
 
+def test_a_density_on_the_nodes_command_line_wins_over_the_scenes_mass(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("rigid_body:\n  ros__parameters: {mass: 2.0, density: 1000.0}\n")
+    argv = ["--ros-args", "--params-file", str(scene)]
+    assert given_arguments(argv, "rigid_body", pytest.fail) == {"mass": 2.0, "density": 1000.0}
+    argv += ["-p", "density:=5000.0"]
+    assert given_arguments(argv, "rigid_body", pytest.fail) == {"mass": 0.0, "density": 5000.0}
+    assert given_arguments([*argv, "-p", "mass:=3.0"], "rigid_body", pytest.fail)["mass"] == 3.0
+
+
 @pytest.mark.parametrize(
     "arguments", [["nowhere.yaml"], ["poke"], ["poke", "--at", "point/1,2"], ["--lead", "x", "poke"]]
 )

@@ -32,7 +32,9 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
                     continue
                 given[name] = value
         else:
-            given.update(_assignment(text, node_name))
+            assigned = _assignment(text, node_name)
+            # As in flight: a density that is set wins over a mass that was there.
+            given.update({"mass": 0.0, **assigned} if "density" in assigned else assigned)
     return given
 
 
