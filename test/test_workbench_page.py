@@ -395,7 +395,7 @@ WITH_A_PAGE = {"pose": 2, "twist": 1, "events": 2, "scene": 2}
 def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_environment, tmp_path) -> None:
     from rigid_proto_ros.rerun_view.ports import any_free_port
 
-    def workbench(node: str, log: str) -> RosProcess:
+    def workbench(node: str, log: str, port: int) -> RosProcess:
         arguments = ("workbench", "--node", node, "--port", port, "--no-browser")
         return RosProcess("rigid_proto", *arguments, environment=environment, log=tmp_path / log)
 
@@ -404,8 +404,8 @@ def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_en
         remapped = ("--ros-args", "-r", "__node:=brick", "-r", "__ns:=/lab", "-p", "mesh:=book")
         with running_node(*remapped, environment=environment, log=tmp_path / "node"):
             ear = Ear(environment, "/lab/brick")
-            missing = workbench("/lab/brik", "missing")
-            second = workbench("lab/brick", "second")
+            missing = workbench("/lab/brik", "missing", any_free_port())
+            second = workbench("lab/brick", "second", port)
             second.wait_for("The workbench is at")
             with bare_page(port) as page:
                 ear.until(lambda: listeners(ear)["twist"] == 1, "a page that listens to the node")
