@@ -409,8 +409,13 @@ def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_en
             second.wait_for("The workbench is at")
             with bare_page(port) as page:
                 ear.until(lambda: listeners(ear)["twist"] == 1, "a page that listens to the node")
-                page.send(drag_message("start", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
-                ear.event("string_target")
+
+                def pulled() -> bool:
+                    # A server that has drawn nothing yet lets nothing be grabbed.
+                    page.send(drag_message("start", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
+                    return any(event["kind"] == "string_target" for event in ear.events())
+
+                ear.until(pulled, "a string")
             ear.event("string_release")
             commands = [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in descendants(second.process.pid)]
             assert len(commands) == 1 and b"workbench.main" in commands[0]
