@@ -90,8 +90,9 @@ def _node_arguments(scene: str, mesh: str | None) -> tuple[list[str], int | None
     starts."""
     from ..offline import read_scene, scene_file
     from ..parameters import PARAMETERS
+    from .processes import text_parameter
 
     values = read_scene(scene, {"mesh": mesh} if mesh else {}).values
-    arguments = ["--ros-args", "--params-file", str(scene_file(scene)), *(["-p", f"mesh:={mesh}"] if mesh else [])]
+    arguments = ["--ros-args", "--params-file", str(scene_file(scene)), *(text_parameter("mesh", mesh) if mesh else [])]
     port = values["workbench_port"]
     return arguments, None if port == PARAMETERS["workbench_port"].default else port
