@@ -117,7 +117,9 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
         states = flight.rows(1000)
         for k in range(40_000):
             observer.state(k * 1_000_000, states[k % 1000])
-        observer._flusher.flush_now()
+            if k % 2000 == 1999:
+                # Or viewers would be spared most of it, and nothing would have to be dropped.
+                observer._flusher.flush_now()
         watcher = viewers.ViewerProcess("--connect", observer.live_address, "--save", str(saved))
         _wait_for(lambda: e.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
         seen = _entities(saved)
