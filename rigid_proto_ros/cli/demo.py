@@ -30,6 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Fly, and say what happened."""
     from ..bundled import example_path, scene_path
     from ..offline import read_scene
+    from ..poke_script import read_script
     from .processes import Processes, own_executable, text_parameter
 
     if not 3.0 <= args.duration <= 3600.0:
@@ -56,8 +57,9 @@ def run(args: argparse.Namespace) -> int:
         if status != 0:
             print(f"rigid_proto demo: poke_client ended with status {status}", file=sys.stderr)
             return 1
-        print(f"3. flying for {args.duration:g} s, recorded by Rerun", flush=True)
-        _show_flight(args.duration, node)
+        # It has waited until the last command acted.
+        print(f"3. flying on to {args.duration:g} s, recorded by Rerun", flush=True)
+        _show_flight(args.duration - read_script(script)[-1].t_ns * 1e-9, node)
         node_status = processes.end(node)
     if node_status != 0:
         print(f"rigid_proto demo: rigid_body_node ended with status {node_status}", file=sys.stderr)
