@@ -429,6 +429,7 @@ def test_a_page_of_its_own_shows_a_node_of_another_name_that_runs_already(ros_en
             ear.close()
 
 
+@pytest.mark.stress
 def test_wheel_and_pinch_bring_the_view_nearer_and_a_click_still_pokes_where_it_points(page, ear) -> None:
     x, y = page.middle[0] + 30.0, page.middle[1]
     setup = teapot()
