@@ -22,7 +22,13 @@ def add_parser(subparsers) -> None:
     parser = subparsers.add_parser("demo", help="node, scripted pokes and recording in one go, ending by itself")
     parser.add_argument("--mesh", metavar="PATH", help="fly this mesh instead of the bundled T-handle")
     parser.add_argument("--out", type=Path, default=OUT, metavar="FOLDER", help="for the session (default out)")
-    parser.add_argument("--duration", type=float, default=FLIGHT_S, metavar="S", help="simulated seconds (default 10)")
+    parser.add_argument(
+        "--duration",
+        type=float,
+        default=FLIGHT_S,
+        metavar="S",
+        help="simulated seconds, or until the last poke (default 10)",
+    )
     parser.set_defaults(run=run)
 
 
@@ -58,8 +64,9 @@ def run(args: argparse.Namespace) -> int:
             print(f"rigid_proto demo: poke_client ended with status {status}", file=sys.stderr)
             return 1
         # It has waited until the last command acted.
-        print(f"3. flying on to {args.duration:g} s, recorded by Rerun", flush=True)
-        _show_flight(args.duration - read_script(script)[-1].t_ns * 1e-9, node)
+        last_s = read_script(script)[-1].t_ns * 1e-9
+        print(f"3. flying on to {max(args.duration, last_s):g} s, recorded by Rerun", flush=True)
+        _show_flight(args.duration - last_s, node)
         node_status = processes.end(node)
     if node_status != 0:
         print(f"rigid_proto demo: rigid_body_node ended with status {node_status}", file=sys.stderr)

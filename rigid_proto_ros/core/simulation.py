@@ -124,8 +124,7 @@ class Simulation(Readings):
     def check_change(self, new: Setup) -> None:
         """Raises CommandRefused (``integrator``) when the new setup's integrator can't carry what acts, or will."""
         # A string that is to be tied at time 0 will be, at the next reset, though it was let go since.
-        kept = new.string.attached == self.setup.string.attached and self.string is not None
-        tied = kept or new.string.attached
+        tied = new.string.attached or (self.string is not None and not self.setup.string.attached)
         check_carried(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
 
     def reset(self, setup: Setup | None = None) -> None:

@@ -102,7 +102,8 @@ class ScriptSender(Node):
         else:
             start_ns = self._now_ns() + nanoseconds(lead_s)
         sent = dict.fromkeys(self._topics, 0)
-        horizon_ns = nanoseconds(float(self.parameter("schedule_horizon") or PARAMETERS["schedule_horizon"].default))
+        horizon_s = self.parameter("schedule_horizon")
+        horizon_ns = nanoseconds(PARAMETERS["schedule_horizon"].default if horizon_s is None else float(horizon_s))
         paused = reset
         for number, command in enumerate(script):
             stamp_ns = start_ns + command.t_ns
