@@ -22,7 +22,7 @@ from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
 from .history import History
-from .panel import Panel, show_tab
+from .panel import Panel
 from .pointer import Pointer, Tools, suggested_force
 from .readout_panel import ReadoutPanel
 from .rewind import Rewind, core_row
@@ -31,6 +31,7 @@ from .scene_loader import SceneLoader
 from .scene_view import SceneView
 from .session_tab import SessionTab
 from .shadow import Shadow
+from .show_tab import ShowTab
 from .sighting import DrawnPose, Sightings
 from .situation import Situation, bring_about
 from .upload_button import UploadButton
@@ -83,7 +84,7 @@ class Page:
         self._panel = Panel(self, self._controls, tabs)
         self.body_tab = BodyTab(self, self._controls, tabs)
         self._session = SessionTab(self, tabs, self._panel.play_tab)
-        show_tab(self, tabs)
+        self.show_tab = ShowTab(self, tabs)
         self._upload = UploadButton(self)
         self._session.show_lesson_named(lesson)
         self._open = asyncio.Event()
@@ -144,6 +145,7 @@ class Page:
             self.state = None
             self.history = self._new_history(self.link.target)
             self.sightings.forget()
+            self.view.trails.forget()
             self._readouts.restart()
             self._scenes.forget()
             self._known.clear()  # somebody may change it meanwhile, and a link sets what differs from it
@@ -289,6 +291,7 @@ class Page:
         events = [event for line in heard.events if (event := self._event(line)) is not None]
         for time_ns, row in heard.states:
             self.history.state(time_ns, row[:7], row[7:])
+            self.view.trails.add(time_ns, row)
         if self.scenario is not None:
             for event in events:
                 self._hear(event)
@@ -328,6 +331,7 @@ class Page:
             self.acting.begin(setup, State(0, setup.initial))
             self.shadow.begin(self.scenario, State(0, setup.initial))
             self._readouts.restart()
+            self.view.trails.forget()
             if self.looking_at is None:
                 self.view.origin = np.zeros(3)
         elif kind == "pause":
@@ -352,6 +356,7 @@ class Page:
         with self.server.atomic():
             view.place(state.row)
             view.place_grid()
+            view.draw_trails(now_s, state.time_ns, self.scenario)
             view.show_string(None if looking else self.acting.string_ends(setup, state))
             view.show_loads([] if looking else self.acting.arrows(setup, state, size))
             view.show_hit(None if looking else self.acting.hit(setup, state))

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from ..core.integrators import INTEGRATORS
 from .controls import Controls, read_numbers
 from .pointer import POKE, PUSH
-from .scene_view import SWITCHES
 
 if TYPE_CHECKING:
     from .page import Page
@@ -27,7 +26,7 @@ Drag beside it: turn the view; right button: move it; wheel or two fingers: clos
 
 
 class Panel:
-    """Play, physics and show: the tabs that need nothing but parameters, services and the pointer's tools."""
+    """Play and physics: the tabs that need nothing but parameters, services and the pointer's tools."""
 
     def __init__(self, page: Page, controls: Controls, tabs) -> None:
         self._page = page
@@ -163,28 +162,3 @@ class Panel:
 
 
 _TENS = ((-2.0, "×0.01"), (-1.0, "×0.1"), (0.0, "×1"), (1.0, "×10"), (2.0, "×100"))
-
-
-def show_tab(page: Page, tabs) -> None:
-    """Switches of what is drawn."""
-    gui = page.server.gui
-    with tabs.add_tab("Show"):
-        for name, shown in SWITCHES.items():
-            switch = gui.add_checkbox(name, shown)
-
-            @switch.on_update
-            async def _(event, name=name, switch=switch) -> None:
-                page.view.switch(name, switch.value)
-
-        follow = gui.add_checkbox(
-            "Keep the body in view", True, hint="The picture follows; the grid shows the way made"
-        )
-        centre = gui.add_button("Centre on the body")
-
-        @follow.on_update
-        async def _(event) -> None:
-            page.follow = follow.value
-
-        @centre.on_click
-        async def _(event) -> None:
-            page.centre()

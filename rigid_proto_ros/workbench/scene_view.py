@@ -14,6 +14,16 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..appearance import (
+    AXES_COLOURS,
+    BODY_COLOUR,
+    FORCE_COLOUR,
+    GHOST_COLOUR,
+    HAND_COLOUR,
+    MOMENTUM_COLOUR,
+    OMEGA_COLOUR,
+    STRING_COLOUR,
+)
 from ..core.inertia_tensor import equimomental_shapes
 from ..core.rotation import quaternion_from_matrix
 from ..core.surface import Surface
@@ -21,12 +31,9 @@ from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
 from .acting import Hit
 from .poke_mark import PokeMark
+from .trails import COM_TRAIL, POINT_TRAIL, Trails
 
-BODY_COLOUR, GHOST_COLOUR = (214, 205, 190), (120, 180, 255)
-STRING_COLOUR, HAND_COLOUR = (250, 180, 60), (250, 130, 40)
-LOAD_COLOUR, MOMENTUM_COLOUR, OMEGA_COLOUR = (205, 25, 25), (190, 120, 245), (60, 190, 190)
 BOUNDS_COLOUR = (90, 90, 90)
-AXES_COLOURS = np.array([(235, 85, 85), (90, 200, 110), (85, 150, 250)])
 
 SWITCHES = {
     "See through the body": False,
@@ -42,6 +49,8 @@ SWITCHES = {
     "Angular momentum L": True,
     "Angular velocity ω": False,
     "Ghost": True,
+    COM_TRAIL: False,
+    POINT_TRAIL: False,
     "Grid": True,
 }
 """What can be shown beside the body, and whether it is at first."""
@@ -101,10 +110,11 @@ class SceneView:
         self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
         thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
         thick: dict[str, Any] = {"shaft_radius": 0.013, "head_radius": 0.034, "head_length": 0.09, "visible": False}
-        self._loads = scene.add_arrows("/forces", none, LOAD_COLOUR, **thick)
-        self._poke = PokeMark(scene, LOAD_COLOUR)
+        self._loads = scene.add_arrows("/forces", none, FORCE_COLOUR, **thick)
+        self._poke = PokeMark(scene, FORCE_COLOUR)
         self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
         self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
+        self.trails = Trails(scene)
 
     @property
     def hand(self):
@@ -121,6 +131,8 @@ class SceneView:
         self._shown[name] = shown
         if name == "See through the body":
             self._body_opacity()
+        if name in (COM_TRAIL, POINT_TRAIL):
+            self.trails.switch(name, shown)
         for handle in self._handles[name]:
             handle.visible = shown
 
@@ -191,7 +203,13 @@ class SceneView:
         made = {
             "COM": scene.add_icosphere("/body/com", COM_SIZE * size, (30, 30, 30)),
             "Principal axes": scene.add_arrows(
-                "/body/axes", axes, AXES_COLOURS, wxyz=turned, shaft_radius=0.008, head_radius=0.022, head_length=0.06
+                "/body/axes",
+                axes,
+                np.array(AXES_COLOURS),
+                wxyz=turned,
+                shaft_radius=0.008,
+                head_radius=0.022,
+                head_length=0.06,
             ),
             "Inertia ellipsoid": scene.add_icosphere(
                 "/body/ellipsoid",
@@ -228,6 +246,11 @@ class SceneView:
         shift = -(self.origin / self.unit)
         self._world_axes.position = shift
         self._grid.position = (shift[0] % section, shift[1] % section, shift[2] - 1.2 if abs(shift[2]) < 3.0 else -1.2)
+
+    def draw_trails(self, now_s: float, until_ns: int, scenario: Scenario) -> None:
+        """The paths of COM and point up to a moment of the flight."""
+        setup = scenario.setup
+        self.trails.draw(now_s, until_ns, setup.body, setup.surface, self.origin, self.unit)
 
     def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None) -> None:
         """From the knot to the hand, both in the world; None for no string."""

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: MIT
+"""A stand-in for viser's scene: its ``add_*`` methods make plain objects that hold what they were given."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+
+class SceneStandIn:
+    """nodes: what was added, by name."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[str, SimpleNamespace] = {}
+
+    def __getattr__(self, method: str):
+        if not method.startswith("add_"):
+            raise AttributeError(method)
+
+        def add(name: str, *arguments, **properties) -> SimpleNamespace:
+            properties = {"visible": True, "position": (0.0, 0.0, 0.0), **properties}
+            self.nodes[name] = SimpleNamespace(kind=method, arguments=arguments, **properties)
+            return self.nodes[name]
+
+        return add
