@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from rigid_proto_ros.core.errors import InputError
+from .core.errors import InputError
 
 PACKAGE = "rigid_proto_ros"
 

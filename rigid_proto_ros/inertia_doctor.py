@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.inertia_tensor import check_tensor, six_from_tensor
-from rigid_proto_ros.core.mass_properties import MassProperties
-from rigid_proto_ros.core.mesh_topology_hull import convex_hull
-from rigid_proto_ros.core.moments import referenced_vertices, solid_moments
-from rigid_proto_ros.inertia_robot import LinkInertial, MeshUse, read_robot
-from rigid_proto_ros.mesh_body import MeshBody, mesh_body
-from rigid_proto_ros.mesh_io import load_mesh
+from .core.errors import InputError
+from .core.inertia_tensor import check_tensor, six_from_tensor
+from .core.mass_properties import MassProperties
+from .core.mesh_topology_hull import convex_hull
+from .core.moments import referenced_vertices, solid_moments
+from .inertia_robot import LinkInertial, MeshUse, read_robot
+from .mesh_body import MeshBody, mesh_body
+from .mesh_io import load_mesh
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
+from .core.errors import InputError
 
 MAX_BYTES = 50_000_000
 

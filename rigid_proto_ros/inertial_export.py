@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.inertia_tensor import principal_axes, six_from_tensor
-from rigid_proto_ros.core.mass_properties import MassProperties
+from .core.errors import InputError
+from .core.inertia_tensor import principal_axes, six_from_tensor
+from .core.mass_properties import MassProperties
 
 FRAMES = ("mesh", "com")
 _FLAT = 1e-9  # A + B - C below this part of C: rounding in a reader's own eigenvalues may break its A + B >= C

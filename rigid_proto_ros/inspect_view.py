@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.inertia_tensor import equimomental_shapes, principal_axes
-from rigid_proto_ros.inertial_export import quaternion_wxyz
-from rigid_proto_ros.mesh_inspection import Inspection
-from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
+from .core.errors import InputError
+from .core.inertia_tensor import equimomental_shapes, principal_axes
+from .inertial_export import quaternion_wxyz
+from .mesh_inspection import Inspection
+from .rerun_view.surface_normals import shaded_surface
 
 MESH_COLOR = (150, 170, 190, 230)
 AXIS_COLORS = ((220, 70, 60), (70, 170, 80), (70, 110, 220))

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_proto_ros import mesh_cache
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.mass_properties import MeshMoments
-from rigid_proto_ros.core.mesh_topology_hull import box_surface, convex_hull
-from rigid_proto_ros.core.mesh_topology_repair import repair_surface
-from rigid_proto_ros.core.mesh_topology_verdict import WARNING, Finding, Verdict, judge_surface
-from rigid_proto_ros.core.moments import Moments, referenced_vertices
-from rigid_proto_ros.mesh_io import Mesh, load_mesh
+from . import mesh_cache
+from .core.errors import InputError
+from .core.mass_properties import MeshMoments
+from .core.mesh_topology_hull import box_surface, convex_hull
+from .core.mesh_topology_repair import repair_surface
+from .core.mesh_topology_verdict import WARNING, Finding, Verdict, judge_surface
+from .core.moments import Moments, referenced_vertices
+from .mesh_io import Mesh, load_mesh
 
 FALLBACKS = ("", "hull", "box")
 """What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.exact_moments import exact_solid_moments, relative_errors
-from rigid_proto_ros.core.inertia_tensor import degenerate_pairs, equimomental_shapes, principal_axes
-from rigid_proto_ros.core.mass_properties import INERTIA_MODELS, MassProperties, scale_vector
-from rigid_proto_ros.core.mesh_topology_verdict import WARNING, Finding, unit_suspicion
-from rigid_proto_ros.core.moments import referenced_vertices
-from rigid_proto_ros.mesh_body import MeshBody
+from .core.errors import InputError
+from .core.exact_moments import exact_solid_moments, relative_errors
+from .core.inertia_tensor import degenerate_pairs, equimomental_shapes, principal_axes
+from .core.mass_properties import INERTIA_MODELS, MassProperties, scale_vector
+from .core.mesh_topology_verdict import WARNING, Finding, unit_suspicion
+from .core.moments import referenced_vertices
+from .mesh_body import MeshBody
 
 MODELS = tuple(model for model in INERTIA_MODELS if model != "explicit")
 JSON_KEYS = (

@@ -11,14 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_proto_ros import mesh_cache
-from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.mesh_obj import read_obj
-from rigid_proto_ros.mesh_off import read_off
-from rigid_proto_ros.mesh_ply import read_ply
-from rigid_proto_ros.mesh_stl import is_ascii_stl, read_stl
-
+from . import mesh_cache
 from .core.compilation import njit
+from .core.errors import MeshError
+from .mesh_obj import read_obj
+from .mesh_off import read_off
+from .mesh_ply import read_ply
+from .mesh_stl import is_ascii_stl, read_stl
 
 BODIES = Path(__file__).parent / "bodies"
 """Folder of the bundled meshes."""

@@ -12,10 +12,9 @@ import codecs
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.mesh_text import EXACT, NEEDS_FLOAT, float_of, is_blank, line_of, read_number, token_end
-
 from .core.compilation import njit
+from .core.errors import MeshError
+from .mesh_text import EXACT, NEEDS_FLOAT, float_of, is_blank, line_of, read_number, token_end
 
 _OK, _BAD_VERTEX, _BAD_INDEX, _FEW_CORNERS = 0, 1, 2, 3
 

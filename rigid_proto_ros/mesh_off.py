@@ -7,10 +7,9 @@ import re
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.mesh_text import EXACT, NEEDS_FLOAT, excerpt, float_of, is_blank, line_of, read_number
-
 from .core.compilation import njit
+from .core.errors import MeshError
+from .mesh_text import EXACT, NEEDS_FLOAT, excerpt, float_of, is_blank, line_of, read_number
 
 _OK, _ENDED, _BAD_VERTEX, _BAD_FACE = 0, 1, 2, 3
 

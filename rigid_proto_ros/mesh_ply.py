@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.mesh_text import excerpt, line_of, read_numbers
-
 from .core.compilation import njit
+from .core.errors import MeshError
+from .mesh_text import excerpt, line_of, read_numbers
 
 _TYPES = dict(
     pair.split(":")

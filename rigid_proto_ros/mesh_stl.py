@@ -8,9 +8,9 @@ import struct
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.core.mesh_topology import first_equal_rows
-from rigid_proto_ros.mesh_text import excerpt, line_of, read_numbers
+from .core.errors import MeshError
+from .core.mesh_topology import first_equal_rows
+from .mesh_text import excerpt, line_of, read_numbers
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 

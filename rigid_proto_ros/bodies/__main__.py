@@ -4,8 +4,8 @@
 import argparse
 from pathlib import Path
 
-from rigid_proto_ros.bodies.catalogue import BODIES
-from rigid_proto_ros.bodies.surfaces import Surface
+from .catalogue import BODIES
+from .surfaces import Surface
 
 
 def obj_text(name: str, surface: Surface) -> str:

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rigid_proto_ros.bodies.surfaces import (
+from .surfaces import (
     Surface,
     difference,
     extrude,

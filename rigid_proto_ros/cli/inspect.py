@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigid_proto_ros.cli.progress import Progress
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.inertia_tensor import principal_axes, six_from_tensor
-from rigid_proto_ros.core.mass_properties import MassProperties, scale_vector
-from rigid_proto_ros.inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
-from rigid_proto_ros.mesh_body import FALLBACKS, mesh_body
-from rigid_proto_ros.mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
-from rigid_proto_ros.mesh_io import MAX_TRIANGLES, load_mesh, resolve_mesh
+from ..core.errors import InputError
+from ..core.inertia_tensor import principal_axes, six_from_tensor
+from ..core.mass_properties import MassProperties, scale_vector
+from ..inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
+from ..mesh_body import FALLBACKS, mesh_body
+from ..mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
+from ..mesh_io import MAX_TRIANGLES, load_mesh, resolve_mesh
+from .progress import Progress
 
 if TYPE_CHECKING:
-    from rigid_proto_ros.inertia_doctor import LinkDiagnosis
+    from ..inertia_doctor import LinkDiagnosis
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
@@ -168,7 +168,7 @@ def run(args: argparse.Namespace) -> int:
         raise inspection.refusal
     status = _verify(inspection, report, args.json) if args.verify else 0
     if args.record:
-        from rigid_proto_ros.inspect_view import record_inspection
+        from ..inspect_view import record_inspection
 
         record_inspection(args.record, inspection)
     if args.json:
@@ -229,7 +229,7 @@ def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
 
 def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:
     """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to 1e-3, otherwise 1."""
-    from rigid_proto_ros.inertia_doctor import compare_robot  # XML and all: only who compares pays for it
+    from ..inertia_doctor import compare_robot  # XML and all: only who compares pays for it
 
     for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
         if getattr(args, flag):

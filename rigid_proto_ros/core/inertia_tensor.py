@@ -7,9 +7,8 @@ import math
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import TensorError
-
 from .compilation import njit
+from .errors import TensorError
 
 TRIANGLE_SLACK_GIVEN = 1e-5
 """Given tensors may miss A + B ≥ C by this much of C: published ones are rounded to five or six digits."""

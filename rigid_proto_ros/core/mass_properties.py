@@ -9,18 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import InputError, MeshError, TensorError
-from rigid_proto_ros.core.inertia_tensor import (
+from .compilation import njit
+from .errors import InputError, MeshError, TensorError
+from .inertia_tensor import (
     MAX_MOMENT_RATIO,
     TRIANGLE_SLACK_COMPUTED,
     check_tensor,
     principal_axes_kernel,
     tensor_from_six,
 )
-from rigid_proto_ros.core.moments import Moments, box_moments, point_moments, solid_moments
-from rigid_proto_ros.core.moments_shell import shell_moments
-
-from .compilation import njit
+from .moments import Moments, box_moments, point_moments, solid_moments
+from .moments_shell import shell_moments
 
 INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
 """How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding

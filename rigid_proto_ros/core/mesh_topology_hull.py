@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import MeshError
+from .errors import MeshError
 
 FLAT = 1e-12
 """Distances below this part of the points' extent count as zero: such a point adds less volume than rounding does."""

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core.mesh_topology import Topology, component_volumes, mesh_topology
-from rigid_proto_ros.core.mesh_topology_nesting import component_nesting
-from rigid_proto_ros.core.mesh_topology_verdict import MAX_NESTED_COMPONENTS
-
 from .compilation import njit
+from .mesh_topology import Topology, component_volumes, mesh_topology
+from .mesh_topology_nesting import component_nesting
+from .mesh_topology_verdict import MAX_NESTED_COMPONENTS
 
 WELD = 1e-5
 """Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigid_proto_ros.core.mesh_topology import Topology, component_volumes, mesh_topology
-from rigid_proto_ros.core.mesh_topology_nesting import component_nesting
-
 from .compilation import njit
+from .mesh_topology import Topology, component_volumes, mesh_topology
+from .mesh_topology_nesting import component_nesting
 
 INFO, WARNING, ERROR = "info", "warning", "error"
 MAX_NESTED_COMPONENTS = 2000
@@ -290,8 +289,8 @@ def judge_surface(
 
 def _no_volume(vertices, triangles, diagonal: float) -> bool:
     """Whether the volume, taken in pair arithmetic, is below rounding of area × diagonal."""
-    from rigid_proto_ros.core.errors import MeshError
-    from rigid_proto_ros.core.moments import solid_moments
+    from .errors import MeshError
+    from .moments import solid_moments
 
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = 0.5 * float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.core.exact_arithmetic import pair_add, pair_divide, pair_multiply
-from rigid_proto_ros.core.moments_solid import blocked_sums, compensated_sums, joined_sums
-
 from .compilation import njit
+from .errors import MeshError
+from .exact_arithmetic import pair_add, pair_divide, pair_multiply
+from .moments_solid import blocked_sums, compensated_sums, joined_sums
 
 SMALL_MESH = 1024
 """Up to this many triangles the compensated sums cost well under a millisecond, so they are always taken."""

@@ -12,10 +12,9 @@ import math
 
 import numpy as np
 
-from rigid_proto_ros.core.exact_arithmetic import pair_add
-from rigid_proto_ros.core.moments import Moments, as_arrays, central_moments, exact_reference
-
 from .compilation import njit
+from .exact_arithmetic import pair_add
+from .moments import Moments, as_arrays, central_moments, exact_reference
 
 
 @njit(cache=True, nogil=True)

@@ -15,9 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core.exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
-
 from .compilation import njit
+from .exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
 
 BLOCK = 256
 """Triangles a block: its corners (18 KB) stay in the first-level cache, and its plain sum rounds at most 256 times."""
