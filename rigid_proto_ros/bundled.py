@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .core.errors import InputError
+from .nearest_name import one_of
 
 PACKAGE = "rigid_proto_ros"
 
@@ -52,7 +53,8 @@ def example_names() -> list[str]:
 
 def _named(field: str, name: str, files: dict[str, Path]) -> Path:
     if name not in files:
-        raise InputError(field, name, ", ".join(sorted(files)) or f"none: this installation of {PACKAGE} holds none")
+        known = one_of(name, sorted(files)) if files else f"none: this installation of {PACKAGE} holds none"
+        raise InputError(field, name, known)
     return files[name]
 
 

@@ -7,7 +7,6 @@ Lengths are drawn from the COM, so that a mesh far from its file's origin isn't 
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from .core.errors import InputError
 from .core.inertia_tensor import equimomental_shapes, principal_axes
 from .inertial_export import quaternion_wxyz
 from .mesh_inspection import Inspection
+from .output_file import output_file
 from .rerun_view.surface_normals import shaded_surface
 
 MESH_COLOR = (150, 170, 190, 230)
@@ -42,13 +42,13 @@ def model_errors(inspection: Inspection) -> dict[str, float]:
 
 def record_inspection(path: str, inspection: Inspection) -> None:
     """Write the picture to ``path`` (.rrd); raises InputError when rerun is missing or the file can't be written."""
+    if not path.lower().endswith(".rrd"):
+        raise InputError("--record", path, "a file that ends in .rrd")
     try:
         import rerun as rr
     except ImportError:
         raise InputError("--record", path, "the package rerun-sdk (pip install rerun-sdk)") from None
-    target = Path(path)
-    if target.suffix.lower() != ".rrd" or not target.absolute().parent.is_dir():
-        raise InputError("--record", path, "the path of an .rrd file in an existing folder")
+    target = output_file("--record", path)
     recording = rr.RecordingStream("rigid_proto_inspect")
     try:
         recording.save(str(target), default_blueprint=_blueprint(inspection))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import re
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from .mesh_obj import read_obj
 from .mesh_off import read_off
 from .mesh_ply import read_ply
 from .mesh_stl import is_ascii_stl, read_stl
+from .nearest_name import did_you_mean
 
 BODIES = Path(__file__).parent / "bodies"
 """Folder of the bundled meshes."""
@@ -113,10 +113,11 @@ def _found_mesh(name: str) -> Path:
         raise MeshError("mesh", name, "a mesh file; this is a folder")
     names = bundled_names()
     siblings = [p.name for p in path.parent.iterdir() if p.is_file()] if path.parent.is_dir() and "/" in name else []
-    near = difflib.get_close_matches(path.name, [*names, *siblings], n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    hint = did_you_mean(path.name, [*names, *siblings])
     raise MeshError(
-        "mesh", name, f"an existing file, package://<package>/<path>, or a bundled name ({', '.join(names)}){hint}"
+        "mesh",
+        name,
+        f"an existing file, package://<package>/<path>, or a bundled name ({', '.join(names)}){hint and '; ' + hint}",
     )
 
 

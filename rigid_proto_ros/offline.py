@@ -13,6 +13,7 @@ from .core.errors import CommandRefused, InputError
 from .core.observer import Observer
 from .core.simulation import Simulation
 from .ghost import ghost_of
+from .nearest_name import did_you_mean
 from .parameters import is_ros_parameter, parameter_named
 from .poke_script import ScriptCommand, core_command, with_contacts
 from .scenario import Scenario, make_scenario, publication_ns
@@ -25,7 +26,11 @@ def scene_file(name: str) -> Path:
     if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
         return scene_path(name.removesuffix(".yaml"))
     if not path.exists():
-        raise InputError("scene", name, f"a scene file, or one of the bundled {', '.join(scene_names())}")
+        hint = did_you_mean(Path(name).stem, scene_names())
+        known = f"the bundled scenes are {', '.join(scene_names())}"
+        raise InputError(
+            "scene", f"there is no file and no bundled scene {name!r}; {' '.join(filter(None, [hint, known]))}"
+        )
     return path
 
 
@@ -54,7 +59,7 @@ def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, o
             parameter_named(parameter)
         except InputError as error:
             if parameter not in scene.wildcard:
-                raise InputError(f"{path}, {parameter}", value, error.accepted) from None
+                raise InputError(f"{path}, {parameter}", error.received, error.accepted) from None
             warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
             continue
         values[parameter] = value

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from array import array
@@ -16,6 +15,7 @@ from .core.errors import CommandRefused, InputError
 from .core.frames import check_contact_name
 from .core.integrators import INTEGRATORS
 from .core.mass_properties import INERTIA_MODELS
+from .nearest_name import did_you_mean
 
 LIVE, AT_RESET, READ_ONLY = "live", "at the next reset", "read-only"
 
@@ -211,9 +211,8 @@ def parameter_named(name: str) -> Parameter:
             except CommandRefused as error:
                 raise InputError(name, own, error.accepted) from None
             return Parameter(**{**vars(pattern), "name": name})
-    near = difflib.get_close_matches(name, [*PARAMETERS, *PATTERNS], n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    raise InputError("parameter", name, f"a known parameter{hint}")
+    hint = did_you_mean(name, [*PARAMETERS, *PATTERNS])
+    raise InputError("parameter", f"there is no parameter {name!r}{hint and '; ' + hint}")
 
 
 ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides.")

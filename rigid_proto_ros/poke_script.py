@@ -18,6 +18,7 @@ from . import cdr
 from .core.commands import Change, ClearWrench, Command, MoveString, ReleaseString, TieString, WrenchCommand
 from .core.errors import CommandRefused, InputError
 from .core.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
+from .nearest_name import did_you_mean
 from .plain_yaml import load_plain_yaml
 from .scenario import nanoseconds
 from .scene_file import MAX_BYTES
@@ -314,7 +315,9 @@ def _checked_frame(frame: str, where: str) -> str:
 def _check_keys(entry: dict, known: set, where: str) -> None:
     unknown = [str(key) for key in entry if key not in known]
     if unknown:
-        raise InputError(where, ", ".join(unknown), f"the keys {', '.join(sorted(known))}")
+        hint = did_you_mean(unknown[0], known)
+        keys = f"the keys here are {', '.join(sorted(known))}"
+        raise InputError(where, f"there is no key {', '.join(unknown)}; {' '.join(filter(None, [hint, keys]))}")
 
 
 def _number(value, field: str, lower: float = -1e100, upper: float = 1e100) -> float:

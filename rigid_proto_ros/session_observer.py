@@ -25,6 +25,7 @@ from .core.loads import Load
 from .core.observer import BodySnapshot, Observer
 from .mailbox import Block, Mailbox, Mark
 from .mesh_io import resolve_mesh
+from .output_file import output_file
 from .scene_file import read_scene_text
 from .session_mesh import file_sha256, scene_sha256
 
@@ -75,7 +76,7 @@ class McapObserver(Observer):
         self._closed = False
         self._file: McapFile | None = None
         try:
-            self._file = McapFile(Path(path))
+            self._file = McapFile(output_file("record", path))
             self._file.add_metadata("rigid_proto_ros", _made_with())
             self._channels = {
                 name: self._file.add_channel(
@@ -87,7 +88,7 @@ class McapObserver(Observer):
                 for name, message_type in session_messages.TOPICS.items()
             }
         except OSError as error:
-            accepted = f"a file in an existing folder with space left ({error.strerror})"
+            accepted = f"a file that can be written ({error.strerror})"
             raise InputError("record", str(path), accepted) from None
         self._mailbox = Mailbox(lambda: self._stopped("the disk takes nothing any more"))
         self._thread = threading.Thread(target=self._write_until_closed, name="mcap", daemon=True)

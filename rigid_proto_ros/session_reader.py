@@ -8,6 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 from .core.errors import InputError
+from .output_file import output_file
 from .recorded_session import RecordedSession
 
 
@@ -36,6 +37,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
         raise InputError("--repair", str(repaired), f"a file that ends in {ending}, as the session's kind does")
     if repaired.exists() and path.exists() and repaired.samefile(path):
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
+    output_file("--repair", repaired)
     if not bag:
         from .rerun_view.rrd_file import repair as repair_rrd
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The bundled bodies are closed solids that other tests and every first flight may trust."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,24 @@ def test_body_is_one_solid_of_a_size_one_holds(name: str) -> None:
     assert parts(triangles) == (2 if name == "hollow_box" else 1)
     assert 250 <= len(triangles) <= 7000
     assert 0.05 <= np.ptp(vertices, axis=0).max() <= 0.7
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_body_has_the_size_that_its_description_states(name: str) -> None:
+    pytest.importorskip("manifold3d")
+    from rigid_proto_ros.bodies.catalogue import BODIES
+
+    stated = re.search(r"Size ([0-9.]+) x ([0-9.]+) x ([0-9.]+) m\.", BODIES[name].__doc__)
+    assert stated, name
+    assert np.ptp(read(body_path(name))[0], axis=0) == pytest.approx([float(x) for x in stated.groups()], abs=5.1e-4)
+
+
+def test_the_lesson_states_the_size_of_the_book() -> None:
+    page = Path(__file__).parent.parent / "docs" / "lessons" / "book.md"
+    if not page.is_file():
+        pytest.skip("not run from a source tree")
+    stated = re.search(r"([0-9.]+) cm wide, ([0-9.]+) cm high\s+and ([0-9.]+) cm thick", page.read_text("utf-8"))
+    assert 100.0 * np.ptp(read(body_path("book"))[0], axis=0) == pytest.approx([float(x) for x in stated.groups()])
 
 
 def test_hollow_box_weighs_the_walls_alone() -> None:

@@ -199,7 +199,7 @@ def test_an_inverted_mesh_is_turned_with_a_warning(tmp_path, capsys):
 def test_a_name_that_is_no_file_lists_the_bundled_ones(capsys):
     status, out, err = inspect(capsys, "tennis_raket")
     assert (status, out) == (2, "")
-    assert "did you mean 'tennis_racket'" in one_line(err)
+    assert "did you mean tennis_racket?" in one_line(err)
     assert "hammer" in err
 
 

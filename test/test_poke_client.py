@@ -197,7 +197,9 @@ def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, tmp_pat
     refused = client(rig, tmp_path / "refused.yaml", "--reset")
     rig.sent += 2
     assert refused.returncode == 1
-    assert "0 late, 2 refused" in refused.stdout
+    assert "0 late, 2 refused (1 frame, 1 ray_miss)" in refused.stdout
+    # The node's own sentences.
+    assert "nowhere" in refused.stdout and "5.0,5.0,5.0" in refused.stdout
 
 
 class SlowNode:

@@ -251,8 +251,9 @@ def test_recording_can_be_switched_on_and_off_in_flight(tmp_path, states):
     assert read_session(first).mesh_chunks == read_session(second).mesh_chunks == 1
 
 
-@pytest.mark.parametrize("name", ["nowhere/session.rrd", "session.mcap", "."])
+@pytest.mark.parametrize("name", ["taken/session.rrd", "session.mcap", "."])
 def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, name):
+    (tmp_path / "taken").touch()  # no folder can be made where a file is
     with pytest.raises(InputError, match="record"):
         RerunObserver(record=str(tmp_path / name))
 

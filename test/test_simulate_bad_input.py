@@ -14,7 +14,8 @@ from rigid_proto_ros.bundled import scene_path
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.core.errors import MeshError
 from rigid_proto_ros.mesh_io import resolve_mesh
-from rigid_proto_ros.ros.arguments import given_arguments
+from rigid_proto_ros.parameters import PARAMETERS
+from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
 from rigid_proto_ros.ros.main import main as rigid_body_node
 from rigid_proto_ros.ros.poke_client import main as poke_client
 
@@ -47,7 +48,12 @@ SCENES = {
     "short_gravity": (scene_text("gravity: [0.0, 0.0]"), "gravity", "0.0, 0.0", "3 finite numbers"),
     "long_scale": (scene_text("scale: [1.0, 1.0]"), "scale", "1.0, 1.0", "1 or 3"),
     "zero_scale": (scene_text("scale: [1.0, 0.0, 1.0]"), "scale", "0.0", "1e-9 <= |s|"),
-    "unknown": (scene_text("gravitation: [0.0, 0.0, 1.0]"), "gravitation", "0.0, 0.0, 1.0", "did you mean gravity?"),
+    "unknown": (
+        scene_text("gravitation: [0.0, 0.0, 1.0]"),
+        "gravitation",
+        "there is no parameter",
+        "did you mean gravity?",
+    ),
     "model": (scene_text("inertia_model: wire"), "inertia_model", "wire", "solid"),
     "integrator": (scene_text("integrator: rk5"), "integrator", "rk5", "rk4"),
     "text_for_bool": (scene_text("gyroscopic: perhaps"), "gyroscopic", "perhaps", "true or false"),
@@ -168,7 +174,7 @@ def test_a_scene_that_makes_no_sense_is_refused(name, tmp_path, capfd):
     scene = tmp_path / "scene.yaml"
     scene.write_text(text)
     line = one_line(capfd, rigid_proto, ["simulate", str(scene)])
-    assert "accepted" in line
+    assert "accepted: " in line or "did you mean" in line
     for part in parts:
         assert part in line
 
@@ -197,6 +203,12 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
         (["simulate", "t_handle", "--script", "nowhere.yaml"], "nowhere.yaml"),
         (["simulate"], "SCENE"),
         (["fly"], "simulate"),
+        (["inspct", "book"], "did you mean inspect?"),
+        (["simulate", "t_handel"], "did you mean t_handle?"),
+        (["simulate", "config/t_handel.yaml"], "did you mean t_handle?"),
+        (["simulate", "t_handle", "--recrod", "x.rrd"], "did you mean --record?"),
+        (["replay", "x.rrd", "--publish", "state"], "did you mean states?"),
+        (["inspect", "book", "hammer"], "one argument too many"),
         (["replay", "nowhere.rrd"], "nowhere.rrd"),
         (["demo", "--duration", "1"], "--duration"),
     ],
@@ -212,7 +224,7 @@ def test_what_is_refused_overwrites_no_recording(option, ending, tmp_path, capfd
     kept.write_bytes(b"an earlier flight")
     script.write_text(SCRIPTS["contact"][0])
     recorded = [option, f"record={kept}" if option == "--set" else str(kept)]
-    elsewhere = ["--record", str(tmp_path / "nowhere" / "x.mcap")] if option == "--bag" else []
+    elsewhere = ["--record", str(script / "x.mcap")] if option == "--bag" else []
     for refused in (["--script", str(script)], elsewhere or ["--set", "mass=-1"], ["--duration", "-1"]):
         one_line(capfd, rigid_proto, ["simulate", "t_handle", *recorded, *refused])
         assert kept.read_bytes() == b"an earlier flight"
@@ -257,6 +269,39 @@ def test_an_unknown_name_under_the_wildcard_is_only_warned_of(tmp_path, capfd):
 )
 def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
     assert part in one_line(capfd, rigid_body_node, ["rigid_body_node", "--ros-args", *arguments])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--bodys", "hammer"], "did you mean --bodies?"),
+        (["--recrd"], "no option --recrd"),
+        (["hammer"], "--ros-args --params-file hammer"),
+        (["--bodies"], "--bodies"),
+        (["--ros-args", "--parms-file", "x.yaml"], "did you mean --params-file?"),
+        (["--ros-args", "mesh:=book"], "did you mean -p mesh:=book?"),
+        (["--ros-args", "-p", "mass:=1", "--", "--mas"], "no option --mas"),
+    ],
+)
+def test_a_mistyped_option_of_the_node_starts_nothing(arguments, part, capfd):
+    assert part in one_line(capfd, rigid_body_node, ["rigid_body_node", *arguments])
+
+
+def test_help_of_the_node_lists_options_and_parameters_and_starts_nothing(capfd):
+    with pytest.raises(SystemExit) as ended:
+        rigid_body_node(["rigid_body_node", "--help"])
+    assert ended.value.code == 0
+    text = capfd.readouterr().out
+    assert "--bodies" in text and all(f"\n  {name}\n" in text for name in PARAMETERS)
+
+
+def test_what_ros_itself_hands_a_node_is_no_mistake():
+    """As `ros2 launch` and `ros2 run` start it, with every kind of ROS argument."""
+    ros = "--ros-args -r __node:=a -r __ns:=/b --remap ~/wrench:=/w --params-file f.yaml -p mass:=1 --log-level debug"
+    ros += " --log-level rigid_body:=info --enable-rosout-logs --disable-stdout-logs -e /enclave"
+    assert own_arguments(["node", *ros.split()]).bodies == []
+    assert own_arguments(["node", *ros.split(), "--", "--bodies", "book", "hammer"]).bodies == ["book", "hammer"]
+    assert own_arguments(["node", "--bodies", "book", *ros.split()]).bodies == ["book"]
 
 
 @pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])

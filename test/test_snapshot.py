@@ -103,13 +103,14 @@ def test_a_bag_is_drawn_as_the_recording_of_the_same_flight(tmp_path):
         (["--at", "0.6", "-o", "x.png"], "--at"),
         (["--at", "nan", "-o", "x.png"], "--at"),
         (["--at", "0.1", "-o", "x.jpg"], "-o"),
-        (["--at", "0.1", "-o", "nowhere/x.png"], "-o"),
+        (["--at", "0.1", "-o", "taken/x.png"], "-o"),
         (["--at", "0.1", "-o", "x.png", "--size", "wide"], "--size"),
         (["--at", "0.1", "-o", "x.png", "--size", "10x10"], "--size"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused_with_what_would_be_accepted(recording, tmp_path, monkeypatch, words, field):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").touch()
     args = arguments(str(recording), *words)
     with pytest.raises(InputError, match=f"^{field}: "):
         args.run(args)

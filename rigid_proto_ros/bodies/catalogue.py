@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The bundled bodies, one function each. Lengths in metres; each docstring says where the origin and the axes are."""
+"""The bundled bodies, one function each. Lengths in metres; each docstring says where the origin and the axes are, and the size
+along x, y and z to a millimetre.
+"""
 
 from itertools import pairwise
 
@@ -26,7 +28,7 @@ X, Y, Z = np.eye(3)
 def t_handle() -> Surface:
     """T-handle: crossbar along y, stem along +z to its tip at (0, 0, 0.07); origin where the two axes meet.
 
-    The stem is the middle principal axis: I_y < I_z < I_x.
+    The stem is the middle principal axis: I_y < I_z < I_x. Size 0.015 x 0.100 x 0.078 m.
     """
     bar = _rounded_ends(
         [(0.0075, -0.0500), (0.0075, -0.0380), (0.0060, -0.0330), (0.0060, 0.0330), (0.0075, 0.0380), (0.0075, 0.0500)],
@@ -38,7 +40,10 @@ def t_handle() -> Surface:
 
 
 def tennis_racket() -> Surface:
-    """Tennis racket: x from the butt (origin) to the rim, y across the face, z normal to the strings."""
+    """Tennis racket: x from the butt (origin) to the rim, y across the face, z normal to the strings.
+
+    Size 0.684 x 0.263 x 0.033 m.
+    """
     centre, half_length, half_width = 0.515, 0.164, 0.126
     angle = 2.0 * np.pi * np.arange(72) / 72
     hoop = np.stack([centre + half_length * np.cos(angle), half_width * np.sin(angle), 0.0 * angle], axis=1)
@@ -75,7 +80,10 @@ def tennis_racket() -> Surface:
 
 
 def hammer() -> Surface:
-    """Forged hammer: z from the grip's end (origin) up to the head; its face looks along +x, its peen along -x."""
+    """Forged hammer: z from the grip's end (origin) up to the head; its face looks along +x, its peen along -x.
+
+    Size 0.141 x 0.041 x 0.313 m.
+    """
     grip = smooth_curve(
         [
             (0.0, 0.014, 0.0105),
@@ -126,7 +134,7 @@ def hammer() -> Surface:
 def l_bracket() -> Surface:
     """Angle bracket with three holes: origin at the outer corner, long leg along x, short leg along z, width along y.
 
-    The hole beside the middle makes all three products of inertia nonzero.
+    The hole beside the middle makes all three products of inertia nonzero. Size 0.100 x 0.040 x 0.060 m.
     """
     thickness, long, short, width, fillet = 0.006, 0.100, 0.060, 0.040, 0.008
     bend = np.linspace(-np.pi / 2.0, -np.pi, 7)
@@ -159,12 +167,18 @@ def l_bracket() -> Surface:
 
 
 def hollow_box() -> Surface:
-    """Closed box of 0.20 x 0.12 x 0.08 m about the origin, with a cavity that leaves walls of 5 mm."""
+    """Closed box about the origin, with a cavity that leaves walls of 5 mm.
+
+    Size 0.200 x 0.120 x 0.080 m.
+    """
     return with_cavity(rounded_box((0.20, 0.12, 0.08), 0.004, spans=6), rounded_box((0.19, 0.11, 0.07), 0.002, spans=6))
 
 
 def book() -> Surface:
-    """Hardcover book about the origin: x from the spine to the fore edge, y its height, z its thickness."""
+    """Hardcover book about the origin: x from the spine to the fore edge, y its height, z its thickness.
+
+    Size 0.154 x 0.210 x 0.030 m.
+    """
     width, height, thickness, board, overhang = 0.148, 0.210, 0.030, 0.0025, 0.003
     arc = np.linspace(np.pi / 2.0, 3.0 * np.pi / 2.0, 17)
     half = thickness / 2.0
@@ -187,7 +201,10 @@ def book() -> Surface:
 
 
 def teapot() -> Surface:
-    """Solid teapot: origin at the centre of its foot, z up through the knob, spout towards +x, handle towards -x."""
+    """Solid teapot: origin at the centre of its foot, z up through the knob, spout towards +x, handle towards -x.
+
+    Size 0.270 x 0.161 x 0.142 m.
+    """
     belly = smooth_curve(
         [(0.046, 0.006), (0.062, 0.016), (0.078, 0.042), (0.080, 0.062), (0.070, 0.088), (0.050, 0.104)], 21
     )
@@ -229,7 +246,10 @@ def teapot() -> Surface:
 
 
 def spinning_top() -> Surface:
-    """Spinning top: z from the point (origin) up through the disc to the stem's end at 0.075."""
+    """Spinning top: z from the point (origin) up through the disc to the stem's end at 0.075.
+
+    Size 0.071 x 0.071 x 0.075 m.
+    """
     peg = [(0.0, 0.0), (0.0012, 0.0003), (0.0022, 0.0014), (0.0026, 0.0035), (0.0032, 0.0080), (0.0055, 0.0110)]
     disc = smooth_curve(
         [

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,8 +38,6 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         help="mass properties of a mesh, and a verdict on it",
         description="Mass, centre of mass and inertia of a mesh under every model; a broken mesh is told, not summed.",
     )
-    # argparse takes -1e-3 for an option otherwise.
-    parser._negative_number_matcher = re.compile(r"^-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
     parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
     mass = parser.add_mutually_exclusive_group()
     mass.add_argument("--density", type=float, metavar="D", help=f"kg/m^3 (default {DENSITY:g})")

@@ -6,13 +6,13 @@ Exit status: 0 done, 1 a check failed, 2 the input was refused (one line on stde
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import os
 import signal
 import sys
 
 from .. import __version__
+from ..command_line import Parser
 from ..core.errors import InputError
 
 COMMANDS = {
@@ -27,19 +27,12 @@ COMMANDS = {
 }
 
 
-class _Parser(argparse.ArgumentParser):
-    """Usage errors as one line."""
-
-    def error(self, message: str):
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
     argv = sys.argv[1:] if argv is None else argv
-    parser = _Parser(prog="rigid_proto", description="Prototype the properties of one rigid body.")
+    parser = Parser(prog="rigid_proto", description="Prototype the properties of one rigid body.")
     parser.add_argument("--version", action="version", version=__version__)
-    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     # Only the command that runs is imported, so that each starts as fast as it can.
     for name, summary in COMMANDS.items():
         if argv and argv[0] == name:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from ..core.errors import InputError
+from ..output_file import output_file
 
 
 def add_parser(subparsers) -> None:
@@ -132,7 +133,7 @@ def _branch(session, args: argparse.Namespace) -> None:
     if given is None and session.missing:
         raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", "--scene FILE with it")
     branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)
-    scene = Path(args.as_scene)
+    scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")
     print(f"  scene at {args.at:g} s: {scene}")
     if branch.pokes:

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from ..core.errors import InputError
+from ..output_file import output_file
 
 
 def add_parser(subparsers) -> None:
@@ -67,8 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_places(files: list[str]) -> None:
     for file in files:
-        if Path(file).is_dir() or not Path(file).parent.is_dir():
-            raise InputError("record", file, "a file in an existing folder")
+        output_file("record", file)
     if len({Path(file).resolve() for file in files}) < len(files):
         raise InputError("--bag", files[-1], "another file than that of --record")
 

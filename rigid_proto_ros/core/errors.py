@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""The one error family: every message names the field, what was received and what is accepted."""
+"""The one error family: every message names the field and says what is wrong with it, in one line."""
 
 
 class InputError(ValueError):
-    """Input that was refused.
+    """Input that was refused: what was received and what is accepted; or, without ``accepted``, a sentence that says both,
+    which reads better where what was received isn't one value.
 
     The command line prints ``str(error)`` as its one line on stderr and exits with status 2; the node keeps the old
     value in force and returns the same text.
     """
 
-    def __init__(self, field: str, received: object, accepted: str) -> None:
+    def __init__(self, field: str, received: object, accepted: str = "") -> None:
         self.field = field
         self.received = received
         self.accepted = accepted
-        super().__init__(f"{field}: got {received!r}; accepted: {accepted}")
+        super().__init__(f"{field}: got {received!r}; accepted: {accepted}" if accepted else f"{field}: {received}")
 
 
 class MeshError(InputError):
@@ -27,6 +28,6 @@ class TensorError(InputError):
 class CommandRefused(InputError):
     """A wrench, string or schedule command that was refused; ``reason`` is the diagnostics counter it goes to."""
 
-    def __init__(self, reason: str, field: str, received: object, accepted: str) -> None:
+    def __init__(self, reason: str, field: str, received: object, accepted: str = "") -> None:
         self.reason = reason
         super().__init__(field, received, accepted)

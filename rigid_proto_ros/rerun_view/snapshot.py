@@ -15,6 +15,7 @@ import numpy as np
 from PIL import Image
 
 from ..core.errors import InputError
+from ..output_file import output_file
 from ..recorded_session import RecordedSession
 from . import entities as e
 from .ports import LOOPBACK, any_free_port
@@ -71,10 +72,10 @@ def take_picture(
 
 
 def check_picture(picture: str | Path) -> None:
-    """Raise InputError unless a picture could be written there."""
-    picture = Path(picture).absolute()
-    if not picture.parent.is_dir() or picture.suffix.lower() != ".png":
-        raise InputError("-o", str(picture), "the path of a .png file in an existing folder")
+    """Raise InputError unless a picture could be written there; its folder is made."""
+    if Path(picture).suffix.lower() != ".png":
+        raise InputError("-o", str(picture), "a file that ends in .png")
+    output_file("-o", picture)
 
 
 def check_time(session: RecordedSession, at_s: float) -> None:

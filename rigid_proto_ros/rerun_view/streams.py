@@ -21,6 +21,7 @@ import rerun as rr
 import rerun_bindings
 
 from ..core.errors import InputError
+from ..output_file import output_file
 from .ports import LOOPBACK
 from .rrd_file import end_without_index
 from .sent_layout import SentLayout
@@ -103,14 +104,13 @@ class FileStream(Stream):
         self._open_ended = open_ended
         if path.suffix != ".rrd":
             raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
+        output_file("record", path)
         try:
             super().__init__(recording_id, rr.FileSink(path, write_footer=not open_ended), name)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
             self._inode = path.stat().st_ino
         except (RuntimeError, OSError) as error:
-            raise InputError(
-                "record", str(path), f"a file in an existing folder with space left ({_last_line(error)})"
-            ) from error
+            raise InputError("record", str(path), f"a file that can be written ({_last_line(error)})") from error
 
     def flush(self) -> None:
         """Write out; raises RecordingLostError where the data would not arrive in the file of this name."""

@@ -3,11 +3,99 @@
 
 from __future__ import annotations
 
+import argparse
+import textwrap
 from collections.abc import Callable
 
+from ..command_line import Parser
 from ..core.errors import InputError
-from ..parameters import is_ros_parameter, parameter_named
+from ..nearest_name import did_you_mean
+from ..parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named
 from ..scene_file import read_scene_file, typed_value
+
+_WITH_VALUE = (
+    "-p", "--param", "--params-file", "-r", "--remap", "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name",
+)  # fmt: skip
+_SWITCHES = tuple(
+    f"--{word}-{what}-logs" for word in ("enable", "disable") for what in ("rosout", "stdout", "external-lib")
+)
+"""What rcl reads behind ``--ros-args``."""
+
+EXAMPLES = (
+    ("rigid_body_node", "simulate the bundled T-handle"),
+    ("rigid_body_node --ros-args --params-file config/hammer.yaml -p viewer:=web", "a scene, with a live view"),
+    ("rigid_body_node --ros-args -p mesh:=part.obj -p scale:=0.001 -r __node:=part", "a mesh in mm, as the node /part"),
+    ("rigid_body_node --bodies hammer book config/t_handle.yaml", "three bodies in one process, a node each"),
+)
+
+
+def own_arguments(argv: list[str]) -> argparse.Namespace:
+    """``bodies``: the files behind ``--bodies``. Everything else outside ``--ros-args ... [--]`` ends the process: --help with
+    0, what isn't known with 2 and the nearest option. Options inside that rcl wouldn't know are refused, too.
+    """
+    parser = Parser(
+        prog="rigid_body_node",
+        usage="rigid_body_node [--bodies SCENE ...] [--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
+        description="Simulate a rigid body as a ROS 2 node until Ctrl-C. A scene is a ROS parameter file.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument(
+        "--bodies",
+        nargs="+",
+        default=[],
+        metavar="SCENE",
+        help="several bodies: scene files or bundled names, a node each",
+    )
+    own, ros = _split(argv[1:])
+    for word in ros:
+        _check_ros_option(word)
+    if "-h" in own or "--help" in own:
+        parser.epilog = f"{_parameter_help()}\n\n{parser.epilog}"
+    if own and not any(word.startswith("-") for word in own):
+        raise InputError(own[0], f"not an option; a scene is given by --ros-args --params-file {own[0]}")
+    return parser.parse_args(own)
+
+
+def _split(words: list[str]) -> tuple[list[str], list[str]]:
+    """The words outside ``--ros-args ... --``, and those inside that aren't the value of the one before."""
+    own: list[str] = []
+    ros: list[str] = []
+    inside = value = False
+    for word in words:
+        if value:
+            value = False
+        elif word == "--ros-args":
+            inside = True
+        elif inside and word == "--":
+            inside = False
+        elif inside:
+            ros.append(word)
+            value = word in _WITH_VALUE
+        else:
+            own.append(word)
+    return own, ros
+
+
+def _check_ros_option(word: str) -> None:
+    known = (*_WITH_VALUE, *_SWITCHES)
+    if word in known:
+        return
+    hint = did_you_mean(word, [option for option in known if option.startswith("--")])
+    if not word.startswith("-") and ":=" in word:
+        hint = f"did you mean -p {word}?"
+    raise InputError("--ros-args", f"there is no ROS argument {word}{hint and '; ' + hint}")
+
+
+def _parameter_help() -> str:
+    """The parameters as --help lists them."""
+    lines = ["parameters (-p NAME:=VALUE, or in a scene):"]
+    for parameter in (*PARAMETERS.values(), *PATTERNS.values()):
+        default = "" if parameter.default is None else f" (default {parameter.default!r})"
+        unit = f" [{parameter.unit}]" if parameter.unit else ""
+        text = f"{parameter.description.rstrip('.')}{unit}{default}"
+        lines.append(f"  {parameter.name}")
+        lines += textwrap.wrap(text, 100, initial_indent="      ", subsequent_indent="      ")
+    return "\n".join(lines)
 
 
 def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> dict[str, object]:
@@ -27,7 +115,7 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
                     parameter_named(name)
                 except InputError as error:
                     if name not in scene.wildcard:
-                        raise InputError(f"{text}, {name}", value, error.accepted) from None
+                        raise InputError(f"{text}, {name}", error.received, error.accepted) from None
                     warn(f"{text}: {name} under /** is not a parameter of this node; ignored")
                     continue
                 given[name] = value

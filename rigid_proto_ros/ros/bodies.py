@@ -12,18 +12,11 @@ from ..offline import scene_file, scene_values
 NODE_NAME_FORM = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
-def bodies_of(argv: list[str]) -> tuple[list[str], dict[str, dict]]:
-    """``argv`` without ``--bodies`` and its files, and the parameters given by each file under its node's name.
+def read_bodies(files: list[str]) -> dict[str, dict]:
+    """The parameters given by each file under its node's name.
 
     Raises InputError for a file that can't be read, a name that no node can have, or two equal ones.
     """
-    if "--bodies" not in argv:
-        return argv, {}
-    start = argv.index("--bodies")
-    end = next((k for k in range(start + 1, len(argv)) if argv[k].startswith("-")), len(argv))
-    files = argv[start + 1 : end]
-    if not files:
-        raise InputError("--bodies", "nothing", "one or more scene files")
     bodies: dict[str, dict] = {}
     for file in files:
         path = scene_file(file)
@@ -31,7 +24,7 @@ def bodies_of(argv: list[str]) -> tuple[list[str], dict[str, dict]]:
         if name in bodies:
             raise InputError("--bodies", file, f"files with different names; {name} is there already")
         bodies[name] = scene_values(path, print)
-    return [*argv[:start], *argv[end:]], bodies
+    return bodies
 
 
 def node_name_of(path: Path) -> str:

@@ -27,11 +27,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(argv: list[str], ending: Ending) -> int:
-    from .arguments import given_arguments
-    from .bodies import bodies_of
+    from .arguments import given_arguments, own_arguments
+    from .bodies import read_bodies
     from .node_name import remapped_node_name
 
-    argv, bodies = bodies_of(argv)
+    bodies = read_bodies(own_arguments(argv).bodies)
     name = remapped_node_name(argv)
     given = given_arguments(argv, name, _warn)
 

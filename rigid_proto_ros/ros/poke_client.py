@@ -11,10 +11,10 @@ Exit status: 0 all sent, 1 something came late or was refused, 2 the input was r
 from __future__ import annotations
 
 import argparse
-import re
 import signal
 import sys
 
+from ..command_line import Parser
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
 from ..poke_script import MAX_TIME_S, ScriptCommand, parse_script, read_script
@@ -47,21 +47,22 @@ def main(argv: list[str] | None = None) -> int:
         return 0
 
 
-class _Parser(argparse.ArgumentParser):
-    """Usage errors as one line."""
-
-    def error(self, message: str):
-        self.exit(2, f"poke_client: {message} (see poke_client --help)\n")
+EXAMPLES = (
+    ("poke_client poke --at tip --push 0.05", "0.05 N along the inward normal at the contact tip"),
+    ("poke_client poke --at vertex/7 --impulse 0.001 0 0", "0.001 N s at a vertex, at once, world axes"),
+    ("poke_client wrench --torque 0 0 -2e-4 --axes body --for 3", "a torque held for 3 s, body axes"),
+    ("poke_client msg_examples/flip_and_poke.yaml --reset", "a script, its times counted from the reset"),
+    ("poke_client msg_examples/flip_and_poke.yaml --dry-run", "what it would send"),
+)
 
 
 def _arguments(argv: list[str]) -> argparse.Namespace:
-    parser = _Parser(
+    parser = Parser(
         prog="poke_client",
         description="Send a poke script, or one command, to a running rigid_body node.",
         usage="poke_client (SCRIPT.yaml | poke ... | wrench ...) [--reset] [--lead S] [--node NAME]",
+        examples=EXAMPLES,
     )
-    # argparse takes -2e-4 for an option: it knows no exponents.
-    parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
     parser.add_argument("what", metavar="SCRIPT.yaml | poke | wrench", help="a script, or one command from the line")
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
@@ -157,6 +158,8 @@ def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]
             sender.destroy_node()
         rclpy.try_shutdown()
     print(report.text)
+    for line in report.told:
+        print(f"  {line}")
     return 0 if report.all_in_time else 1
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, WrenchStamped
+from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.node import Node
@@ -43,13 +44,15 @@ BURST_S = 0.5
 
 @dataclass(frozen=True)
 class Report:
-    """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``. last_ns: when the
-    last command acts.
+    """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused ones
+    by reason; told: what the node's log said of them, at most one line a second. last_ns: when the last command acts.
     """
 
     sent: dict[str, int]
     late: int
     refused: int
+    reasons: dict[str, int]
+    told: tuple[str, ...]
     last_ns: int
     reached_ns: int
 
@@ -61,7 +64,9 @@ class Report:
     def text(self) -> str:
         """One line for the terminal."""
         parts = ", ".join(f"{count} {topic}" for topic, count in self.sent.items() if count) or "nothing"
-        text = f"sent {parts}; {self.late} late, {self.refused} refused; the last acts at {self.last_ns / 1e9:.6g} s"
+        why = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
+        refused = f"{self.refused} refused{f' ({why})' if why else ''}"
+        text = f"sent {parts}; {self.late} late, {refused}; the last acts at {self.last_ns / 1e9:.6g} s"
         if sum(self.sent.values()) and self.reached_ns <= self.last_ns:
             text += f", but simulated time stands still at {self.reached_ns / 1e9:.6g} s"
         return text
@@ -74,6 +79,7 @@ class ScriptSender(Node):
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self.target = node_name if node_name.startswith("/") else f"/{node_name}"
         self._counters: dict[str, str] = {}
+        self._refusals: list[str] = []
         self._reports = 0
         self._simulated_ns: int | None = None
         self._get_parameters: Client | None = None
@@ -88,6 +94,7 @@ class ScriptSender(Node):
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
         self._pause_client = self.create_client(SetBool, f"{self.target}/pause")
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+        self.create_subscription(Log, "/rosout", self._on_log, 100)
         self._wait_for_node(timeout_s)
 
     def send(self, script: list[ScriptCommand], reset: bool = False, lead_s: float = 0.2) -> Report:
@@ -123,8 +130,13 @@ class ScriptSender(Node):
             self._wait_until_acted(last_ns)
         self._show("")
         # All of one report: what it has reached, it has counted.
-        late, refused = (int(self._counters[k]) - int(before[k]) for k in ("late", "refused_total"))
-        return Report(sent, late, refused, last_ns, self._reported_ns())
+        rose = {key: int(self._counters[key]) - int(before[key]) for key in before if key.startswith("refused_")}
+        refused = rose.pop("refused_total")
+        reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
+        if refused and not self._refusals:
+            rclpy.spin_once(self, timeout_sec=0.5)  # the log's line may come behind the report
+        late = int(self._counters["late"]) - int(before["late"])
+        return Report(sent, late, refused, reasons, tuple(self._refusals), last_ns, self._reported_ns())
 
     def _contacts(self, script: list[ScriptCommand]) -> dict[str, tuple]:
         """The contacts that the script ties strings to, as the node has them."""
@@ -163,6 +175,10 @@ class ScriptSender(Node):
             if status.name == f"{self.target}: simulation":
                 self._counters = {v.key: v.value for v in status.values}
                 self._reports += 1
+
+    def _on_log(self, message: Log) -> None:
+        if message.name == self.target.strip("/").replace("/", ".") and message.msg.startswith("refused: "):
+            self._refusals.append(message.msg)
 
     def _now_ns(self) -> int:
         """Simulated time of a state published from now on."""

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Mapping
 
 from ..core.errors import InputError
+from ..nearest_name import one_of
 
 
 def number(value, field: str, lower: float = -1e100, upper: float = 1e100, above: float = -math.inf) -> float:
@@ -52,9 +52,7 @@ def known_name(name: str, field: str, known: Iterable[str]) -> str:
     """One of the known names, or a refusal that says which is nearest."""
     known = tuple(known)
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise InputError(field, name, f"{hint}one of {', '.join(known)}")
+        raise InputError(field, name, one_of(name, known))
     return name
 
 

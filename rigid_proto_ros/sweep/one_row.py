@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..offline import OfflineRun
+from ..output_file import output_file
 from ..scenario import publication_ns
 from ..session_recorder import make_recorder
 from .chunk import run_chunk
@@ -37,6 +38,7 @@ def write_scene(study: Study, row: Variation, file: Path, time: float | None) ->
     """Write the row as a scene, its script beside it as NAME_script.yaml; returns the files and the command that flies them."""
     duration = time if time is not None else study.duration_ns / 1e9
     scenario, commands = row.scenario, row.commands
+    output_file("--as-scene", file)
     try:
         file.write_text(scenario.text, encoding="utf-8")
         words = ["rigid_proto", "simulate", str(file), "--duration", repr(duration)]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import InputError
+from ..output_file import output_file
 from .table import read_columns
 
 _KEYS = ("x", "y", "color", "to", "log")
@@ -102,6 +103,7 @@ def plot_table(plot: Plot, table: Path) -> None:
     axes.set_ylabel(plot.y)
     axes.set_title(table.stem)
     metadata = {"Date": None} if plot.file.suffix == ".svg" else None
+    output_file("--plot", plot.file)
     try:
         figure.savefig(plot.file, dpi=150, metadata=metadata)
     except OSError as error:

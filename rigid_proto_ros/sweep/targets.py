@@ -8,11 +8,11 @@
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..core.errors import InputError
+from ..nearest_name import one_of
 from ..parameters import READ_ONLY, Parameter, parameter_named
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
@@ -84,11 +84,11 @@ def read_target(name: str, field: str, values: Mapping[str, object], entries: li
     except InputError as error:
         parameter, _, component = name.rpartition(".")
         if not parameter:
-            raise InputError(field, name, error.accepted) from None
+            raise InputError(field, error.received, error.accepted) from None
         try:
             declared = parameter_named(parameter)
         except InputError:
-            raise InputError(field, name, error.accepted) from None
+            raise InputError(field, error.received, error.accepted) from None
     if declared.changes == READ_ONLY:
         raise InputError(field, name, "a parameter that varies; this one is fixed for the node")
     if parameter not in values:
@@ -113,9 +113,7 @@ def _script_target(name: str, field: str, entries: list) -> Target:
     if not number.isdigit() or not 1 <= int(number) <= len(entries) or not keys:
         raise InputError(field, name, accepted)
     if keys[0] not in SCRIPT_FIELDS:
-        near = difflib.get_close_matches(keys[0], SCRIPT_FIELDS, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise InputError(field, keys[0], f"{hint}one of {', '.join(SCRIPT_FIELDS)}")
+        raise InputError(field, keys[0], one_of(keys[0], SCRIPT_FIELDS))
     if keys[0] == "set":
         # A parameter's name has dots of its own.
         keys = ["set", ".".join(keys[1:])]

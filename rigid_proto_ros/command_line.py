@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""What the three executables' command lines have in common: one-line refusals with the nearest known name, examples in --help."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Iterable
+from typing import Any, NoReturn
+
+from .nearest_name import did_you_mean
+
+NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
+"""argparse knows no exponents and takes -2e-4 for an option."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Usage errors are one line on stderr and exit status 2. examples: (command, what it does), shown below --help's options."""
+
+    def __init__(self, *args: Any, examples: Iterable[tuple[str, str]] = (), **kwargs: Any) -> None:
+        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
+        self._negative_number_matcher = NEGATIVE_NUMBER
+        self.show_examples(examples)
+
+    def show_examples(self, examples: Iterable[tuple[str, str]]) -> None:
+        """Commands to copy, each under a line that says what it does."""
+        lines = [line for command, meaning in examples for line in (f"  # {meaning}", f"  {command}")]
+        if lines:
+            self.epilog = "\n".join(["examples:", *lines])
+
+    def parse_known_args(self, args=None, namespace=None):
+        """As argparse does it, but what isn't known is refused by the command that it was given to, which knows its options."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(self._unknown(unknown))
+        return found, unknown
+
+    def error(self, message: str) -> NoReturn:
+        """One line, exit status 2."""
+        self.exit(2, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
+
+    def _unknown(self, words: list[str]) -> str:
+        options = [word for word in words if word.startswith("-")]
+        if not options:
+            return f"{words[0]!r} is one argument too many"
+        name = options[0].partition("=")[0]
+        hint = did_you_mean(name, (option for option in self._option_string_actions if option.startswith("--")))
+        return f"no option {name}" + (f"; {hint}" if hint else "")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is None or value in action.choices:
+            return
+        known = [str(choice) for choice in action.choices]
+        hint = did_you_mean(str(value), known)
+        raise argparse.ArgumentError(
+            action, " ".join(filter(None, [f"no {value!r};", hint, f"one of {', '.join(known)}"]))
+        )
