@@ -7,10 +7,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from ..troubles import COUNTED, troubles
+
 REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tensor", "integrator", "schedule")
-
-
-_TROUBLES = ("refused_total", "overruns", "real_time_lost_s", "sequence_gaps", "queue_full")
 
 
 class Diagnostics:
@@ -20,7 +19,7 @@ class Diagnostics:
         self._node = node
         self._values = values
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._troubles_before = 0.0
+        self._before: dict[str, object] = {}
         # By the steady clock: reports must go on while /clock stands still.
         self._timer = node.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -28,17 +27,20 @@ class Diagnostics:
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         values = self._values()
-        troubles = sum(float(values[key]) for key in _TROUBLES)
-        troubled, self._troubles_before = troubles > self._troubles_before, troubles
+        said, self._before = troubles(self._before, values), {key: values[key] for key in values if _counts(key)}
         if self._publisher.get_subscription_count() == 0:
             return
-        warning = values.pop("warning")
+        said += [values["warning"]] if values["warning"] else []
         status = DiagnosticStatus(
             name=f"{self._node.get_fully_qualified_name()}: simulation", hardware_id="simulated rigid body"
         )
-        status.level = DiagnosticStatus.WARN if troubled or warning else DiagnosticStatus.OK
-        status.message = warning or ("refused, lost or late in the last second" if troubled else values["state"])
+        status.level = DiagnosticStatus.WARN if said else DiagnosticStatus.OK
+        status.message = "; ".join(said) or values["state"]
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp = stamp
         self._publisher.publish(message)
+
+
+def _counts(key: str) -> bool:
+    return key in COUNTED or key.startswith("refused_")

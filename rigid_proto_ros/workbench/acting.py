@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.frames import parse_frame
+from ..core.commands import ClearWrench, Command, MoveString, ReleaseString, TieString, WrenchCommand
 from ..core.loads import Load, settle
 from ..core.setup import Setup
 from ..core.state import State
 from ..core.string import Tied
 from ..core.string_control import StringControl
-from ..poke_script import string_attach, string_target
 from ..scenario import Scenario, nanoseconds
 
 SHOWN_AT_LEAST_NS = 800_000_000
@@ -66,33 +64,25 @@ class Acting:
         if self._control is not None:
             self._control.change(old.setup, new.setup, state)
 
-    def event(self, line: dict, scenario: Scenario, state: State) -> None:
-        """A line of the event log, when ``state`` was the last one known."""
+    def event(self, command: Command, time_ns: int, scenario: Scenario, state: State) -> None:
+        """A command acted when ``state`` was the last one known; raises InputError where it can't be followed."""
         if self._control is None:
             return
-        try:
-            self._follow(line["kind"], line["content"], line["time_ns"], scenario, state)
-        except InputError:
-            pass  # refused there as well: a line that the page can't read draws nothing
-
-    def _follow(self, kind: str, content: dict, time_ns: int, scenario: Scenario, state: State) -> None:
         at = State(time_ns, state.row)
-        if kind == "string_attach":
-            self._control.tie_at(string_attach(0, content["axes"], content["point"]), scenario.setup, at)
-        elif kind == "string_target":
-            self._control.move(string_target(0, "world", content["point"]), scenario.setup, at)
-        elif kind == "string_release":
+        if isinstance(command, TieString):
+            self._control.tie_at(command, scenario.setup, at)
+        elif isinstance(command, MoveString):
+            self._control.move(command, scenario.setup, at)
+        elif isinstance(command, ReleaseString):
             self._control.release()
-        elif kind == "clear_wrench":
+        elif isinstance(command, ClearWrench):
             self._acting = []
-        elif kind in ("poke", "wrench"):
-            self._load(kind == "wrench", content, time_ns, scenario, at)
+        elif isinstance(command, WrenchCommand):
+            self._load(command, time_ns, scenario, at)
 
-    def _load(self, held: bool, content: dict, time_ns: int, scenario: Scenario, state: State) -> None:
-        setup = scenario.setup
-        names = (scenario.values["world_frame"], scenario.values["body_frame"] or "body")
-        frame = parse_frame(content["frame_id"], frozenset(setup.contacts), *names)
-        load = settle(frame, content["force"], content["torque"], setup.body, setup.surface, setup.contacts, state)
+    def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:
+        setup, frame, held = scenario.setup, command.frame, command.held
+        load = settle(frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
         if held:
             self._acting = [acting for acting in self._acting if not acting.held]
             lasting_ns = setup.wrench_timeout_ns or 1 << 62
@@ -104,7 +94,7 @@ class Acting:
             # Simulated time runs as fast as it is told to, eyes don't.
             seen_ns = round(SHOWN_AT_LEAST_NS * (scenario.values["real_time_factor"] or 1.0))
             until_ns = time_ns + (lasting_ns if held else max(lasting_ns, seen_ns))
-            text = _strength_text(content["force"], frame.impulse)
+            text = _strength_text(command.force, frame.impulse)
             self._acting.append(_Acting(held, load, text, time_ns, until_ns))
 
     def string_ends(self, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray] | None:

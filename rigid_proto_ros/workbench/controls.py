@@ -44,6 +44,11 @@ class ParameterSetter:
         self._waiting.update(changes)
         self._go_on()
 
+    @property
+    def busy(self) -> bool:
+        """Whether the node hasn't answered yet."""
+        return self._call is not None
+
     def _go_on(self) -> None:
         if self._call is not None or not self._waiting:
             return

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections import deque
 from collections.abc import Awaitable
 
 import numpy as np
@@ -21,7 +22,8 @@ from ..scenario import Scenario
 from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
-from .history import History
+from .heard_command import heard_command
+from .history import SCENE_GRACE_S, History
 from .panel import Panel
 from .pointer import Pointer, Tools, suggested_force
 from .readout_panel import ReadoutPanel
@@ -34,6 +36,7 @@ from .shadow import Shadow
 from .show_tab import ShowTab
 from .sighting import DrawnPose, Sightings
 from .situation import Situation, bring_about
+from .status import Status
 from .upload_button import UploadButton
 
 FRAME_S = 0.02
@@ -42,9 +45,6 @@ FRAME_S = 0.02
 GRACE_S = 2.0
 """[s] After the last browser left: a page that is loaded anew finds its history."""
 
-SILENT_S = 1.5
-"""[s] Without a state: a node that lives sends one every 0.1 s at least, unless its publish_rate is low."""
-
 LEASH = 1.0
 """Body sizes that the body may fly from the picture's middle before the picture follows."""
 
@@ -52,10 +52,13 @@ LEASH = 1.0
 class Page:
     """Follows one node. state: the last one heard.
 
-    address: of this page. lesson: name of the bundled scene that it was started with, or empty.
+    address: of this page. lesson: name of the bundled scene that it was started with, or empty. anew: the flight begins
+    anew when the first browser is there to see it.
     """
 
-    def __init__(self, server: viser.ViserServer, target: str, address: str, lesson: str = "") -> None:
+    def __init__(
+        self, server: viser.ViserServer, target: str, address: str, lesson: str = "", anew: bool = False
+    ) -> None:
         self.server = server
         self.address = address
         self.loop = server.get_event_loop()
@@ -74,7 +77,7 @@ class Page:
         self.view = SceneView(server)
         self.sightings = Sightings()
         self.acting = Acting()
-        self.shadow = Shadow()
+        self.shadow = Shadow(self._ghost_refuses)
         self.pointer = Pointer(self.link, self, self.sightings, self.tools)
         self._setter = ParameterSetter(self.link.set_parameters, self._refused)
         self._controls = Controls(server.gui, self._setter.set)
@@ -92,7 +95,13 @@ class Page:
         self._another_body = True
         self._doing = ""
         self._odd_line_said = False
-        self._heard_s = self._slow_due_s = 0.0
+        self._refusals_said: set[str] = set()
+        self._begin_anew = anew
+        self._events: deque[dict] = deque()
+        self._newest: tuple[int, np.ndarray] | None = None
+        self._reset_due_s: float | None = None
+        self._status_of = Status(self.link.target)
+        self._slow_due_s = 0.0
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
 
@@ -131,6 +140,7 @@ class Page:
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         if not self._open.is_set():
+            self._status_of.heard(time.monotonic())  # it has time to be heard
             self.link.listen()
             self._open.set()
 
@@ -143,6 +153,8 @@ class Page:
             self.link.stop_listening()
             # What happens from now on isn't heard: the memory of the flight ends here.
             self.state = None
+            self._events.clear()
+            self._newest = self._reset_due_s = None
             self.history = self._new_history(self.link.target)
             self.sightings.forget()
             self.view.trails.forget()
@@ -155,6 +167,11 @@ class Page:
     def set(self, changes) -> None:
         """Set parameters of the node."""
         self._setter.set(changes)
+
+    @property
+    def busy(self) -> bool:
+        """Whether something that was asked for here isn't done yet."""
+        return bool(self._doing) or self._setter.busy
 
     def call(self, service: str, data: bool | None = None) -> None:
         """Call a service; a failure is said on the page."""
@@ -212,6 +229,8 @@ class Page:
 
     def follow_link(self, link: str) -> None:
         """Bring the node where a link leads, once a page is open."""
+
+        self._begin_anew = False
 
         async def following() -> None:
             await self.known()  # before that nobody would see a refusal
@@ -273,9 +292,13 @@ class Page:
             self.usual_force = self.tools.force = suggested_force(scenario, 2.0 * self.view.radius)
             self._panel.show_force()
         self._known.set()
+        if self._begin_anew:
+            self._begin_anew = False
+            self.call("reset")
 
     def _on_diagnostics(self, values: dict[str, str]) -> None:
         self.diagnostics = values
+        self._status_of.report(values, time.monotonic())
         self.paused = values.get("state") == "paused"
         self._panel.show_state(self.paused)
 
@@ -288,27 +311,50 @@ class Page:
     def tick(self, now_s: float) -> None:
         """Take what the node has said and draw it."""
         heard = self.link.take()
-        events = [event for line in heard.events if (event := self._event(line)) is not None]
+        self._events.extend(event for line in heard.events if (event := self._event(line)) is not None)
         for time_ns, row in heard.states:
             self.history.state(time_ns, row[:7], row[7:])
             self.view.trails.add(time_ns, row)
         if self.scenario is not None:
-            for event in events:
-                self._hear(event)
-            if heard.states:
-                self._heard_s = now_s
-                time_ns, row = heard.states[-1]
-                first = self.state is None
-                self.state = State(time_ns, core_row(row))
-                if first:
-                    self.acting.begin(self.scenario.setup, self.state)
-                    self.shadow.begin(self.scenario, self.state)
+            self._follow(heard.states, now_s)
             if self.state is not None:
                 self._draw(now_s)
+        if heard.states:
+            self._status_of.heard(now_s)
         self.pointer.hold()
         if now_s >= self._slow_due_s:
             self._slow_due_s = now_s + 1.0
             self._every_second(now_s)
+
+    def _follow(self, states: list, now_s: float) -> None:
+        """Events in their order, then the newest state; a reset once the scene that it begins with is known, which comes on
+        another topic."""
+        if states:
+            self._newest = states[-1]
+        while self._events:
+            if self._events[0]["kind"] == "reset":
+                if self._reset_due_s is None:
+                    self._reset_due_s = now_s + SCENE_GRACE_S
+                if self._newest is not None and self.state is not None and self._newest[0] >= self.state.time_ns:
+                    self._newest = None  # from before it
+                if now_s < self._reset_due_s or self._scenes.busy:
+                    return
+                self._reset_due_s = None
+            self._hear(self._events.popleft())
+        if self._newest is not None:
+            time_ns, row = self._newest
+            self._newest = None
+            another = self.state is None or time_ns < self.state.time_ns
+            self.state = State(time_ns, core_row(row))
+            if another:
+                self._begin(self.state)
+
+    def _begin(self, state: State) -> None:
+        """A reset, the first look at a node, or another node under its name."""
+        self.acting.begin(self.scenario.setup, state)
+        self.shadow.begin(self.scenario, state)
+        self._refusals_said.clear()
+        self._readouts.restart()
 
     def _event(self, line: str) -> dict | None:
         """A line of ``~/events``, kept; None for one that is none, which anybody may publish."""
@@ -327,10 +373,8 @@ class Page:
     def _hear(self, event: dict) -> None:
         kind = event["kind"]
         if kind == "reset":
-            setup = self.scenario.setup
-            self.acting.begin(setup, State(0, setup.initial))
-            self.shadow.begin(self.scenario, State(0, setup.initial))
-            self._readouts.restart()
+            self.state = State(0, self.scenario.setup.initial)
+            self._begin(self.state)
             self.view.trails.forget()
             if self.looking_at is None:
                 self.view.origin = np.zeros(3)
@@ -341,10 +385,33 @@ class Page:
             self.pointer.knot_moved()
         if self.state is not None:
             try:
-                self.acting.event(event, self.scenario, self.state)
-                self.shadow.event(event, self.scenario)
+                self._act(kind, event["content"], event["time_ns"])
             except (ArithmeticError, LookupError, TypeError, ValueError) as error:
                 self._odd_line(InputError("event", str(event)[:80], f"the content of its kind ({error!r})"))
+
+    def _act(self, kind: str, content: dict, time_ns: int) -> None:
+        """What acted on the body acts on what is drawn beside it; what can't be followed is said."""
+        try:
+            command = heard_command(kind, content, self.scenario, self.link.target.rpartition("/")[2])
+            if command is not None:
+                self.acting.event(command, time_ns, self.scenario, self.state)
+        except InputError as error:
+            self._say_once(f"The picture doesn't show this {kind.replace('_', ' ')}: {error}")
+            return
+        if command is not None:
+            try:
+                self.shadow.event(command, time_ns)
+            except InputError as error:
+                self._ghost_refuses(str(error))
+
+    def _ghost_refuses(self, reason: str) -> None:
+        self._say_once(f"The ghost doesn't take part: {reason}")
+
+    def _say_once(self, text: str) -> None:
+        """A line to all pages, not again before the next reset."""
+        if text not in self._refusals_said:
+            self._refusals_said.add(text)
+            self.say(text)
 
     def _draw(self, now_s: float) -> None:
         state, setup, view = self._shown_state(), self.scenario.setup, self.view
@@ -392,18 +459,7 @@ class Page:
 
     def _every_second(self, now_s: float) -> None:
         self._session.every_second()
-        silent = self.state is None or now_s - self._heard_s > SILENT_S
-        if self._doing:
-            status = f"*{self._doing} …*"
-        elif silent:
-            status = f"⚠ no word from `{self.link.target}`"
-        else:
-            status = f"`{self.link.target}` is {self.diagnostics.get('state', 'there')}"
-            if (choice := self.diagnostics.get("integrator_choice")) and choice != self.diagnostics.get("integrator"):
-                status += f", method {choice}"
-            warning = self.diagnostics.get("message", "")
-            if warning and warning != self.diagnostics.get("state"):
-                status += f"  \n⚠ {warning}"
+        status = self._status_of.text(now_s, self._doing)
         if self._status.content != status:
             self._status.content = status
 

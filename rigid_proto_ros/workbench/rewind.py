@@ -30,10 +30,12 @@ KEPT = frozenset(
             "imu_contact",
             "schedule_horizon",
         ),
-        *("ghost.inertia_model", "ghost.integrator"),
     }
 )
-"""Parameters that a rewind leaves as they are: how one looks at the motion, not the motion."""
+"""Parameters that stay as they are: how one looks at the motion, not the motion."""
+
+KEPT_BY_REWIND = KEPT | {"ghost.inertia_model", "ghost.integrator"}
+"""A lesson has a ghost of its own; who goes back in one flight keeps his."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def make_rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole
         moment_ns=moment_ns,
         time_ns=time_ns,
         row=row,
-        changes=changes_to(values, read_scene_text(present).values),
+        changes=changes_to(values, read_scene_text(present).values, KEPT_BY_REWIND),
         commands=expand_script(branch.pokes, wrench_timeout=float(values.get("wrench_timeout", 1.5))),
         scene=branch.scene,
         script=script,
@@ -123,16 +125,18 @@ def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, obj
     return {**values, **{name: numbers[i:j] for name, (i, j) in zip(_START, cuts, strict=True)}}
 
 
-def changes_to(values: Mapping[str, object], present: Mapping[str, object]) -> dict[str, object]:
+def changes_to(
+    values: Mapping[str, object], present: Mapping[str, object], kept: frozenset[str] = KEPT
+) -> dict[str, object]:
     """What takes a node from its present parameters to those of a moment or a scene, to be set in one call.
 
-    What can't change in flight and what belongs to looking (KEPT) is left out; a ballast that isn't there yet weighs
+    What can't change in flight and what is ``kept`` is left out; a ballast that isn't there yet weighs
     nothing.
     """
     changes = {
         name: value
         for name, value in values.items()
-        if name not in KEPT
+        if name not in kept
         and parameter_named(name).changes != READ_ONLY
         and (value != present.get(name) or name in _START)
     }

@@ -160,7 +160,7 @@ class RosLink:
         for status in message.status:
             if status.name == f"{self.target}: simulation":
                 values = {v.key: v.value for v in status.values}
-                self._deliver(self._on_diagnostics, {**values, "message": status.message})
+                self._deliver(self._on_diagnostics, values)
 
     def take(self) -> Heard:
         """All states and event lines since the last call."""

@@ -31,6 +31,11 @@ class SceneLoader:
         self._newest = self._loaded = ""
         self._loading: asyncio.Task | None = None
 
+    @property
+    def busy(self) -> bool:
+        """Whether a text is being taken on."""
+        return self._loading is not None
+
     def load(self, text: str) -> None:
         """Take this on, unless a newer one comes first."""
         self._newest = text

@@ -6,27 +6,36 @@ It is computed here, from what the page hears: the state that it begins with, an
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from ..core.commands import Change, ClearWrench, Command, ReleaseString, WrenchCommand
-from ..core.errors import InputError
-from ..core.frames import parse_frame
+from ..core.commands import Change, Command
+from ..core.observer import Observer
 from ..core.setup import Setup
 from ..core.simulation import Simulation
 from ..core.state import State
-from ..poke_script import string_attach, string_target
 from ..scenario import Scenario
 
-LONGEST_NS = 1_000_000_000
-"""[ns] That it is carried over at once; a page that slept for longer begins anew."""
+PORTION_NS = 1_000_000_000
+"""[ns] That it is carried at most between two pictures: whoever draws waits for it."""
+
+
+class _Refusals(Observer):
+    def __init__(self, on_refusal: Callable[[str], None]) -> None:
+        self._on_refusal = on_refusal
+
+    def refused(self, time_ns: int, reason: str, text: str) -> None:
+        self._on_refusal(text)
 
 
 class Shadow:
-    """Follows one flight. ``begin`` with each reset, or where the page comes in."""
+    """Follows one flight. ``begin`` with each reset, or where the page comes in. on_refusal(reason) hears of a command that was
+    refused when it came to act."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_refusal: Callable[[str], None]) -> None:
+        self._refusals = _Refusals(on_refusal)
         self._simulation: Simulation | None = None
         self._setup: Setup | None = None
         self._offset_ns = 0
@@ -44,7 +53,7 @@ class Shadow:
         if scenario.ghost is not None:
             at_start = state.time_ns == 0
             initial = scenario.ghost.initial if at_start else _beside(scenario, state)
-            self._simulation = Simulation(replace(scenario.ghost, initial=initial))
+            self._simulation = Simulation(replace(scenario.ghost, initial=initial), self._refusals)
 
     def changed(self, scenario: Scenario, state: State) -> None:
         """Parameters changed at ``state``."""
@@ -55,32 +64,23 @@ class Shadow:
         setup = self._setup = scenario.ghost
         self._submit(Change({}, lambda: setup), state.time_ns)
 
-    def event(self, line: dict, scenario: Scenario) -> None:
-        """A line of the event log."""
+    def event(self, command: Command, time_ns: int) -> None:
+        """A command acted; raises InputError where the ghost can't carry it, which then passes it by."""
         if self._simulation is not None:
-            try:
-                command = _command(line["kind"], line["content"], scenario)
-            except InputError:
-                return
-            if command is not None:
-                self._submit(command, line["time_ns"])
+            self._submit(command, time_ns)
 
     def _submit(self, command: Command, time_ns: int) -> None:
-        try:
-            self._simulation.submit(command, max(time_ns - self._offset_ns, self._simulation.time_ns))
-        except InputError:
-            pass  # what its integrator can't carry passes it by
+        self._simulation.submit(command, max(time_ns - self._offset_ns, self._simulation.time_ns))
 
     def row(self, time_ns: int) -> np.ndarray | None:
-        """Its state (13,) at the node's ``time_ns``, or None."""
+        """Its state (13,) at the node's ``time_ns``; None while there is none, and where it is behind: it catches up by
+        PORTION_NS a call."""
         simulation = self._simulation
         until_ns = time_ns - self._offset_ns
         if simulation is None or simulation.failure or until_ns < simulation.time_ns:
             return None
-        if until_ns > simulation.time_ns + LONGEST_NS:
-            self._simulation = None
-            return None
-        return simulation.advance(until_ns).row
+        state = simulation.advance(min(until_ns, simulation.time_ns + PORTION_NS))
+        return state.row if simulation.time_ns == until_ns and not simulation.failure else None
 
 
 def _beside(scenario: Scenario, state: State) -> np.ndarray:
@@ -90,21 +90,3 @@ def _beside(scenario: Scenario, state: State) -> np.ndarray:
     row[0:3] += apart
     row[7:10] += np.cross(state.angular_velocity, apart)
     return row
-
-
-def _command(kind: str, content: dict, scenario: Scenario) -> Command | None:
-    if kind == "string_attach":
-        return string_attach(0, content["axes"], content["point"])
-    if kind == "string_target":
-        return string_target(0, "world", content["point"])
-    if kind == "string_release":
-        return ReleaseString()
-    if kind == "clear_wrench":
-        return ClearWrench()
-    if kind in ("wrench", "poke"):
-        values = scenario.values
-        names = (values["world_frame"], values["body_frame"] or "body")
-        frame = parse_frame(content["frame_id"], frozenset(scenario.setup.contacts), *names)
-        force, torque = tuple(content["force"]), tuple(content["torque"])
-        return WrenchCommand(kind == "wrench", frame, force, torque, 0, content["frame_id"], b"")
-    return None

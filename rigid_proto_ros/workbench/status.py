@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""The line at the head of the page: what the node is doing, what went wrong there, and what to do when it is gone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from ..troubles import grown, serious_troubles
+
+SILENT_S = 2.5
+"""[s] Without a state or a report: a node that lives sends a report every second."""
+
+SLOW = 0.1
+"""Share of a second of real time that may be lost before it is worth a word: eyes don't see less."""
+
+SHOWN_S = 8.0
+"""[s] That a trouble is shown: long enough to be read."""
+
+
+class Status:
+    """Follows one node's reports. ``text`` is markdown."""
+
+    def __init__(self, target: str) -> None:
+        self._target = target
+        self._last: Mapping[str, str] = {}
+        self._heard_s = -1e9
+        self._silent_since = ""
+        self._troubles: dict[str, float] = {}
+
+    def report(self, values: Mapping[str, str], now_s: float) -> None:
+        """A report of /diagnostics."""
+        last, self._last = self._last, values
+        self.heard(now_s)
+        if last:
+            said = serious_troubles(last, values)
+            lost_s = grown("real_time_lost_s", last, values)
+            if lost_s > SLOW:
+                said.append(f"too much to compute here: {lost_s:.2g} s behind real time")
+            self._troubles |= dict.fromkeys(said, now_s + SHOWN_S)
+
+    def heard(self, now_s: float) -> None:
+        """The node has said something."""
+        self._heard_s = now_s
+
+    def silent(self, now_s: float) -> bool:
+        """Whether the node has said nothing for longer than one that lives would."""
+        return now_s - self._heard_s > SILENT_S
+
+    def text(self, now_s: float, doing: str = "") -> str:
+        """What stands on the page at ``now_s`` [s, monotonic]; doing: what the page is busy with."""
+        if self.silent(now_s):
+            return self._gone()
+        self._silent_since = ""
+        if doing:
+            return f"*{doing} …*"
+        last = self._last
+        text = f"`{self._target}` is {last.get('state', 'there')}"
+        if (choice := last.get("integrator_choice")) and choice != last.get("integrator"):
+            text += f", method {choice}"
+        self._troubles = {said: until_s for said, until_s in self._troubles.items() if until_s > now_s}
+        warnings = [last["warning"]] if last.get("warning") else []
+        return "".join([text, *(f"  \n⚠ {said}" for said in (*warnings, *self._troubles))])
+
+    def _gone(self) -> str:
+        if not self._last and not self._silent_since:
+            return f"waiting for `{self._target}` …"
+        self._silent_since = self._silent_since or time.strftime("%H:%M:%S")
+        return (
+            f"⚠ **`{self._target}` has ended, or hangs: no word since {self._silent_since}.** The picture shows its last "
+            "state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in another terminal): this page goes "
+            "on by itself when it is back."
+        )
+
+
+ENDED = "⚠ **The workbench has ended.** Start it again with `rigid_proto workbench` and load this page anew."
+"""What stands on the page when its server ends."""

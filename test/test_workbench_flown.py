@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""What the page shows of a body in flight is what the body does: string, energy, ghost, refusals. No browser, no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed: no interactive page")
+pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
+
+from flown_page import FlownLink, FlownPage  # noqa: E402
+
+from rigid_proto_ros.workbench import controls  # noqa: E402
+from rigid_proto_ros.workbench import page as page_module  # noqa: E402
+
+
+@pytest.fixture
+def flown(monkeypatch: pytest.MonkeyPatch) -> Iterator[FlownPage]:
+    monkeypatch.setattr(page_module, "RosLink", FlownLink)
+    monkeypatch.setattr(page_module, "GRACE_S", 0.0)
+    monkeypatch.setattr(controls, "TYPING_S", 0.0)
+    monkeypatch.setattr(controls, "TOUCHED_S", 0.0)
+    flown = FlownPage()
+    yield flown
+    flown.end()
+
+
+def test_a_drag_draws_the_string_from_the_grabbed_point_and_shows_the_energy_that_it_holds(flown: FlownPage) -> None:
+    flown.pick("Three pushes, three answers")
+    spout = [0.134, 0.0, 0.108]
+    place = flown.grab(spout)
+    flown.pull(place + [0.03, 0.0, 0.02])
+    flown.fly(0.3)
+    page, own = flown.page, flown.link.simulation
+    knot, hand = flown.do(lambda: page.acting.string_ends(page.scenario.setup, page.state))
+    tied = own.string
+    assert tied is not None
+    assert np.abs(hand - tied.free_end(own.time_ns)).max() < 1e-12
+    true_knot = own.state.position + own.state.rotation @ own.setup.body.point(tied.attach)
+    assert (
+        np.abs(knot - true_knot).max() < 1e-6
+    )  # stiffness aside, all is the node's own; positions are published in full
+    stretched = flown.do(lambda: page.acting.string_energy(page.scenario.setup, page.state))
+    assert stretched == pytest.approx(tied.potential_energy(own.setup.body, own.state), rel=1e-3)
+    assert not flown.said
+    flown.let_go()
+    flown.fly(0.1)
+    assert own.string is None and flown.do(lambda: page.acting.string_ends(page.scenario.setup, page.state)) is None
+
+
+def test_frames_that_bear_the_nodes_name_are_shown_and_what_cannot_be_is_said(flown: FlownPage) -> None:
+    flown.do(lambda: flown.link.wrench("poke", "rigid_body@point/0.0,0.0,0.07", (0.0, 1.0, 0.0)))
+    flown.fly(0.05)
+    page = flown.page
+    assert len(flown.do(lambda: page.acting.arrows(page.scenario.setup, page.state, 0.1))) == 1
+    assert not flown.said
+    line = '{"time_ns": 60000000, "kind": "poke", "content": {"frame_id": "moon", "force": [1, 0, 0], "torque": [0, 0, 0]}}'
+    flown.do(lambda: flown.link._heard.events.append(line))
+    flown.fly(0.05)
+    assert len(flown.said) == 1 and "doesn't show this poke" in flown.said[0] and "moon" in flown.said[0]
+
+
+def test_the_ghost_of_a_lesson_is_there_from_its_start_and_gone_in_the_next_one(flown: FlownPage) -> None:
+    page = flown.page
+    flown.fly(3.0)
+    flown.pick("The true tensor against the box's")
+    flown.fly(0.05)
+    alike, _ = flown.until(lambda: (ghost := page._ghost_row(False))[0] is not None and ghost, "ghost at the start")
+    assert np.abs(alike[3:7] - page.state.row[3:7]).max() < 0.02
+    flown.fly(2.0)
+    apart, _ = flown.until(lambda: (ghost := page._ghost_row(False))[0] is not None and ghost, "ghost later on")
+    assert np.abs(apart[3:7] - page.state.row[3:7]).max() > 0.3
+    flown.pick("One book, three throws")
+    flown.fly(0.5)
+    assert flown.link.scenario.ghost is None and page._ghost_row(False)[0] is None
+
+
+def test_a_command_that_the_ghosts_integrator_cannot_carry_is_said(flown: FlownPage) -> None:
+    flown.set("Its integrator", "taylor")
+    flown.reset()
+    flown.fly(0.1)
+    place = flown.grab([0.0, 0.0, 0.07])
+    flown.pull(place + [0.0, 0.1, 0.0])
+    flown.fly(0.1)
+    assert any("ghost doesn't take part" in text and "taylor" in text for text in flown.said)
