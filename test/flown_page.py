@@ -286,7 +286,11 @@ class FlownPage:
         self.do(lambda: self.page.pointer.pull((np.asarray(place) - view.origin) / view.unit))
 
     def let_go(self) -> None:
-        self.do(self.page.pointer.let_go)
+        def let_go() -> None:
+            self.page.pointer.let_go()
+            self.link.fly(0.01)  # the last target acts before the release comes
+
+        self.do(let_go)
         self.until(lambda: self.page.pointer._drag is None, "hand that lets go")
 
     def reset(self) -> None:

@@ -40,9 +40,7 @@ def test_a_drag_draws_the_string_from_the_grabbed_point_and_shows_the_energy_tha
     assert tied is not None
     assert np.abs(hand - tied.free_end(own.time_ns)).max() < 1e-12
     true_knot = own.state.position + own.state.rotation @ own.setup.body.point(tied.attach)
-    assert (
-        np.abs(knot - true_knot).max() < 1e-6
-    )  # stiffness aside, all is the node's own; positions are published in full
+    assert np.abs(knot - true_knot).max() < 1e-12
     stretched = flown.do(lambda: page.acting.string_energy(page.scenario.setup, page.state))
     assert stretched == pytest.approx(tied.potential_energy(own.setup.body, own.state), rel=1e-3)
     assert not flown.said
