@@ -7,7 +7,7 @@ doesn't carry it.
 
 from __future__ import annotations
 
-from .core.commands import Change, Command
+from .core.commands import Change, Command, Listed
 from .core.errors import InputError
 from .core.observer import Observer
 from .core.simulation import Simulation
@@ -31,21 +31,23 @@ class Ghost:
         self._observer = observer
         self.announce()
 
-    def submit(self, command: Command, when_ns: int) -> None:
+    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
         """Take a command of the followed simulation; what the ghost can't carry passes it by."""
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
         try:
-            self.simulation.submit(command, when_ns)
+            self.simulation.submit(command, when_ns, listed)
         except InputError:
             pass
 
-    def change(self, time_ns: int, scenario: Scenario) -> None:
-        """The followed scenario changed at ``time_ns``; one without a ghost leaves this one out of sight."""
+    def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
+        """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one out of
+        sight.
+        """
         setup = scenario.ghost
         self._shown = setup is not None
         if setup is not None:
-            self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns))
+            self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
             self._observer.ghost_began(time_ns, self.simulation.snapshot(setup))
 
     def reset(self, scenario: Scenario) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 from .body import Body
 from .loads import LOADS_SIZE, Load
 
-NEVER = 1 << 63
-"""Later than any simulated time [ns]."""
+NEVER = 1 << 62
+"""Later than any simulated time [ns], and an int64."""
 
 
 @dataclass(slots=True, eq=False)
@@ -34,32 +34,29 @@ class Acting:
 
 
 class ActingLoads:
-    """held: the wrench of the last held command, if it still acts; it comes first in every sum, then the pulses in their order.
-
-    next_end_ns: when the first of them ends.
+    """All in the order in which they began to act, which is that of every sum. held: that of the last held command, if it
+    still acts. next_end_ns: when the first of them ends.
     """
 
     def __init__(self) -> None:
         self.held: Acting | None = None
-        self.pulses: list[Acting] = []
+        self._parts: list[Acting] = []
         self.next_end_ns = NEVER
 
     def __iter__(self) -> Iterator[Acting]:
-        if self.held is not None:
-            yield self.held
-        yield from self.pulses
+        return iter(self._parts)
 
     def __bool__(self) -> bool:
-        return self.held is not None or bool(self.pulses)
+        return bool(self._parts)
 
     def hold(self, acting: Acting) -> None:
         """Take a held wrench; the one before must have been ended."""
         self.held = acting
-        self.next_end_ns = min(self.next_end_ns, acting.end_ns)
+        self.add(acting)
 
     def add(self, acting: Acting) -> None:
         """Take a pulse."""
-        self.pulses.append(acting)
+        self._parts.append(acting)
         self.next_end_ns = min(self.next_end_ns, acting.end_ns)
 
     def hold_until(self, end_ns: int) -> None:
@@ -72,25 +69,26 @@ class ActingLoads:
         """End the held wrench; returns what ended."""
         if self.held is None:
             return []
-        ended, self.held = [self.held], None
+        ended, self.held = self.held, None
+        self._parts.remove(ended)
         self._find_next_end()
-        return ended
+        return [ended]
 
     def end_due(self, now_ns: int) -> list[Acting]:
         """End what ends at ``now_ns`` or should have before; returns it."""
         if now_ns < self.next_end_ns:
             return []
-        held = self.held
-        ended = self.end_held() if held is not None and held.end_ns <= now_ns else []
-        ended += [pulse for pulse in self.pulses if pulse.end_ns <= now_ns]
-        self.pulses = [pulse for pulse in self.pulses if pulse.end_ns > now_ns]
+        ended = [part for part in self._parts if part.end_ns <= now_ns]
+        self._parts = [part for part in self._parts if part.end_ns > now_ns]
+        if self.held in ended:
+            self.held = None
         self._find_next_end()
         return ended
 
     def end_all(self) -> list[Acting]:
         """End everything; returns it."""
-        ended = list(self)
-        self.held, self.pulses, self.next_end_ns = None, [], NEVER
+        ended, self._parts = self._parts, []
+        self.held, self.next_end_ns = None, NEVER
         return ended
 
     def sum(self, body: Body) -> np.ndarray:
@@ -101,6 +99,4 @@ class ActingLoads:
         return total
 
     def _find_next_end(self) -> None:
-        self.next_end_ns = NEVER if self.held is None else self.held.end_ns
-        for pulse in self.pulses:
-            self.next_end_ns = min(self.next_end_ns, pulse.end_ns)
+        self.next_end_ns = min((part.end_ns for part in self._parts), default=NEVER)

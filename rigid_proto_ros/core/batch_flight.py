@@ -17,6 +17,7 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from . import batch_body as b
 from . import problem as pr
+from .acting import NEVER
 from .compilation import njit
 from .integrators import control as ctl
 from .integrators.auto import ANY_LOADS, FREE, STEADY, TURNING_LOADS, kind_of_segment
@@ -46,7 +47,6 @@ AUTO, ONE_EXACT_STEP, FIXED_STEPS = range(3)
 """How an integrator steps."""
 
 _STEADY, _FREE, _FIXED, _TAYLOR, _SERIES, _ASLEEP = range(6)
-NEVER = 1 << 62
 
 # That functions as values are experimental is no news for users: a test holds every state to the simulation's bits.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -269,18 +269,19 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
     common = np.zeros(pr.SIZE)
     _problem_of_body(body, settings, gyroscopic, common)
     pulses, ends_ns = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    running, held, held_end_ns, pending = 0, -1, NEVER, 0
+    running, held, held_end_ns, before_held, pending = 0, -1, NEVER, 0, 0
     start_ns, committed_ns, method, fresh = 0, 0, _ASLEEP, True
     for look in range(looks_ns.shape[0]):
         while True:
             if fresh:
-                # A new segment: loads summed in their order, the held wrench first.
+                # A new segment: loads summed in the order in which they began to act.
                 fresh = False
                 sums[:] = 0.0
-                if held >= 0:
-                    _add(loads[held], body, r, f, sums)
-                for k in range(running):
-                    _add(loads[pulses[k]], body, r, f, sums)
+                for k in range(running + 1):
+                    if held >= 0 and k == before_held:
+                        _add(loads[held], body, r, f, sums)
+                    if k < running:
+                        _add(loads[pulses[k]], body, r, f, sums)
                 start[:] = row
                 p[:] = common
                 pr.begin_problem(p, sums, row)
@@ -316,12 +317,14 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
             # What ends, then what begins; then a new segment.
             if held >= 0 and held_end_ns <= event_ns:
                 held = -1
-            kept = 0
+            kept, kept_before_held = 0, 0
             for k in range(running):
                 if ends_ns[k] > event_ns:
                     pulses[kept], ends_ns[kept] = pulses[k], ends_ns[k]
                     kept += 1
-            running = kept
+                    if k < before_held:
+                        kept_before_held += 1
+            running, before_held = kept, kept_before_held
             while pending < count and commands[pending, AT_NS] == event_ns:
                 kind = commands[pending, KIND]
                 load = loads[pending]
@@ -337,7 +340,7 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
                     if kind == CLEAR:
                         running = 0
                     elif _any(load, FORCE) or _any(load, TORQUE):
-                        held = pending
+                        held, before_held = pending, running
                         timeout_ns = times[b.TIMEOUT_NS]
                         held_end_ns = event_ns + timeout_ns if timeout_ns else NEVER
                 pending += 1

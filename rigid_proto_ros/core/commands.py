@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Commands as the simulation takes them, and the order in which equal times act.
 
-Commands that act at the same nanosecond act in the order of ``Rank``, then by the bytes of their message, never by arrival:
-four publishers in any order give one trajectory.
+Commands that act at the same nanosecond act in the order of ``order_key``, never by arrival: four publishers in any order give
+one trajectory.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FARTHEST = 1e100
 
 
 class Rank(IntEnum):
-    """Order of commands at one instant."""
+    """Order of single messages at one instant."""
 
     CHANGE = 0  # parameter changes and services
     INERTIA = 1
@@ -163,6 +163,16 @@ def _check_point(field: str, point) -> None:
     if not all(abs(x) <= FARTHEST for x in point):
         raise CommandRefused("magnitude", field, list(point), f"at most {FARTHEST:g} m")
 
+
+def order_key(command: Command, listed: Listed | None) -> tuple:
+    """What decides among commands of one instant: first the entries of lists, each list's in its own order and lists by their
+    bytes; then single messages by rank and bytes.
+    """
+    return (0, *listed) if listed is not None else (1, command.rank, command.message)
+
+
+Listed = tuple[bytes, int]
+"""The bytes of the list that a command is an entry of, and its number there."""
 
 Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
 

@@ -2,7 +2,7 @@
 """The frame of a wrench: which axes its numbers are in, and which point of the body it attacks.
 
 A frame is written ``axes@point[;duration=<s>|;impulse]``; README and docs list the forms. This module only reads the text;
-where the point lies is settled when the command takes effect (``attachment``).
+where the point lies on the body is settled by core/loads.py.
 """
 
 from __future__ import annotations

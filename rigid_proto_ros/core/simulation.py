@@ -20,11 +20,13 @@ from .commands import (
     Change,
     ClearWrench,
     Command,
+    Listed,
     MoveString,
     Pending,
     ReleaseString,
     TieString,
     WrenchCommand,
+    order_key,
 )
 from .errors import CommandRefused, InputError
 from .event_log import EventLog
@@ -44,14 +46,15 @@ from .string_control import StringControl
 class Follower(Protocol):
     """Whoever takes the same commands at the same times, such as a ghost."""
 
-    def submit(self, command: Command, when_ns: int) -> None: ...
+    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None: ...
 
 
 class Simulation(Readings):
     """One body under commands; what can be read off it is in readings.py.
 
     Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
-    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty.
+    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place of the
+    command that acts at this moment in its list, if it is an entry of one.
     """
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
@@ -95,25 +98,28 @@ class Simulation(Readings):
 
     # The way of a command
 
-    def submit(self, command: Command, at_ns: int | None = None) -> int:
+    def submit(self, command: Command, at_ns: int | None = None, listed: Listed | None = None) -> int:
         """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
 
-        Raises CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
+        listed: its place, when it is an entry of a list; a change before it there may allow what the present setup doesn't,
+        so whoever submits a list judges its entries (``judge``). Raises CommandRefused for what can be judged now; what can't
+        (a ray) is judged when it acts, and counted.
         """
         when_ns = self.time_ns if at_ns is None else max(at_ns, self.time_ns)
         setup, load = self.setup, None
-        if isinstance(command, WrenchCommand):
-            load = self._settled(command, None)
-        elif isinstance(command, MoveString):
-            check_carried(setup.integrator, frozenset({STRING}))
+        try:
+            load = judge(command, setup)
+        except CommandRefused:
+            if listed is None:
+                raise
         self._arrivals += 1
         pending = Pending(when_ns, command)
         if load is not None and command.frame.point[0] != "ray":
             pending.load, pending.settled_for = load, setup
-        # Time, rank, message: arrival decides only between messages that are equal to the byte.
-        heapq.heappush(self._pending, (when_ns, command.rank, command.message, self._arrivals, pending))
+        # Arrival decides only between messages that are equal to the byte.
+        heapq.heappush(self._pending, (when_ns, order_key(command, listed), self._arrivals, pending, listed))
         if self.follower is not None:
-            self.follower.submit(command, when_ns)
+            self.follower.submit(command, when_ns, listed)
         return when_ns
 
     def refuse(self, error: CommandRefused) -> None:
@@ -180,7 +186,7 @@ class Simulation(Readings):
         changed = self._tell_ended(self.acting.end_due(now_ns))
         changed |= self._string.end_due(now_ns)
         while self._pending and self._pending[0][0] == now_ns:
-            pending = heapq.heappop(self._pending)[-1]
+            *_, pending, self.listed = heapq.heappop(self._pending)
             try:
                 self._apply(pending)
                 changed = True
@@ -188,6 +194,7 @@ class Simulation(Readings):
                 self.refuse(refusal)
             except InputError as error:
                 self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
+        self.listed = None
         if changed:
             self._segment.cut(now_ns)
             self._finish_segment()
@@ -221,21 +228,9 @@ class Simulation(Readings):
         if before is not None and before.surface is setup.surface:
             if before.body is not setup.body:
                 pending.load.check_magnitude(setup.body)
-            self._check_carried(pending.command, pending.load)
+            _check_load_carried(pending.command, pending.load, setup)
             return pending.load
-        return self._settled(pending.command, self.state)
-
-    def _settled(self, command: WrenchCommand, state: State | None) -> Load:
-        setup = self.setup
-        load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
-        load.check_magnitude(setup.body)
-        self._check_carried(command, load)
-        return load
-
-    def _check_carried(self, command: WrenchCommand, load: Load) -> None:
-        # An impulse acts at once: the integrator never sees it.
-        if not command.frame.impulse:
-            check_carried(self.setup.integrator, needs_of_load(load))
+        return _settled(pending.command, setup, self.state)
 
     def _begin_load(self, command: WrenchCommand, load: Load) -> None:
         self._load_ids += 1
@@ -304,6 +299,7 @@ class Simulation(Readings):
 
     def _start_over(self) -> None:
         self._pending: list[tuple] = []
+        self.listed: Listed | None = None
         self.acting = ActingLoads()
         self._finished_steps = 0
         self._finished_evaluations = 0
@@ -323,6 +319,30 @@ class Simulation(Readings):
         self.time_ns = self.state.time_ns
         self.failure = str(failed)
         self._finish_segment()
+
+
+def judge(command: Command, setup: Setup) -> Load | None:
+    """The load of a command as far as it can be settled before it acts, None for what is none; raises CommandRefused for what a
+    body of this setup can't take.
+    """
+    if isinstance(command, WrenchCommand):
+        return _settled(command, setup, None)
+    if isinstance(command, MoveString):
+        check_carried(setup.integrator, frozenset({STRING}))
+    return None
+
+
+def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> Load:
+    load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
+    load.check_magnitude(setup.body)
+    _check_load_carried(command, load, setup)
+    return load
+
+
+def _check_load_carried(command: WrenchCommand, load: Load, setup: Setup) -> None:
+    # An impulse acts at once: the integrator never sees it.
+    if not command.frame.impulse:
+        check_carried(setup.integrator, needs_of_load(load))
 
 
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
