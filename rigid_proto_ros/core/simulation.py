@@ -65,6 +65,7 @@ class Simulation(Readings):
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
+        self.listed: Listed | None = None
         self._load_ids = 0
         check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
         self._start_over()
@@ -299,7 +300,7 @@ class Simulation(Readings):
 
     def _start_over(self) -> None:
         self._pending: list[tuple] = []
-        self.listed: Listed | None = None
+        self.listed = None
         self.acting = ActingLoads()
         self._finished_steps = 0
         self._finished_evaluations = 0
