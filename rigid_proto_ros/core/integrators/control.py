@@ -21,7 +21,12 @@ PENDING = 6  # evaluations spent on the step that waits
 FLOOR_BINDS = 7  # 1 once rounding, not the accuracy, set the allowance of a step
 FAILED = 8  # 1 when a nanosecond would be too long a step, or the motion ran away
 SERIES = 9  # 1 while the workspace holds the series from the committed variables on
-SIZE = 10
+# Of the step that waits, where the string's law changes within it (integrators/series_steps.py):
+LAW = 10  # the string's law at its start
+SWITCH = 11  # time after which the last series holds and no more the first [s]; infinite for none
+LAST_START = 12  # where the last series starts [s]
+LAST_LAW = 13  # the law of the last series
+SIZE = 14
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""

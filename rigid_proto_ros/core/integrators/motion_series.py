@@ -38,6 +38,7 @@ from .knot import knot_and_stretch, moved_pair, unit_attitude
 
 # Columns of the coefficient array c (degree + 2, COLUMNS); the first 15 are the variables of core/motion.py.
 _Q, _W, _D, _U, _WORK, _HEAT, _R, A_KNOT, _N, _L, _T, _F, _STRETCH = 0, 4, 7, 10, 13, 14, 15, 24, 27, 30, 31, 32, 35
+DISTANCE, TENSION, STRETCH = _L, _T, _STRETCH
 COLUMNS = 36
 
 
@@ -82,6 +83,13 @@ def _length(c, k):
         if 0 < i < k:
             rest += c[i, _L] * c[j, _L]
     c[k, _L] = (square - rest) / (2.0 * c[0, _L])
+
+
+@njit(cache=True, error_model="numpy")
+def distance_series(c, degree):
+    """Fill in the knot's distance for a string that doesn't pull, whose motion needs it not."""
+    for k in range(1, degree + 1):
+        _length(c, k)
 
 
 @njit(cache=True, error_model="numpy")
