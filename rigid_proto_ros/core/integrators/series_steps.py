@@ -61,7 +61,7 @@ def _lay_out(y, p, control, weights, c):
     degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
     part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
-    series, last = c[: degree + 2], c[2 * (degree + 2)]
+    series, last = c, c[2 * (degree + 2)]
     start = y
     law = law_of(y, p)
     control[ctl.LAW], control[ctl.SWITCH] = law, math.inf
@@ -105,7 +105,7 @@ def _reach(y, p, control, c, time_ns, out):
     degree, t = int(control[ctl.DEGREE]), time_ns * 1e-9
     if t <= control[ctl.SWITCH]:
         out[:] = y
-        _move(c[: degree + 2], p, degree, t, control[ctl.LAW], out)
+        _move(c, p, degree, t, control[ctl.LAW], out)
     else:
         out[:] = c[2 * (degree + 2)][:STORED]
         _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control[ctl.LAST_START], control[ctl.LAST_LAW], out)
