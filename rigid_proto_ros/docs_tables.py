@@ -20,6 +20,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from . import __version__
+from .bundled import body_names
+from .core.inertia_tensor import principal_axes
 from .core.integrators import INTEGRATORS
 from .core.integrators.integrator import (
     ANGULAR_DAMPING,
@@ -31,10 +33,12 @@ from .core.integrators.integrator import (
 )
 from .interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from .lessons import lesson, lessons
+from .mesh_body import mesh_body
+from .mesh_inspection import inspect_mesh
+from .mesh_io import load_mesh
 from .parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENTS = ("README.md", "docs/physics.md", "docs/architecture.md")
 
 _MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -99,8 +103,8 @@ def modules() -> str:
     return "\n".join([*lines[1:], ""])
 
 
-def masses() -> str:
-    """Mass properties here and elsewhere, from the last benchmark's own numbers."""
+def masses(short: bool = False) -> str:
+    """Mass properties here and elsewhere, from the last benchmark's own numbers. short: the README's choice of tools and errors."""
     with (ROOT / "benchmarks" / "results" / "mass_properties.csv").open(encoding="utf-8", newline="") as file:
         measured = [row for row in csv.DictReader(file) if row["what"] == "mass properties"]
     found = {
@@ -108,10 +112,15 @@ def masses() -> str:
     }
     rows = []
     for tool in dict.fromkeys(row["tool"] for row in measured):
+        if short and tool not in _SHORT_MASSES:
+            continue
         place = found[tool, "ellipsoid 100k", "base"]
         errors = [found[tool, mesh, at]["inertia_error"] for mesh, at in _INERTIA_ERRORS]
         time = f"{float(place['ns_per_triangle']):,.0f}"
         rows.append((tool, place["version"], time, *(_error(error) for error in errors)))
+    if short:
+        head = ("tool", "ns per triangle", "error at the origin", "moved by 10³", "moved by 10⁶")
+        return _table(head, ((tool, *cells[1:5]) for tool, *cells in rows))
     sentence = f"Measured {place['date'][:10]} on one {place['cpu']}, in one process, medians."
     head = (
         "tool",
@@ -124,6 +133,8 @@ def masses() -> str:
     )
     return f"{sentence}\n\n{_table(head, rows)}"
 
+
+_SHORT_MASSES = ("rigid_proto", "trimesh", "igl.moments", "MuJoCo compile, exact", "Drake")
 
 _INERTIA_ERRORS = (
     ("ellipsoid 100k", "base"),
@@ -139,8 +150,9 @@ def _error(text: str) -> str:
     return "refuses" if math.isnan(value) else f"{value:.0e}"
 
 
-def motions() -> str:
-    """Motion here and elsewhere: each tool's most accurate run of a problem, from the last benchmark's own numbers."""
+def motions(short: bool = False) -> str:
+    """Motion here and elsewhere: each tool's most accurate run of a problem, from the last benchmark's own numbers. short: without
+    versions and date."""
     with (ROOT / "benchmarks" / "results" / "work_precision.csv").open(encoding="utf-8", newline="") as file:
         measured = [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
     ours = [row for row in measured if row["tool"] == "ours" and row["integrator"] == "auto"]
@@ -157,6 +169,8 @@ def motions() -> str:
         (_TOOLS.get(tool, tool), versions[tool], *(_best_run(best.get((tool, problem))) for problem in _MOTIONS))
         for tool in versions
     ]
+    if short:
+        return _table(("tool", *_MOTIONS.values()), ((tool, *cells) for tool, _, *cells in rows))
     newest = max(measured, key=lambda row: row["date"])
     sentence = f"Measured {newest['date'][:10]} on one {newest['cpu']}, in one process, medians of whole runs."
     return f"{sentence}\n\n{_table(('tool', 'version', *_MOTIONS.values()), rows)}"
@@ -184,7 +198,7 @@ def _best_run(row: dict[str, str] | None) -> str:
         return "not run"
     error = _attitude_error(row)
     if error > 0.1:
-        return "lost"
+        return "error > 0.1 rad"
     milliseconds = 1e3 * float(row["median_s"])
     time = f"{milliseconds:.0f}" if milliseconds >= 10.0 else f"{milliseconds:.2g}"
     return f"{error:.0e} rad in {time} ms"
@@ -205,6 +219,18 @@ def lesson_to_try(name: str) -> str:
     return "\n".join(f"{number}. {sentence}" for number, sentence in enumerate(lesson(name).sentences, 1))
 
 
+def bodies() -> str:
+    """The bundled bodies with sizes and masses, from their meshes."""
+    rows = []
+    for name in body_names():
+        inspected = inspect_mesh(mesh_body(load_mesh(name)))
+        size = " × ".join(f"{100.0 * length:.3g}" for length in inspected.upper - inspected.lower)
+        moments, _ = principal_axes(inspected.chosen.inertia)
+        ratios = " : ".join(f"{moment / moments[0]:.3g}" for moment in moments)
+        rows.append((_code(name), size, f"{1e6 * inspected.volume:,.0f}", ratios))
+    return _table(("name", "size x × y × z [cm]", "volume [cm³]", "principal moments A : B : C"), rows)
+
+
 TABLES = {
     "topics": topics,
     "services": services,
@@ -212,8 +238,11 @@ TABLES = {
     "integrators": integrators,
     "modules": modules,
     "masses": masses,
+    "masses_short": lambda: masses(short=True),
+    "bodies": bodies,
     "lessons": lesson_table,
     "motions": motions,
+    "motions_short": lambda: motions(short=True),
 }
 
 
@@ -229,7 +258,7 @@ def filled(text: str) -> str:
 
 def documents() -> list[Path]:
     """The documents that hold tables."""
-    return [ROOT / name for name in DOCUMENTS if (ROOT / name).is_file()] + sorted(ROOT.glob("docs/lessons/*.md"))
+    return [path for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))) if path.is_file()]
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -9,9 +9,12 @@ import shlex
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import yaml
 
@@ -23,9 +26,11 @@ from rigid_proto_ros.offline import OfflineRun, read_scene
 from rigid_proto_ros.poke_script import parse_script, read_script
 from rigid_proto_ros.ros.poke_client import main as poke_client
 from rigid_proto_ros.scenario import nanoseconds
+from rigid_proto_ros.session_reader import read_runs
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 README = SOURCE / "README.md"
+REFERENCE = SOURCE / "docs" / "reference.md"
 pytestmark = pytest.mark.skipif(not README.is_file(), reason="not run from a source tree")
 
 DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if README.is_file() else []
@@ -47,12 +52,16 @@ def blocks(path: Path, *languages: str) -> list[str]:
 
 
 def commands() -> Iterator[str]:
-    """Every command line in a shell block of the documents, and in the head of the examples."""
+    """Every command line in a shell block of the documents and in a row of the README's tables, and in the head of the examples."""
     for path in DOCUMENTS:
         for block in blocks(path, "sh", "bash", "console"):
             for line in block.splitlines():
                 if line.strip() and not line.startswith("#"):
                     yield line.strip()
+        if path == README:
+            yield from re.findall(
+                r"^\|.*`((?:rigid_proto|poke_client) [^`]+)` \|$", path.read_text("utf-8"), re.MULTILINE
+            )
     for name in example_names():
         for line in example_path(name).read_text("utf-8").splitlines():
             if re.match(r"#   \S", line):
@@ -76,7 +85,6 @@ def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with the scenes and examples beside it, as commands from the repository's root expect."""
     for name in ("config", "msg_examples"):
         (tmp_path / name).symlink_to(SOURCE / name)
-    (tmp_path / "out").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -225,27 +233,88 @@ def _submit(run: OfflineRun, topic: str, message) -> None:
     simulation.submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id, b""))
 
 
+def things_to_try() -> list[str]:
+    """The commands of README's three things to try."""
+    section = README.read_text("utf-8").partition("## Three things to try")[2].partition("\n## ")[0]
+    return [line.strip() for line in section.splitlines() if line.strip().startswith("poke_client")]
+
+
+MINUTE_S = 60.0
+
+
 @pytest.mark.slow
-def test_three_things_to_try_reach_a_running_node(ros_environment: dict[str, str]) -> None:
+def test_three_things_to_try_do_what_the_readme_says_in_their_order_with_a_minute_between(
+    ros_environment: dict[str, str], tmp_path: Path
+) -> None:
     pytest.importorskip("rclpy")
-    text = README.read_text("utf-8")
-    section = text[text.index("### Three things to try") : text.index("### Frames and units")]
-    lines = [line.strip() for line in section.splitlines() if line.strip().startswith("poke_client")]
+    pytest.importorskip("mcap")
+    lines = things_to_try()
     assert len(lines) == 3
-    # Ten seconds of script fly in 2.5 s; the lead of simulated time is 2 s of the clock, lest a busy machine be late.
-    scene = ["--ros-args", "--params-file", "config/t_handle.yaml", "-p", "real_time_factor:=4.0"]
+    session, faster = tmp_path / "session.mcap", 20.0
+    scene = ["--ros-args", "--params-file", "config/t_handle.yaml", "-p", f"real_time_factor:={faster}"]
+    scene += ["-p", f"record:={session}"]
     node = subprocess.Popen([sys.executable, "-m", "rigid_proto_ros.ros.main", *scene], env=ros_environment, cwd=SOURCE)
     try:
         for line in lines:
-            command = [sys.executable, "-m", "rigid_proto_ros.ros.poke_client", *words(line)[1:], "--lead", "8"]
+            command = [sys.executable, "-m", "rigid_proto_ros.ros.poke_client", *words(line)[1:], "--timeout", "120"]
             done = subprocess.run(
-                command, env=ros_environment, capture_output=True, text=True, timeout=180, check=False
+                command, env=ros_environment, cwd=SOURCE, capture_output=True, text=True, timeout=180, check=False
             )
             assert done.returncode == 0, (line, done.stdout, done.stderr)
             assert "0 late, 0 refused" in done.stdout
+            time.sleep(1.5 * MINUTE_S / faster)
     finally:
         node.terminate()
         assert node.wait(timeout=180.0) == 0
+    runs = read_runs(str(session))[-3:]
+    assert all(run.times[-1] > MINUTE_S * 1e9 for run in runs)
+    inertia = read_scene("t_handle").setup.body.inertia
+    left_alone, _ = rhythm(flown("t_handle"))
+    assert left_alone == pytest.approx(2.7, abs=0.05)
+    poked, braked, pulled = runs
+    # Measured 1.298, 4.052 s; |L| 1.2049 and 0.6050 mN m s.
+    assert rhythm(poked)[0] == pytest.approx(1.3, abs=0.05)
+    assert rhythm(braked)[0] == pytest.approx(4.0, abs=0.1)
+    sizes = [1e3 * np.linalg.norm(inertia @ row[10:13]) for row in (braked.rows[0], braked.rows[-1])]
+    assert sizes == pytest.approx([1.2, 0.6], abs=0.01)
+    up = {round(ns / 1e9, 2): row[2] for ns, row in zip(pulled.times.tolist(), pulled.rows, strict=True)}
+    assert up[1.0] == 0.0 and up[2.0] == pytest.approx(0.12, abs=0.005)
+    # Let go after 7 s: no force from then on.
+    velocities = pulled.rows[pulled.times > 7_020_000_000, 7:10]
+    assert len(velocities) and np.ptp(velocities, axis=0).max() == 0.0
+
+
+def flown(scene: str):
+    """States of a scene left alone for 25 s, as a session holds them."""
+    run, times, rows = OfflineRun(read_scene(scene)), np.arange(2500) * 10_000_000, []
+    for time_ns in times.tolist():
+        run.advance(time_ns)
+        rows.append(run.simulation.state.row.copy())
+    return SimpleNamespace(times=times, rows=np.array(rows))
+
+
+def rhythm(run) -> tuple[float, int]:
+    """Mean time between flips [s] and their number: the sign of ω along the stem, in body axes."""
+    along = np.sign(run.rows[:, 12])
+    flips = run.times[1:][along[1:] != along[:-1]] / 1e9
+    flips = flips[flips > 4.0]  # what acts, acts before
+    return float(np.diff(flips).mean()), len(flips)
+
+
+def test_true_and_box_tensor_part_as_the_readme_says() -> None:
+    text = README.read_text("utf-8")
+    stated = float(re.search(r"after 1 s their attitudes differ by (\d+)°", text)[1])
+    ends = []
+    for model in ("solid", "bounding_box"):
+        run = OfflineRun(read_scene("true_or_box_tensor", {"inertia_model": model}))
+        run.advance(1_000_000_000)
+        ends.append(run.simulation.state.row[3:7])
+    # Measured 117.3°.
+    assert np.degrees(2.0 * np.arccos(abs(ends[0] @ ends[1]))) == pytest.approx(stated, abs=0.5)
+
+
+def test_readme_is_short() -> None:
+    assert len(README.read_text("utf-8").splitlines()) <= 160
 
 
 @pytest.mark.parametrize("name", example_names())
@@ -294,11 +363,10 @@ def test_picture_is_there_and_small() -> None:
     assert 20_000 < picture.stat().st_size < 300_000
 
 
-def test_frames_of_the_readme_are_read_and_are_what_it_says() -> None:
+def test_frames_of_the_reference_are_read_and_are_what_it_says() -> None:
     from rigid_proto_ros.core.frames import parse_frame
 
-    text = README.read_text("utf-8")
-    section = text[text.index("### Frames and units") : text.index("## Is it right?")]
+    section = REFERENCE.read_text("utf-8").partition("## Frames and units")[2].partition("\n## ")[0]
     rows = [line.split("|")[2] for line in section.splitlines() if line.startswith("| a ")]
     frames = [code for row in rows for code in re.findall(r"`([^`]+)`", row) if code != "force.x"]
     assert len(frames) >= 10
@@ -311,8 +379,8 @@ def test_frames_of_the_readme_are_read_and_are_what_it_says() -> None:
 
 def test_tables_are_the_codes(capsys: pytest.CaptureFixture) -> None:
     assert docs_tables.main(["--check"]) == 0, capsys.readouterr().err
-    text = README.read_text("utf-8")
-    for name in ("topics", "services", "parameters"):
+    text = REFERENCE.read_text("utf-8")
+    for name in ("topics", "services", "parameters", "bodies"):
         assert f"<!-- table: {name} -->" in text
 
 
@@ -324,8 +392,8 @@ def test_a_table_that_is_behind_is_found_and_mended() -> None:
     assert docs_tables.filled(new) == new
 
 
-def test_every_scene_stands_in_the_readme() -> None:
-    text = README.read_text("utf-8")
+def test_every_scene_stands_in_the_list_of_lessons() -> None:
+    text = (SOURCE / "docs" / "lessons" / "README.md").read_text("utf-8")
     for name in scene_names():
         assert f"`{name}`" in text, name
 
