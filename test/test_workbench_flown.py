@@ -84,3 +84,42 @@ def test_a_command_that_the_ghosts_integrator_cannot_carry_is_said(flown: FlownP
     flown.pull(place + [0.0, 0.1, 0.0])
     flown.fly(0.1)
     assert any("ghost doesn't take part" in text and "taylor" in text for text in flown.said)
+
+
+def slider_below(flown: FlownPage, label: str):
+    """The slider that is added right after an input."""
+    widgets = list(flown._widgets())
+    return widgets[next(k for k, w in enumerate(widgets) if getattr(w, "label", None) == label) + 1]
+
+
+@pytest.mark.parametrize("label, of", [("Size ×", "scale"), ("Mass ×", "mass"), ("Force ×", "")])
+def test_a_factors_box_holds_the_factor_itself_and_its_slider_the_logarithm(flown, label: str, of: str) -> None:
+    page, box, slider = flown.page, flown.widget(label), slider_below(flown, label)
+    body = page.scenario.setup.body
+
+    def factor() -> float:
+        if of == "":
+            return page.tools.force / page.usual_force
+        now = page.scenario.setup.body
+        return now.scale[0] / body.scale[0] if of == "scale" else now.mass / body.mass
+
+    assert box.value == "1" and slider.value == (0.0,)
+    flown.set(label, "2")
+    assert factor() == pytest.approx(2.0, rel=1e-8)
+    assert slider.value == pytest.approx((0.3,), abs=0.002)
+    flown._update(slider, (-1.0,))
+    assert factor() == pytest.approx(0.1, rel=1e-2) and float(box.value) == pytest.approx(0.1, rel=1e-2)
+    before = factor()
+    flown.set(label, "two")
+    flown.until(lambda: flown.said, "word of what can't be read")
+    assert "'two'" in flown.said[0] and "a number" in flown.said[0]
+    assert factor() == before and float(box.value) == pytest.approx(before, rel=1e-3)
+
+
+def test_the_ballast_form_shows_the_prepared_weight_at_its_place(flown: FlownPage) -> None:
+    flown.do(lambda: flown.link.set_parameters({"ballast.tip": [0.0, 0.0, 0.0, 0.07]}))
+    flown.settle()
+    assert [flown.widget(label).value for label in ("Weight", "Its mass [kg]", "At x y z")] == ["tip", "0", "0 0 0.07"]
+    flown.set("Its mass [kg]", "heavy")
+    flown.press("Put it there")
+    assert len(flown.said) == 1 and "'heavy'" in flown.said[0]

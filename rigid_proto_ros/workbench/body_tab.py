@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .page import Page
 
 OWN_FILE = "(a file)"
+ANOTHER = "(another one)"
 
 
 class BodyTab:
@@ -34,6 +35,7 @@ class BodyTab:
         self._gui = page.server.gui
         self._base_scale = self._base_mass = 1.0
         self._judged_mesh: tuple = ()
+        self._weights: dict[str, list[float]] = {}
         with tabs.add_tab("Body"):
             self._mesh_folder()
             self._size_and_mass_folder()
@@ -49,7 +51,7 @@ class BodyTab:
         self._table.content = comparison(scenario)
         mesh = str(scenario.values["mesh"])
         self._file.content = "" if mesh in body_names() else f"Mesh file: `{Path(mesh).name}`"
-        self._list.content = _ballast_list(scenario)
+        self._ballast_changed(scenario)
         key = tuple(scenario.values[name] for name in ("mesh", "mesh_repair", "mesh_fallback"))
         if key != self._judged_mesh and scenario.body_mesh is not None:
             self._judged_mesh = key
@@ -158,20 +160,45 @@ class BodyTab:
 
     def _ballast_folder(self) -> None:
         gui = self._gui
-        with gui.add_folder("Ballast", expand_by_default=False):
-            self._list = gui.add_markdown("")
-            name = gui.add_text("Name", "weight", hint="Letters, digits and _; an old name is changed")
-            mass = gui.add_text("Its mass [kg]", "0")
-            place = gui.add_text("At x y z", "0 0 0", hint="Mesh coordinates")
+        with gui.add_folder("Ballast"):
+            self._weight = weight = gui.add_dropdown("Weight", (ANOTHER,), initial_value=ANOTHER)
+            self._name = name = gui.add_text("Its name", "weight", hint="Small letters, digits and _")
+            self._weight_mass = mass = gui.add_text("Its mass [kg]", "0", hint="0 takes it off")
+            self._place = place = gui.add_text("At x y z", "0 0 0", hint="Mesh coordinates")
             put = gui.add_button("Put it there")
+
+        @weight.on_update
+        async def _(event) -> None:
+            if event.client is not None:
+                self._show_weight()
 
         @put.on_click
         async def _(event) -> None:
             numbers = read_numbers(f"{mass.value} {place.value}", 4)
-            if numbers is None or not re.fullmatch(r"[a-z][a-z0-9_]*", name.value):
-                self._page.say("Ballast: a name of small letters, a mass, and three mesh coordinates")
+            chosen = name.value if weight.value == ANOTHER else weight.value
+            if numbers is None or not re.fullmatch(r"[a-z][a-z0-9_]*", chosen):
+                received = f"got {chosen[:40]!r}, {mass.value[:40]!r}, {place.value[:80]!r}"
+                self._page.say(f"Ballast: {received}; accepted: a name of small letters, a mass, three coordinates")
             else:
-                self._page.set({f"ballast.{name.value}": numbers})
+                self._page.set({f"ballast.{chosen}": numbers})
+
+    def _ballast_changed(self, scenario: Scenario) -> None:
+        weights = {n.removeprefix("ballast."): v for n, v in scenario.values.items() if n.startswith("ballast.")}
+        if weights == self._weights:
+            return
+        added = [name for name in weights if name not in self._weights]
+        self._weights = weights
+        chosen = self._weight.value
+        self._weight.options = (*weights, ANOTHER)
+        self._weight.value = added[0] if added else chosen if chosen in weights else ANOTHER
+        self._show_weight()
+
+    def _show_weight(self) -> None:
+        chosen = self._weight.value
+        self._name.visible = chosen == ANOTHER
+        mass, *place = self._weights.get(chosen, (0.0, 0.0, 0.0, 0.0))
+        self._weight_mass.value = f"{mass:g}"
+        self._place.value = " ".join(f"{x:.9g}" for x in place)
 
 
 def _own_mass(scenario: Scenario) -> float:
@@ -198,8 +225,3 @@ def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
         if name.startswith("ballast."):
             changes[name] = [0.0, *value[1:]]
     return changes
-
-
-def _ballast_list(scenario: Scenario) -> str:
-    weights = {n.removeprefix("ballast."): v for n, v in scenario.values.items() if n.startswith("ballast.") and v[0]}
-    return "\n".join(f"- {name}: {v[0]:g} kg at {v[1]:g} {v[2]:g} {v[3]:g}" for name, v in weights.items())

@@ -72,20 +72,27 @@ class ParameterSetter:
 @dataclass
 class _Control:
     """handle: the input. shown(values) gives what it shows of parameters; changes(input) what an input means for them,
-    None where it can't be read."""
+    None where it can't be read, as ``accepted`` says."""
 
     handle: viser.GuiInputHandle
     shown: Callable[[Mapping], object]
     changes: Callable[[object], dict | None]
+    accepted: str = ""
     touched_s: float = -1e9
 
 
 class Controls:
-    """The inputs of one page server. set(changes) sends parameters, as ParameterSetter.set."""
+    """The inputs of one page server. set_parameters(changes) as ParameterSetter.set; say(text) tells of what can't be read."""
 
-    def __init__(self, gui: viser.GuiApi, set_parameters: Callable[[Mapping[str, object]], None]) -> None:
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        set_parameters: Callable[[Mapping[str, object]], None],
+        say: Callable[[str], None],
+    ) -> None:
         self._gui = gui
         self._set = set_parameters
+        self._say = say
         self._controls: list[_Control] = []
         self._values: Mapping[str, object] = {}
 
@@ -123,8 +130,9 @@ class Controls:
 
     def number(self, name: str, label: str) -> viser.GuiInputHandle:
         """A number of any size, as text."""
+        accepted = parameter_named(name).accepted
         return self._text(
-            label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1)
+            label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1), accepted
         )
 
     def vector(self, name: str, label: str, length: int) -> viser.GuiInputHandle:
@@ -134,7 +142,9 @@ class Controls:
             numbers = values[name]
             return _written([numbers[0]] * length if len(numbers) == 1 else numbers)
 
-        return self._text(label, _hint(name), shown, lambda text: _numbers(name, text, length))
+        return self._text(
+            label, _hint(name), shown, lambda text: _numbers(name, text, length), parameter_named(name).accepted
+        )
 
     def slider(self, name: str, label: str, lower: float, upper: float, step: float) -> viser.GuiInputHandle:
         """A number within what is usual; one beyond it stands at the end."""
@@ -146,16 +156,19 @@ class Controls:
     def factor(
         self, label: str, hint: str, decades: float, shown: Callable[[Mapping], float], changes: Callable[[float], dict]
     ) -> viser.GuiInputHandle:
-        """How many times of something: shown(values) > 0 gives it, changes(factor) sets it. The slider is logarithmic."""
-        handle = self._gui.add_slider(label, -decades, decades, 0.01, 0.0, hint=hint, marks=_marks(decades))
+        """How many times of something: shown(values) > 0 gives it, changes(factor) sets it. The box holds the factor itself, the
+        slider below it is logarithmic."""
 
-        def place(values):
-            factor = shown(values)
-            return round(min(max(math.log10(factor), -decades), decades), 2) if factor > 0.0 else 0.0
+        def typed(text):
+            numbers = read_numbers(text, 1)
+            return changes(numbers[0]) if numbers is not None and numbers[0] > 0.0 else None
 
-        return self.bind(handle, place, lambda value: changes(10.0 ** float(value)))
+        box = self._text(label, hint, lambda values: f"{shown(values):.4g}", typed, "a number > 0")
+        slider = log_slider(self._gui, decades, hint)
+        self.bind(slider, lambda values: on_slider(shown(values), decades), lambda value: changes(10.0 ** value[0]))
+        return box
 
-    def _text(self, label, hint, shown, changes) -> viser.GuiInputHandle:
+    def _text(self, label, hint, shown, changes, accepted: str) -> viser.GuiInputHandle:
         handle = self._gui.add_text(label, "", hint=hint)
 
         def place(values):
@@ -164,10 +177,11 @@ class Controls:
             in_force = mine is not None and all(_equal(values.get(name), value) for name, value in mine.items())
             return handle.value if in_force else shown(values)
 
-        return self.bind(handle, place, changes, TYPING_S)
+        return self.bind(handle, place, changes, TYPING_S, accepted)
 
-    def bind(self, handle, shown, changes, wait_s: float = 0.0):
-        control = _Control(handle, shown, changes)
+    def bind(self, handle, shown, changes, wait_s: float = 0.0, accepted: str = ""):
+        """An input of any kind; see _Control. wait_s: after the last touch, until it is taken as meant."""
+        control = _Control(handle, shown, changes, accepted)
         self._controls.append(control)
 
         @handle.on_update
@@ -188,6 +202,8 @@ class Controls:
         changes = control.changes(control.handle.value)
         if changes is None:
             control.touched_s = -1e9
+            if control.accepted:
+                self._say(f"{control.handle.label}: got {control.handle.value!r}; accepted: {control.accepted}")
             self.update(self._values)
         else:
             self._set(changes)
@@ -197,6 +213,16 @@ def _hint(name: str) -> str:
     parameter = parameter_named(name)
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     return f"{parameter.description}{unit} ({name})"
+
+
+def log_slider(gui: viser.GuiApi, decades: float, hint: str) -> viser.GuiInputHandle:
+    """A slider of factors whose value is (log10,); viser's slider for one number would show that beside it."""
+    return gui.add_multi_slider(" ", -decades, decades, 0.01, (0.0,), hint=hint, marks=_marks(decades))
+
+
+def on_slider(factor: float, decades: float) -> tuple[float]:
+    """Where a factor stands on a slider of so many decades up and down."""
+    return (round(min(max(math.log10(factor), -decades), decades), 2) if factor > 0.0 else 0.0,)
 
 
 def _marks(decades: float) -> tuple:
@@ -232,4 +258,6 @@ def _equal(a, b) -> bool:
 
 
 def _same(a, b) -> bool:
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(_same, a, b))
     return abs(a - b) < 1e-9 if isinstance(a, float) and isinstance(b, float) else a == b

@@ -80,7 +80,7 @@ class Page:
         self.shadow = Shadow(self._ghost_refuses)
         self.pointer = Pointer(self.link, self, self.sightings, self.tools)
         self._setter = ParameterSetter(self.link.set_parameters, self._refused)
-        self._controls = Controls(server.gui, self._setter.set)
+        self._controls = Controls(server.gui, self._setter.set, lambda text: self.say(text))
         self._readouts = ReadoutPanel(server, 300)
         self._status = server.gui.add_markdown("")
         tabs = server.gui.add_tab_group()

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..core.integrators import INTEGRATORS
-from .controls import Controls, read_numbers
+from .controls import TYPING_S, Controls, log_slider, on_slider, read_numbers
 from .pointer import POKE, PUSH
 
 if TYPE_CHECKING:
@@ -18,6 +20,12 @@ SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1"
 GRABBED, COM = "Grabbed point", "Centre of mass"
 PAUSE, GO_ON, STEP, RESET = "Pause", "Go on", "Step", "Reset"
 EARTH = [0.0, 0.0, -9.81]
+
+FORCE_DECADES = 2.0
+"""Of the force's slider, up and down from the force that suits the body."""
+
+STRONGEST = 1e12
+"""[N] More comes from a slip of the finger."""
 
 HELP = """
 **Drag** the body: a string ties it to the pointer. **Click**: a poke along the view. **Shift-click**: a push inward.
@@ -36,6 +44,7 @@ class Panel:
         with self.play_tab:
             self._gui.add_markdown(HELP, order=-2.0)
             self._time_folder()
+            self._start_folder()
             self._poke_folder()
             self._string_folder()
         with tabs.add_tab("Physics"):
@@ -48,8 +57,16 @@ class Panel:
             self._running.content = text
 
     def show_force(self) -> None:
-        """The poke's force was changed by something else than its own input."""
-        self._force.value = f"{self._page.tools.force:.4g}"
+        """The poke's force, as it is now, in all its inputs."""
+        force = self._page.tools.force
+        times = force / self._page.usual_force
+        for box, text in ((self._force, f"{force:.4g}"), (self._times, f"{times:.4g}")):
+            # "2." means what is in force, so it may stay as it is typed.
+            if read_numbers(box.value, 1) != read_numbers(text, 1):
+                box.value = text
+        place = on_slider(abs(times), FORCE_DECADES)
+        if self._slider.value != place:
+            self._slider.value = place
 
     # Play
 
@@ -75,6 +92,11 @@ class Panel:
 
         self._controls.bind(speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
 
+    def _start_folder(self) -> None:
+        with self._gui.add_folder("Start, at the next reset"):
+            self._controls.vector("initial.angular_velocity", "Initial spin [rad/s]", 3)
+            self._controls.vector("initial.linear_velocity", "Initial velocity [m/s]", 3)
+
     def _poke_folder(self) -> None:
         gui, tools = self._gui, self._page.tools
         with gui.add_folder("Poke (click)"):
@@ -82,26 +104,42 @@ class Panel:
                 "Click", (POKE, PUSH), initial_value=POKE, hint="Shift-click does the other; for pages without shift"
             )
             self._force = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
-            times = gui.add_slider(
-                "Force ×", -2.0, 2.0, 0.05, 0.0, hint="Times the force that suits the body", marks=_TENS
-            )
+            suits = "Times the force that suits the body"
+            self._times = times = gui.add_text("Force ×", "1", hint=suits)
+            self._slider = slider = log_slider(gui, FORCE_DECADES, suits)
             self._controls.number("poke_duration", "Duration [s]")
 
         @click.on_update
         async def _(event) -> None:
             tools.click = click.value
 
-        @self._force.on_update
-        async def _(event) -> None:
-            numbers = read_numbers(self._force.value, 1)
-            if event.client is not None and numbers is not None and abs(numbers[0]) <= 1e12:
-                tools.force = numbers[0]
+        def take(force: float) -> None:
+            tools.force = float(f"{force:.9g}")
+            self.show_force()
 
-        @times.on_update
+        def typed(box, unit: Callable[[], float]) -> None:
+            def complain(text: str) -> None:
+                if box.value == text:  # else somebody is still typing
+                    self._page.say(f"{box.label}: got {text[:40]!r}; accepted: a number, up to {STRONGEST:g} N")
+                    self.show_force()
+
+            @box.on_update
+            async def _(event) -> None:
+                if event.client is None:
+                    return
+                numbers = read_numbers(box.value, 1)
+                if numbers is not None and abs(numbers[0] * unit()) <= STRONGEST:
+                    take(numbers[0] * unit())
+                else:
+                    asyncio.get_running_loop().call_later(TYPING_S, complain, box.value)
+
+        typed(self._force, lambda: 1.0)
+        typed(times, lambda: self._page.usual_force)
+
+        @slider.on_update
         async def _(event) -> None:
             if event.client is not None:
-                tools.force = float(f"{self._page.usual_force * 10.0**times.value:.3g}")
-                self.show_force()
+                take(float(f"{self._page.usual_force * 10.0 ** slider.value[0]:.3g}"))
 
     def _string_folder(self) -> None:
         gui, tools, controls = self._gui, self._page.tools, self._controls
@@ -122,6 +160,8 @@ class Panel:
             controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
             controls.number("string.rest_length", "Rest length [m]")
             controls.checkbox("string.bilateral", "Pushes too")
+            controls.checkbox("string.attached", "Tied from the start")
+            controls.vector("string.attach", "Tied at x y z", 3)
             controls.number("string.timeout", "Lets go after [s]")
 
         def take() -> None:
@@ -159,6 +199,3 @@ class Panel:
         async def _(event) -> None:
             down = {"off": [0.0, 0.0, 0.0], "Earth's": EARTH, "Moon's": [0.0, 0.0, -1.62]}
             self._page.set({"gravity": down[gravity.value]})
-
-
-_TENS = ((-2.0, "×0.01"), (-1.0, "×0.1"), (0.0, "×1"), (1.0, "×10"), (2.0, "×100"))

@@ -13,6 +13,7 @@ from ..lessons import Lesson, lessons
 from .link import decode, encode
 from .rewind import Rewind
 from .situation import Situation, situation_of
+from .trails import COM_TRAIL, POINT_TRAIL
 
 if TYPE_CHECKING:
     from .page import Page
@@ -21,6 +22,9 @@ NO_LESSON = "–"
 
 MAX_QUERY = 7000
 """Characters of a link that a server reads from an address; a longer one is pasted."""
+
+SHOWN_WITH = {"thrown_hammer": (COM_TRAIL, POINT_TRAIL)}
+"""Names of scene_view.SWITCHES that a lesson needs and that are off otherwise."""
 
 STEP_S = 0.05
 """[s] Of the rewind slider."""
@@ -33,7 +37,7 @@ class SessionTab:
         self._page = page
         self._gui = page.server.gui
         self._lessons: dict[str, Lesson] = {lesson.title: lesson for lesson in lessons()}
-        self._was_paused = False
+        self._shown_for_lesson: tuple[str, ...] = ()
         with play_tab:
             self._lesson_folder()
         with tabs.add_tab("Session"):
@@ -67,6 +71,10 @@ class SessionTab:
 
     def _show_lesson(self, lesson: Lesson | None) -> None:
         self._script.visible = lesson is not None and bool(lesson.script)
+        shown = SHOWN_WITH.get(lesson.name, ()) if lesson is not None else ()
+        changes = {name: name in shown for name in {*shown, *self._shown_for_lesson}}
+        self._shown_for_lesson = shown
+        self._page.show_tab.show(changes)
         if lesson is None:
             self._text.content = ""
         else:
