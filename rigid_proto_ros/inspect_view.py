@@ -7,12 +7,14 @@ Lengths are drawn from the COM, so that a mesh far from its file's origin isn't 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from .core.errors import InputError
 from .core.inertia_tensor import equimomental_shapes, principal_axes
+from .core.model_difference import ModelDifference
 from .inertial_export import quaternion_wxyz
 from .mesh_inspection import Inspection
 from .output_file import output_file
@@ -28,16 +30,10 @@ SHAPE_COLORS = {
 MODEL_NAMES = {"shell": "shell", "points": "vertices", "bounding_box": "bounding box"}
 
 
-def model_errors(inspection: Inspection) -> dict[str, float]:
-    """max|ΔI|/max|I| of each approximate model's tensor against the solid's (against the chosen model's if there is no
-    solid), by model."""
-    truth = inspection.models.get("solid", inspection.chosen).inertia
-    largest = float(np.max(np.abs(truth)))
-    return {
-        name: float(np.max(np.abs(properties.inertia - truth))) / largest
-        for name, properties in inspection.models.items()
-        if properties.inertia is not truth
-    }
+def model_differences(inspection: Inspection) -> dict[str, ModelDifference]:
+    """How each approximate model differs from the solid (from the chosen model if there is no solid), by model."""
+    truth = inspection.models.get("solid", inspection.chosen)
+    return {name: inspection.difference(name) for name, own in inspection.models.items() if own is not truth}
 
 
 def record_inspection(path: str, inspection: Inspection) -> None:
@@ -133,24 +129,30 @@ def _log_shapes(recording: Any, inspection: Inspection) -> None:
 def _log_differences(recording: Any, inspection: Inspection) -> None:
     import rerun as rr
 
-    errors = model_errors(inspection)
+    differences = model_differences(inspection)
     chosen = inspection.chosen
     center = ", ".join(f"{value:.6g}" for value in chosen.center_of_mass)
-    rows = "\n".join(f"| {MODEL_NAMES.get(name, name)} | {error:.3g} |" for name, error in errors.items())
+    rows = "\n".join(
+        f"| {MODEL_NAMES.get(name, name)} | {', '.join(f'{100.0 * e:+.3g}' for e in d.principal_moments)} % "
+        f"| {math.degrees(d.axes_turned):.3g}° | {d.center_of_mass_offset:.3g} m | {d.tensor:.3g} |"
+        for name, d in differences.items()
+    )
     remarks = "\n".join(f"* {finding.severity}: {finding.message}" for finding in inspection.findings) or "* none"
     text = (
         f"# {inspection.body.mesh.name}\n\nmass {chosen.mass:.6g} kg, centre of mass {center} m ({inspection.model})\n\n"
-        f"| model | tensor off by |\n|---|---|\n{rows}\n\nRemarks\n\n{remarks}\n"
+        "| model | principal moments off by | axes turned by | COM offset | largest entry off by |\n"
+        f"|---|---|---|---|---|\n{rows}\n\nRemarks\n\n{remarks}\n"
     )
     recording.log("report", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-    if errors:
-        recording.log("differences", rr.BarChart(np.array(list(errors.values()))), static=True)
+    if differences:
+        worst = [float(np.abs(d.principal_moments).max()) for d in differences.values()]
+        recording.log("differences", rr.BarChart(np.array(worst)), static=True)
 
 
 def _blueprint(inspection: Inspection) -> Any:
     import rerun.blueprint as rrb
 
-    names = ", ".join(MODEL_NAMES.get(name, name) for name in model_errors(inspection))
+    names = ", ".join(MODEL_NAMES.get(name, name) for name in model_differences(inspection))
     size = float(np.linalg.norm(inspection.upper - inspection.lower))
     middle = 0.5 * (inspection.lower + inspection.upper) - inspection.chosen.center_of_mass
     eye = rrb.EyeControls3D(position=middle + size * np.array([1.25, -1.1, 0.75]), look_target=middle)
@@ -159,7 +161,7 @@ def _blueprint(inspection: Inspection) -> Any:
             rrb.Spatial3DView(origin="/world", name=inspection.body.mesh.name, eye_controls=eye),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/report", name="mass properties"),
-                rrb.BarChartView(origin="/differences", name=f"tensor off by: {names}"),
+                rrb.BarChartView(origin="/differences", name=f"worst principal moment off by: {names}"),
             ),
             column_shares=[2, 1],
         ),

@@ -13,6 +13,7 @@ from .core.exact_moments import exact_solid_moments, relative_errors
 from .core.inertia_tensor import degenerate_pairs, equimomental_shapes, principal_axes
 from .core.mass_properties import INERTIA_MODELS, MassProperties, scale_vector
 from .core.mesh_topology_verdict import WARNING, Finding, unit_suspicion
+from .core.model_difference import ModelDifference, model_difference
 from .core.moments import referenced_vertices
 from .mesh_body import MeshBody
 
@@ -45,6 +46,10 @@ class Inspection:
     def chosen(self) -> MassProperties:
         """Mass properties of the chosen model."""
         return self.models[self.model]
+
+    def difference(self, model: str) -> ModelDifference:
+        """How a model differs from the solid, or from the chosen model where there is no solid."""
+        return model_difference(self.models[model], self.models.get("solid", self.chosen))
 
 
 def inspect_mesh(
@@ -119,6 +124,7 @@ def as_json(inspection: Inspection) -> dict:
                 "mass": inspection.models[name].mass,
                 "center_of_mass": inspection.models[name].center_of_mass.tolist(),
                 "inertia": inspection.models[name].inertia.tolist(),
+                **inspection.difference(name).as_dict(),
             }
             for name in MODELS
         },

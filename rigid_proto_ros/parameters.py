@@ -14,7 +14,7 @@ import numpy as np
 from .core.errors import CommandRefused, InputError
 from .core.frames import check_contact_name
 from .core.integrators import INTEGRATORS
-from .core.mass_properties import INERTIA_MODELS
+from .core.mass_properties import INERTIA_MODELS, MODEL_COMS
 from .nearest_name import did_you_mean
 
 LIVE, AT_RESET, READ_ONLY = "live", "at the next reset", "read-only"
@@ -146,6 +146,7 @@ _DECLARED = (
     Parameter("mass", "double", 0.0, "Mass; above 0 it wins over density and doesn't change with scale.", "kg", 0.0, 1e100),
     Parameter("density", "double", 1000.0, "Density of the solid; setting it sets mass to 0.", "kg/m3", 0.0, 1e100, above=True),
     Parameter("inertia_model", "string", "solid", "How the tensor of inertia is found from the mesh.", choices=INERTIA_MODELS),
+    Parameter("inertia_model_com", "string", "model", "Where the model's centre of mass lies: where the model has it, or where the true solid has it, so that what the tensor does is seen alone; explicit numbers keep theirs.", choices=MODEL_COMS),
     Parameter("explicit_inertia.mass", "double", 1.0, "Mass of the explicit model.", "kg", 0.0, 1e100, above=True),
     _vector("explicit_inertia.center_of_mass", [0.0, 0.0, 0.0], "Centre of mass of the explicit model, in mesh coordinates.", "mesh units"),
     Parameter("explicit_inertia.tensor", "doubles", [1.0, 0.0, 0.0, 1.0, 0.0, 1.0], "Tensor of the explicit model about its centre of mass: ixx ixy ixz iyy iyz izz.", "kg m2", -_HUGE, _HUGE, lengths=(6,)),

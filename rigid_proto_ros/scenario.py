@@ -191,7 +191,12 @@ def _mass_properties(values, body_mesh, scale):
     if body_mesh is None:
         raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
     return body_mesh.moments.mass_properties(
-        values["inertia_model"], scale=scale, mass=values["mass"], density=values["density"], ballast=ballast
+        values["inertia_model"],
+        scale=scale,
+        mass=values["mass"],
+        density=values["density"],
+        ballast=ballast,
+        com=values["inertia_model_com"],
     )
 
 

@@ -57,6 +57,7 @@ STRUCTURE = {
     },
     "vary": {
         "inertia_model": {"grid": ["solid", "points", "bounding_box"]},
+        "inertia_model_com": {"list": ["model", "solid", "solid"]},
         "mesh": {"list": ["t_handle", "hammer", "book"]},
         "integrator": {"list": ["auto", "rk4", "dop853"]},
         "density": {"uniform": [100, 5000]},

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.inertia_tensor import principal_axes, six_from_tensor
-from ..core.mass_properties import MassProperties, scale_vector
+from ..core.mass_properties import scale_vector
 from ..inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mesh_body import FALLBACKS, mesh_body
 from ..mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
@@ -96,23 +97,20 @@ def print_report(inspection: Inspection, report: dict) -> None:
     print(f"same inertia     box {_row(report['equimomental_box'])} m, ", end="")
     print(f"ellipsoid of semi-axes {_row(report['equimomental_ellipsoid'])} m")
     solid = inspection.models.get("solid")
-    print("model          mass [kg]   ixx          iyy          izz          off the solid's inertia")
+    print("model          mass [kg]   principal moments against the solid's    axes turned  COM offset [m]")
     for name, properties in inspection.models.items():
         off = ""
         if solid is not None and name != "solid":
-            off = f"{inertia_difference(properties, solid):.3g}"
-        diagonal = "".join(f"{value:<13.6g}" for value in np.diag(properties.inertia))
-        print(f"{'* ' if name == inspection.model else '  '}{name:<13}{properties.mass:<12.6g}{diagonal}{off}")
+            difference = inspection.difference(name)
+            moments_off = ", ".join(f"{100.0 * error:+.3g}" for error in difference.principal_moments)
+            turned = f"{math.degrees(difference.axes_turned):.3g} deg"
+            off = f"{moments_off + ' %':<41}{turned:<13}{difference.center_of_mass_offset:.3g}"
+        print(f"{'* ' if name == inspection.model else '  '}{name:<13}{properties.mass:<12.6g}{off}".rstrip())
     if "verification" in report:
         errors = ", ".join(
             f"{name.removesuffix('_error')} {value:.1e}" for name, value in report["verification"].items()
         )
         print(f"against exact rational arithmetic: {errors}")
-
-
-def inertia_difference(properties: MassProperties, truth: MassProperties) -> float:
-    """max|ΔI|/max|I| of two tensors."""
-    return float(np.max(np.abs(properties.inertia - truth.inertia)) / np.max(np.abs(truth.inertia)))
 
 
 def _row(values) -> str:

@@ -24,6 +24,8 @@ from .moments_shell import shell_moments
 INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
 """How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
 box's cuboid, or given numbers."""
+MODEL_COMS = ("model", "solid")
+"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can be compared alone."""
 SCALE_LIMITS = (1e-9, 1e9)
 
 
@@ -230,35 +232,42 @@ class MeshMoments:
         mass: float = 0.0,
         density: float = 1000.0,
         ballast: Iterable = (),
+        com: str = "model",
     ) -> MassProperties:
         """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form on its ten numbers.
 
-        scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries
+        com: one of MODEL_COMS; "solid" carries the model's tensor, as it is about its own centre, to the solid's. scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries
         (m [kg], x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's.
         Raises InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
         """
         if model not in INERTIA_MODELS or model == "explicit":
             raise InputError("inertia_model", model, ", ".join(m for m in INERTIA_MODELS if m != "explicit"))
+        if com not in MODEL_COMS:
+            raise InputError("inertia_model_com", com, ", ".join(MODEL_COMS))
         s = scale_vector(scale)
         points = _checked_ballast(ballast)
         moments = self.moments(model, s)
         own = self.body_mass(scale=s, mass=mass, density=density)
         # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
         left = np.copysign(abs(s[0]), s) if model == "shell" else s
-        center, reference, com, second = stretched(
-            left, moments.center, moments.center_low, moments.reference, moments.second, own / moments.measure
+        place, low, base = moments.center, moments.center_low, moments.reference
+        if com == "solid":
+            solid = self.moments("solid")
+            place, low, base = ((s / left) * of for of in (solid.center, solid.center_low, solid.reference))
+        center, reference, center_of_mass, second = stretched(
+            left, place, low, base, moments.second, own / moments.measure
         )
-        unscaled = moments.reference * (left / s) if model == "shell" else moments.reference
+        unscaled = base * (left / s) if model == "shell" else base
         total, center, inertia, principal = loaded(own, center, second, s, unscaled, points)
         if len(points):
-            com = reference + center
+            center_of_mass = reference + center
         warnings = ()
         if not _plainly_good(principal):
             try:
                 warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
             except TensorError as error:
                 raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
-        return MassProperties(total, com, inertia, warnings, reference, center)
+        return MassProperties(total, center_of_mass, inertia, warnings, reference, center)
 
 
 def _plainly_good(moments: np.ndarray) -> bool:

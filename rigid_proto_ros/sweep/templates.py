@@ -108,9 +108,10 @@ def constants_of(values: Mapping[str, object], body_mesh: BodyMesh | None) -> np
         row[bb.SOLID_MEASURE] = np.nan
     row[bb.MODEL] = bb.SHELL if model == "shell" else bb.ORDINARY
     row[bb.MEASURE] = moments.measure
-    row[bb.REFERENCE : bb.REFERENCE + 3] = moments.reference
-    row[bb.CENTER : bb.CENTER + 3] = moments.center
-    row[bb.CENTER_LOW : bb.CENTER_LOW + 3] = moments.center_low
+    places = moments if values["inertia_model_com"] == "model" else body_mesh.moments.moments("solid")
+    row[bb.REFERENCE : bb.REFERENCE + 3] = places.reference
+    row[bb.CENTER : bb.CENTER + 3] = places.center
+    row[bb.CENTER_LOW : bb.CENTER_LOW + 3] = places.center_low
     row[bb.SECOND : bb.SECOND + 6] = moments.second
     return row
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 import asyncio
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class BodyTab:
         self._gui = page.server.gui
         self._base_scale = self._base_mass = 1.0
         self._judged_mesh: tuple = ()
-        self._weights: dict[str, list[float]] = {}
+        self._weights: dict[str, list] = {}
         with tabs.add_tab("Body"):
             self._mesh_folder()
             self._size_and_mass_folder()
@@ -126,6 +127,7 @@ class BodyTab:
         gui = self._gui
         with gui.add_folder("Inertia"):
             self._controls.choice("inertia_model", "Model")
+            self._controls.choice("inertia_model_com", "Its COM")
             self._table = gui.add_markdown("")
             with gui.add_folder("Edit the tensor", expand_by_default=False):
                 tensor = gui.add_text("Tensor", "", hint="ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes")
@@ -183,7 +185,8 @@ class BodyTab:
                 self._page.set({f"ballast.{chosen}": numbers})
 
     def _ballast_changed(self, scenario: Scenario) -> None:
-        weights = {n.removeprefix("ballast."): v for n, v in scenario.values.items() if n.startswith("ballast.")}
+        values: Mapping[str, Any] = scenario.values
+        weights = {n.removeprefix("ballast."): list(value) for n, value in values.items() if n.startswith("ballast.")}
         if weights == self._weights:
             return
         added = [name for name in weights if name not in self._weights]

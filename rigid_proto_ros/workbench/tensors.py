@@ -3,19 +3,25 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..core.errors import InputError
 from ..core.inertia_tensor import check_tensor, principal_axes, tensor_from_six
 from ..core.mass_properties import MassProperties, explicit_mass_properties
+from ..core.model_difference import model_difference
 from ..scenario import Scenario
 
-NAMES = ("solid", "shell", "points", "bounding_box")
+ROUNDING = 1e-11
+"""Relative: what is smaller comes from the arithmetic."""
+
 TITLES = {"solid": "solid (true)", "shell": "shell", "points": "points", "bounding_box": "bounding box"}
 
 
-def model_properties(scenario: Scenario, model: str) -> MassProperties:
-    """Mass properties of the scenario's body under a model; raises InputError where that can't be had."""
+def model_properties(scenario: Scenario, model: str, com: str = "") -> MassProperties:
+    """Mass properties of the scenario's body under a model; raises InputError where that can't be had. com: one of MODEL_COMS, as
+    the scenario has it where it is empty."""
     values = scenario.values
     ballast = [value for name, value in values.items() if name.startswith("ballast.")]
     if model == "explicit":
@@ -24,15 +30,20 @@ def model_properties(scenario: Scenario, model: str) -> MassProperties:
     if scenario.body_mesh is None:
         raise InputError("mesh", "", "a mesh")
     return scenario.body_mesh.moments.mass_properties(
-        model, scale=values["scale"], mass=values["mass"], density=values["density"], ballast=ballast
+        model,
+        scale=values["scale"],
+        mass=values["mass"],
+        density=values["density"],
+        ballast=ballast,
+        com=com or values["inertia_model_com"],
     )
 
 
 def comparison(scenario: Scenario) -> str:
-    """A table: the true tensor and the one that flies, or the bounding box's where the true one flies; errors in per cent.
+    """The true tensor and the one that flies, or the bounding box's where the true one flies: what counts for the motion in a
+    sentence, and a table of the numbers.
 
-    Errors of tensor entries are relative to the true tensor's largest, as those of ``inspect`` are; moments each to itself;
-    the COM's distance to the true one is given in per cent of the body's size.
+    Errors of moments are relative to each moment, those of entries to the true tensor's largest, as ``inspect`` has them.
     """
     flying = str(scenario.values["inertia_model"])
     other = "bounding_box" if flying == "solid" else flying
@@ -42,24 +53,63 @@ def comparison(scenario: Scenario) -> str:
         return _alone(scenario, f"No true tensor: {error}")
     try:
         approximate = model_properties(scenario, other)
+        own = model_properties(scenario, other, com="model")
     except InputError as error:
         return _alone(scenario, f"No {other} to compare with: {error}")
+    difference = model_difference(approximate, true)
+    title = TITLES.get(other, other)
+    what = f"**{TITLES[flying]}** flies; the {title} would have" if flying == "solid" else f"**{title}** flies; it has"
+    percents = ", ".join(_per_cent(error) for error in difference.principal_moments)
+    lines = [
+        f"{what}",
+        "",
+        f"- principal moments off by **{percents} %**",
+        f"- principal axes turned by **{_degrees(difference.axes_turned)}**",
+        f"- {_com_text(scenario, difference.center_of_mass, own.center_of_mass - true.center_of_mass)}",
+        "",
+        f"|  | {TITLES['solid']} | {title} | error |",
+        "| --- | --- | --- | --- |",
+    ]
+    moments = zip(
+        principal_axes(true.inertia)[0],
+        principal_axes(approximate.inertia)[0],
+        difference.principal_moments,
+        strict=True,
+    )
+    lines += [
+        f"| I{'₁₂₃'[k]} [kg m²] | {a:.5g} | {b:.5g} | {_per_cent(error)} % |" for k, (a, b, error) in enumerate(moments)
+    ]
+    lines.append(
+        f"| mass [kg] | {true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(approximate.mass / true.mass - 1.0)} % |"
+    )
     largest = float(np.abs(true.inertia).max())
-    rows = [("mass [kg]", true.mass, approximate.mass, _percent(approximate.mass, true.mass, true.mass))]
     for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
-        a, b = float(true.inertia[i, j]), float(approximate.inertia[i, j])
-        rows.append((f"I{'xyz'[i]}{'xyz'[j]} [kg m²]", a, b, _percent(b, a, largest)))
-    moments = (principal_axes(true.inertia)[0], principal_axes(approximate.inertia)[0])
-    for k, (a, b) in enumerate(zip(*moments, strict=True)):
-        rows.append((f"I{'₁₂₃'[k]} principal", float(a), float(b), _percent(float(b), float(a), float(a))))
+        a, b = (_rounded(float(properties.inertia[i, j]), largest) for properties in (true, approximate))
+        lines.append(f"| I{'xyz'[i]}{'xyz'[j]} [kg m²] | {a:.5g} | {b:.5g} | {_per_cent((b - a) / largest)} % |")
+    return "\n".join([*lines, "", "Errors of I₁ I₂ I₃ are each relative to its own, of the entries to the largest."])
+
+
+def _com_text(scenario: Scenario, off: np.ndarray, own: np.ndarray) -> str:
     size = _size(scenario)
-    away = float(np.linalg.norm(approximate.center_of_mass - true.center_of_mass))
-    worst = float(np.abs(approximate.inertia - true.inertia).max()) / largest
-    lines = [f"|  | {TITLES['solid']} | {TITLES.get(other, other)} | error |", "| --- | --- | --- | --- |"]
-    lines += [f"| {name} | {a:.5g} | {b:.5g} | {error} |" for name, a, b, error in rows]
-    lines.append(f"| COM apart [m] | | {away:.3g} | {100.0 * away / size:.2g} % of the size |")
-    head = f"**{flying}** flies. Largest error of {TITLES.get(other, other)}: **{100.0 * worst:.3g} %**"
-    return "\n".join([head, "", *lines])
+    away, own_away = float(np.linalg.norm(off)), float(np.linalg.norm(own))
+    text = f"COM offset **{away:.3g} m**, {100.0 * away / size:.2g} % of the size"
+    if away < 1e-9 * size < own_away:
+        return f"COM where the solid has it; the model's own lies {own_away:.3g} m off, {100.0 * own_away / size:.2g} % of the size"
+    return text
+
+
+def _degrees(angle: float) -> str:
+    degrees = math.degrees(angle)
+    return f"{degrees if degrees > ROUNDING else 0.0:.3g}°"
+
+
+def _per_cent(error: float) -> str:
+    return f"{100.0 * error if abs(error) > ROUNDING else 0.0:+.3g}"
+
+
+def _rounded(entry: float, largest: float) -> float:
+    """0 for what rounding alone left of an entry."""
+    return entry if abs(entry) > ROUNDING * largest else 0.0
 
 
 def _alone(scenario: Scenario, reason: str) -> str:
@@ -73,10 +123,6 @@ def _alone(scenario: Scenario, reason: str) -> str:
 def _size(scenario: Scenario) -> float:
     surface = scenario.setup.surface
     return float(np.linalg.norm(surface.extent * scenario.setup.body.scale))
-
-
-def _percent(value: float, true: float, scale: float) -> str:
-    return f"{100.0 * (value - true) / scale:+.3g} %"
 
 
 def judged(numbers: list[float] | None) -> tuple[bool, str]:
