@@ -158,9 +158,11 @@ class FlownPage:
 
     def __init__(self, lesson: str = "") -> None:
         from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+        from rigid_proto_ros.ros.warm_up import warm_up
         from rigid_proto_ros.workbench.page import Page
         from rigid_proto_ros.workbench.server import make_server
 
+        warm_up(make_scenario({}).setup)  # compiled on the page's thread, kernels would let its socket time out
         self.server = make_server(LOOPBACK, any_free_port(), lambda link: None)
         self.page: Page = self.do(lambda: Page(self.server, "/rigid_body", "http://here", lesson))
         self.link: FlownLink = self.page.link
