@@ -18,10 +18,10 @@ import numpy as np
 from .core.errors import InputError
 from .core.inertia_tensor import check_tensor, six_from_tensor
 from .core.mass_properties import MassProperties
-from .core.mesh_topology_hull import convex_hull
 from .core.moments import referenced_vertices, solid_moments
 from .inertia_robot import LinkInertial, MeshUse, read_robot
 from .mesh_body import MeshBody, mesh_body
+from .mesh_hull import convex_hull
 from .mesh_io import load_mesh
 
 LIMIT = 1e-3

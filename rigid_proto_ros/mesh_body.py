@@ -11,10 +11,10 @@ import numpy as np
 from . import mesh_cache
 from .core.errors import InputError
 from .core.mass_properties import MeshMoments
-from .core.mesh_topology_hull import box_surface, convex_hull
 from .core.mesh_topology_repair import repair_surface
 from .core.mesh_topology_verdict import WARNING, Finding, Verdict, judge_surface
 from .core.moments import Moments, referenced_vertices
+from .mesh_hull import box_surface, convex_hull
 from .mesh_io import Mesh, load_mesh
 
 FALLBACKS = ("", "hull", "box")

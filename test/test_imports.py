@@ -38,7 +38,7 @@ ALLOWED = {
     "rerun": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.inspect_view"),
     "rerun_bindings": (f"{PACKAGE}.rerun_view",),
     "pyarrow": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.sweep.table"),  # comes with rerun, as PIL does
-    "scipy": (f"{PACKAGE}.sweep.sampling",),
+    "scipy": (f"{PACKAGE}.sweep.sampling", f"{PACKAGE}.mesh_hull"),
     "distributed": (f"{PACKAGE}.sweep.cluster",),
     "matplotlib": (f"{PACKAGE}.sweep.plot",),
     "PIL": (f"{PACKAGE}.rerun_view",),

@@ -12,11 +12,11 @@ from mesh_files import CUBE_QUADS, CUBE_VERTICES, moebius, obj
 
 from rigid_proto_ros.core.errors import InputError, MeshError
 from rigid_proto_ros.core.mesh_topology import mesh_topology
-from rigid_proto_ros.core.mesh_topology_hull import box_surface, convex_hull
 from rigid_proto_ros.core.mesh_topology_repair import Surface
 from rigid_proto_ros.core.mesh_topology_verdict import judge_surface, unit_suspicion
 from rigid_proto_ros.core.moments import solid_moments
 from rigid_proto_ros.mesh_body import mesh_body
+from rigid_proto_ros.mesh_hull import box_surface, convex_hull
 from rigid_proto_ros.mesh_io import Mesh, load_mesh
 
 

@@ -231,10 +231,11 @@ def _turn_outward(surface: Surface) -> list[str]:
     volume, _, lower, upper = component_volumes(
         surface.vertices, surface.triangles, topology.component, topology.components
     )
-    depth = np.zeros(topology.components, np.int64)
+    wrong = volume < 0.0
     if topology.components > 1:
-        depth = component_nesting(surface.vertices, surface.triangles, topology.component, lower, upper).depth
-    wrong = np.sign(volume) == np.where(depth % 2 == 0, -1.0, 1.0)
+        nesting = component_nesting(surface.vertices, surface.triangles, topology.component, lower, upper)
+        # A component of which it is unknown where it lies stays as it is.
+        wrong = (np.sign(volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.decided
     if not wrong.any():
         return []
     surface.turn(wrong[topology.component])

@@ -193,9 +193,10 @@ def _judge_components(verdict: Verdict, topology: Topology, vertices, triangles)
     else:
         nesting = component_nesting(vertices, triangles, topology.component, lower, upper)
         expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
-        matters = volume != 0.0
+        # What is undecided accuses no component.
+        matters = (volume != 0.0) & nesting.decided
         wrong = matters & (np.sign(volume) != expected)
-        verdict.inward = bool(np.all(wrong[matters]) and matters.any())
+        verdict.inward = bool(np.all(wrong[matters]) and matters.any() and nesting.decided.all())
         if not verdict.inward:
             disjoint = int(np.count_nonzero(wrong & (expected > 0.0)))
             nested = int(np.count_nonzero(wrong & (expected < 0.0)))
