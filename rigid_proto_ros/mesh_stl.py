@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-import re
+import codecs
 import struct
 
 import numpy as np
 
+from .core.compilation import njit
 from .core.errors import MeshError
 from .core.mesh_topology import first_equal_rows
-from .mesh_text import excerpt, line_of, read_numbers
+from .mesh_text import EXACT, NEEDS_FLOAT, excerpt, float_of, is_blank, line_of, read_number, token_end
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -24,14 +25,14 @@ def _merge(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def is_ascii_stl(data: bytes) -> bool:
     """Whether the bytes read as ASCII STL: binary files, too, may begin with the word solid."""
-    head = data[:512].lstrip().lower()
+    head = data[:512].removeprefix(codecs.BOM_UTF8).lstrip().lower()
     return head.startswith(b"solid") and (b"facet" in head or b"endsolid" in data[:4096].lower()) and b"\0" not in head
 
 
 def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) float64 and triangles (m, 3) int64; raises MeshError for a file cut short or not STL."""
     if is_ascii_stl(data):
-        return _merge(_ascii_points(data, name))
+        return _merge(_ascii_points(data.removeprefix(codecs.BOM_UTF8), name))
     if len(data) < 84:
         raise MeshError(name, f"{len(data)} bytes", "an STL file: ASCII, or a binary header of 84 bytes and facets")
     (count,) = struct.unpack_from("<I", data, 80)
@@ -47,22 +48,87 @@ def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     return _merge(facets["corners"].reshape(-1, 3).astype(np.float64))
 
 
+_OTHER, _SOLID, _END_SOLID, _FACET_WORD, _END_FACET, _VERTEX = range(6)
+_WORDS = tuple(word.encode() for word in ("", "solid", "endsolid", "facet", "endfacet", "vertex"))
+_OK, _BAD_NUMBER, _NOT_THREE = 0, 1, 2
+
+
+@njit(cache=True, nogil=True)
+def _word(buffer, i, stop):
+    """Which of the words that matter the token from i to stop is, in capitals or not."""
+    length = stop - i
+    for kind in range(1, len(_WORDS)):
+        word = _WORDS[kind]
+        if len(word) != length:
+            continue
+        same = True
+        for k in range(length):
+            same = same and (buffer[i + k] | 32) == word[k]
+        if same:
+            return kind
+    return _OTHER
+
+
+@njit(cache=True, nogil=True)
+def _facets(buffer, points, slow):
+    """Corner points into points (n, 3), token by token, so that line ends count as blanks; slow (k, 3) takes (flat index, token
+    start, token end) of numbers left to float(). Returns (status, position, points, whole facets, slow tokens).
+    """
+    i, end = 0, buffer.shape[0]
+    count = facets = in_facet = slow_count = 0
+    named = False  # within the name of a solid, which may hold any word
+    while True:
+        while i < end and (is_blank(buffer[i]) or buffer[i] == 10):
+            i += 1
+        if i >= end:
+            return _OK, i, count, facets, slow_count
+        stop = token_end(buffer, i, end)
+        kind = _word(buffer, i, stop)
+        first = i
+        i = stop
+        if kind in (_SOLID, _END_SOLID):
+            named = True
+        elif kind == _FACET_WORD:
+            named, in_facet = False, 0
+        elif kind == _END_FACET and not named:
+            if in_facet != 3:
+                return _NOT_THREE, first, count, facets, slow_count
+            facets += 1
+        elif kind == _VERTEX and not named:
+            if in_facet == 3 or count == points.shape[0]:
+                return _NOT_THREE, first, count, facets, slow_count
+            for k in range(3):
+                while i < end and (is_blank(buffer[i]) or buffer[i] == 10):
+                    i += 1
+                place = i
+                value, i, status = read_number(buffer, i, end)
+                if status == EXACT:
+                    points[count, k] = value
+                elif status == NEEDS_FLOAT:
+                    slow[slow_count, 0], slow[slow_count, 1], slow[slow_count, 2] = 3 * count + k, place, i
+                    slow_count += 1
+                else:
+                    return _BAD_NUMBER, first, count, facets, slow_count
+            in_facet += 1
+            count += 1
+
+
 def _ascii_points(data: bytes, name: str) -> np.ndarray:
     """Corner points (3m, 3) in file order."""
-    text = data.lower()
-    places = [m.end() for m in re.finditer(rb"\bvertex\b", text)]
-    ends = len(re.findall(rb"\bendfacet\b", text))
-    if len(places) != 3 * ends:
-        received = f"{len(places)} vertices in {ends} whole facets"
+    # A corner takes 12 bytes or more ("vertex 0 0 0"), and never more numbers than that are left to float().
+    room = len(data) // 12 + 1
+    points, slow = np.empty((room, 3)), np.empty((3 * room, 3), np.int64)
+    status, position, count, facets, slow_count = _facets(np.frombuffer(data, np.uint8), points, slow)
+    flat = points.reshape(-1)
+    for index, first, stop in slow[:slow_count].tolist():
+        value = float_of(data[first:stop])
+        if value is None:
+            where = f"{name} line {line_of(data, first)}"
+            raise MeshError(where, excerpt(data, first), "vertex with three numbers")
+        flat[index] = value
+    if status == _BAD_NUMBER:
+        raise MeshError(f"{name} line {line_of(data, position)}", excerpt(data, position), "vertex with three numbers")
+    if status == _NOT_THREE or count != 3 * facets:
+        received = f"{count} vertices in {facets} whole facets"
         raise MeshError(name, received, "three vertices a facet; the file may be cut short")
-    points = np.empty((len(places), 3))
-    # Blanking all words leaves the numbers alone; facet normals go with their words.
-    numbers = re.sub(rb"facet\s+normal[^\n]*|^\s*(end)?solid[^\n]*|\b(end)?(facet|loop)\b|\bouter\b|\bvertex\b",
-                     lambda m: b" " * len(m.group()), text, flags=re.MULTILINE)  # fmt: skip
-    values, bad = read_numbers(numbers, 0, 3 * len(places) + 1)
-    if bad is not None:
-        raise MeshError(f"{name} line {line_of(data, bad)}", excerpt(data, bad), "vertex with three numbers")
-    if len(values) != 3 * len(places):
-        raise MeshError(name, f"{len(values)} coordinates for {len(places)} vertices", "three numbers a vertex")
-    points[:] = values.reshape(-1, 3)
-    return points
+    return points[:count]

@@ -152,6 +152,36 @@ def test_words_that_are_no_numbers_are_told(word):
     assert (read.tolist(), bad) == ([1.0, 2.0], 4)
 
 
+def test_numbers_of_more_digits_than_a_double_holds_are_the_nearest_double():
+    random = np.random.default_rng(1)
+    words = [
+        f"{m}e{e}" for m, e in zip(random.integers(2**53, 10**18, 2000), random.integers(-22, 23, 2000), strict=True)
+    ]
+    for high in random.uniform(2.0**55, 2.0**59, 2000):  # halfway between two doubles, and one beside it
+        middle = int(high) + int(np.spacing(high)) // 2
+        words += [str(middle - 1), str(middle), str(middle + 1)]
+    read, bad = read_numbers(" ".join(words).encode(), 0, len(words))
+    assert bad is None and read.tolist() == [float(word) for word in words]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace(b"\n", b" "),
+        lambda text: text.replace(b"\n", b"\r"),
+        lambda text: text.replace(b"\n", b"\r\n"),
+        lambda text: b"\xef\xbb\xbf" + text,
+        lambda text: text.upper(),
+        lambda text: text.replace(b"solid test", b"solid of vertex 1 2 and an endfacet", 1),
+        lambda text: text.replace(b"endsolid", b"\n" * 33_000 + b"endsolid"),
+    ],
+    ids=["one line", "bare CR", "CRLF", "byte order mark", "capitals", "words in the name", "blank lines"],
+)
+def test_ascii_stl_in_every_spelling(tmp_path, change):
+    mesh = load(tmp_path, "a.stl", change(stl_text()))
+    assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
+
+
 def test_our_readers_agree_with_trimesh_on_files_it_writes(tmp_path, meshes):
     trimesh = pytest.importorskip("trimesh")
     mesh = load_mesh(str(meshes / "sword.obj"))

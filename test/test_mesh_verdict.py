@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mass_solids import box, inward, moved, rotation, sphere, together
 from mesh_files import CUBE_QUADS, CUBE_VERTICES, moebius, obj
 
+from rigid_proto_ros.core import mesh_topology_nesting
 from rigid_proto_ros.core.errors import InputError, MeshError
 from rigid_proto_ros.core.mesh_topology import mesh_topology
 from rigid_proto_ros.core.mesh_topology_repair import Surface
@@ -87,6 +88,43 @@ def test_parts_apart_or_touching_are_not_called_overlapping():
     assert codes(body(together(box(), moved(box(), (3.0, 0, 0))))) == {}
     assert "overlapping_components" not in codes(body(together(box(), moved(box(), (1.0, 0, 0)))))
     assert "overlapping_components" not in codes(body(together(box(), moved(box(), (1.0, 0.5, 0)))))
+
+
+def test_boxes_that_share_part_of_their_faces_and_of_their_inside_are_told():
+    # Every edge that meets the other box lies in one of its faces: no edge passes properly through a triangle.
+    made = body(together(box(), moved(box(), (0.5, 0, 0))))
+    assert codes(made) == {"overlapping_components": "warning"}
+
+
+def test_a_grid_of_touching_boxes_overlaps_nowhere():
+    parts = [moved(box(), (float(i), float(j), float(k))) for i in range(5) for j in range(5) for k in range(5)]
+    assert codes(body(together(*parts))) == {"non_manifold": "info"}
+
+
+def bubbles(count: int) -> tuple:
+    """A ball with count³ spherical bubbles."""
+    places = [(i, j, k) for i in range(count) for j in range(count) for k in range(count)]
+    middle = (count - 1) / 2
+    holes = [
+        inward(moved(sphere(4, (0.02, 0.02, 0.02)), tuple(0.12 * (x - middle) for x in place))) for place in places
+    ]
+    return together(sphere(12), *holes)
+
+
+def test_a_ball_with_many_bubbles_is_right_as_it_is():
+    made = body(bubbles(6), repair=True)
+    assert codes(made) == {"cavities": "info"}
+    one = solid_volume(body(sphere(4, (0.02, 0.02, 0.02))))
+    assert solid_volume(made) == pytest.approx(solid_volume(body(sphere(12))) - 216 * one, rel=1e-12)
+
+
+def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch):
+    monkeypatch.setattr(mesh_topology_nesting, "WORK_LIMIT", 3000)
+    made = body(bubbles(4), repair=True)
+    assert codes(made)["components_unchecked"] == "warning"
+    assert "component_inward" not in codes(made) and "repaired" not in codes(made)
+    one = solid_volume(body(sphere(4, (0.02, 0.02, 0.02))))
+    assert solid_volume(made) == pytest.approx(solid_volume(body(sphere(12))) - 64 * one, rel=1e-12)
 
 
 def test_an_open_surface_says_how_far_its_volume_depends_on_the_origin():
