@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,6 +15,7 @@ from .ghost import ghost_of
 from .nearest_name import did_you_mean
 from .parameters import is_ros_parameter, parameter_named
 from .poke_script import ScriptCommand, core_command, with_contacts
+from .progress import Progress
 from .scenario import Scenario, make_scenario, publication_ns
 from .scene_file import read_scene_file, scalar
 
@@ -133,19 +133,13 @@ class OfflineRun:
 
 
 def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
-    """Advance by a hundredth of the duration at a time, with a line on a terminal; returns the wall time [s]."""
+    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s]."""
     start = time.perf_counter()
-    shown = start
-    for part in range(1, 101):
-        until_ns = duration_ns * part // 100
-        if not run.advance(until_ns):
-            break
-        now = time.perf_counter()
-        if sys.stderr.isatty() and now - shown > 0.2:
-            shown = now
-            print(f"\r{part:3d} %  {until_ns / 1e9:.3f} s simulated", end="", file=sys.stderr, flush=True)
-    if sys.stderr.isatty() and shown > start:
-        print("\r\033[K", end="", file=sys.stderr, flush=True)
+    with Progress(f"simulating {duration_ns / 1e9:g} s") as progress:
+        for part in range(1, 101):
+            if not run.advance(duration_ns * part // 100):
+                break
+            progress.fraction(part, 100)
     return time.perf_counter() - start
 
 

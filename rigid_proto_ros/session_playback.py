@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,13 @@ from .session_messages import PROJECTIONS
 from .session_recorder import make_recorder
 
 
-def play(session: RecordedSession, observer: Observer, given: Scenario | None = None) -> None:
-    """Tell ``observer`` the session from its start to its last state.
+def play(
+    session: RecordedSession,
+    observer: Observer,
+    given: Scenario | None = None,
+    progress: Callable[[float, float], None] = lambda done, total: None,
+) -> None:
+    """Tell ``observer`` the session from its start to its last state; ``progress`` is called with (states told, all states).
 
     given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
     decoded, and for a session without a scene.
@@ -32,7 +38,8 @@ def play(session: RecordedSession, observer: Observer, given: Scenario | None = 
     tell_start(observer, again.scenario)
     again.simulation.announce()
     again.ghost = ghost_of(again.scenario, again.simulation, observer)
-    for time_ns, row in sorted_states(session):
+    for count, (time_ns, row) in enumerate(sorted_states(session)):
+        progress(count, len(session.times))
         try:
             computed = again.advance(time_ns)
         except InputError:
@@ -44,8 +51,14 @@ def play(session: RecordedSession, observer: Observer, given: Scenario | None = 
             again.ghost.advance(time_ns)
 
 
-def record(runs: list[RecordedSession], path: str | Path, given: Scenario | None = None) -> None:
-    """Play all runs of a session into a recording, .rrd or .mcap; given: the scene of a session that lacks it.
+def record(
+    runs: list[RecordedSession],
+    path: str | Path,
+    given: Scenario | None = None,
+    progress: Callable[[float, float], None] = lambda done, total: None,
+) -> None:
+    """Play all runs of a session into a recording, .rrd or .mcap; given: the scene of a session that lacks it. ``progress`` is
+    called with (states told, all states).
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
@@ -53,11 +66,14 @@ def record(runs: list[RecordedSession], path: str | Path, given: Scenario | None
         if not session.scene and given is None:
             raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
     recorder = make_recorder(str(path), runs[-1].node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
+    total = sum(len(session.times) for session in runs)
+    before = 0
     try:
         for number, session in enumerate(runs):
             if number:
                 recorder.reset()
-            play(session, recorder, given)
+            play(session, recorder, given, lambda done, _, before=before: progress(before + done, total))
+            before += len(session.times)
     finally:
         recorder.close()
     if error := getattr(recorder, "error", ""):

@@ -19,7 +19,7 @@ from ..inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mesh_body import FALLBACKS, mesh_body
 from ..mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
 from ..mesh_io import MAX_TRIANGLES, load_mesh, resolve_mesh
-from .progress import Progress
+from ..progress import Progress
 
 if TYPE_CHECKING:
     from ..inertia_doctor import LinkDiagnosis

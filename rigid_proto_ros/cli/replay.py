@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..core.errors import InputError
 from ..output_file import output_file
+from ..progress import Progress
 
 
 def add_parser(subparsers) -> None:
@@ -46,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
     if args.record:
         from ..session_playback import record
 
-        record(runs, args.record, given_scene(args.scene))
+        with Progress(f"recording {args.record}") as progress:
+            record(runs, args.record, given_scene(args.scene), progress.fraction)
     _say_how_to_see_it(args)
     if args.as_scene:
         _branch(runs[-1], args)
@@ -96,7 +98,8 @@ def _verify(runs: list, args: argparse.Namespace) -> int:
     for number, session in enumerate(runs, 1):
         which = f"run {number}: " if len(runs) > 1 else ""
         try:
-            difference = verify(session, _progress)
+            with Progress("verifying") as progress:
+                difference = verify(session, progress.fraction)
         except BeganLaterError:
             # What lies before the first reset can't be checked; what follows it can.
             if number == len(runs) and not verified:
@@ -109,11 +112,6 @@ def _verify(runs: list, args: argparse.Namespace) -> int:
         verified += 1
     print("  verified: every command and state is the same to the bit")
     return 0
-
-
-def _progress(done: float) -> None:
-    if sys.stderr.isatty():
-        print(f"\r{100 * done:3.0f} % verified", end="\r", file=sys.stderr, flush=True)
 
 
 def given_scene(path: str | None):

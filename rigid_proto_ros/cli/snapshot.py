@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from ..core.errors import InputError
+from ..progress import Progress
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -37,16 +38,22 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Take the picture; InputError says what was wrong with the request."""
-    from ..rerun_view.snapshot import take_picture
     from ..session_reader import is_bag
 
     size = _size(args.size)
     if not is_bag(Path(args.session)):
-        take_picture(args.session, args.at, args.output, args.view, size)
+        _draw(args, args.session, size)
         return 0
     with tempfile.TemporaryDirectory() as folder:
-        take_picture(_drawn(args, Path(folder)), args.at, args.output, args.view, size)
+        _draw(args, _drawn(args, Path(folder)), size)
     return 0
+
+
+def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]) -> None:
+    from ..rerun_view.snapshot import take_picture
+
+    with Progress("drawing") as progress:
+        take_picture(recording, args.at, args.output, args.view, size, progress.fraction)
 
 
 def _drawn(args: argparse.Namespace, folder: Path) -> Path:
@@ -61,7 +68,8 @@ def _drawn(args: argparse.Namespace, folder: Path) -> Path:
     check_time(session, args.at)
     check_picture(args.output)
     path = folder / "session.rrd"
-    record([session], path, given_scene(args.scene))
+    with Progress("reading the bag") as progress:
+        record([session], path, given_scene(args.scene), progress.fraction)
     return path
 
 

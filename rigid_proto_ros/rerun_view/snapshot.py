@@ -6,7 +6,7 @@ from __future__ import annotations
 import io
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -38,23 +38,37 @@ MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wg
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
 
+STAGES = 4
+"""Of a picture: read, viewer started, recording loaded, drawn."""
+
+
 def take_picture(
-    session_path: str | Path, at_s: float, picture: str | Path, view: str = "", size: tuple[int, int] = (1600, 900)
+    session_path: str | Path,
+    at_s: float,
+    picture: str | Path,
+    view: str = "",
+    size: tuple[int, int] = (1600, 900),
+    progress: Callable[[float, float], None] = lambda done, total: None,
 ) -> None:
     """Write a .png of the recording at simulated time ``at_s``: the whole layout, its tab of this name, or the view.
+    ``progress`` is called with (stages done, all stages).
 
     Raises InputError for a time that wasn't recorded, a view that isn't there, a picture that can't be written, and a
     machine without the drivers.
     """
     session_path, picture = Path(session_path), Path(picture).absolute()
+    progress(0, STAGES)
     session = read_session(session_path)
     check_time(session, at_s)
     check_picture(picture)
+    progress(1, STAGES)
     with ExitStack() as stack:
         readable = session_path.absolute() if session.complete else stack.enter_context(whole_part(session_path))
         started = time.monotonic()
         client = stack.enter_context(headless_viewer(*size))
+        progress(2, STAGES)
         show(client, readable)
+        progress(3, STAGES)
         client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
         view_id = bring_to_front(client, view) if view else None
         if view_id is not None:

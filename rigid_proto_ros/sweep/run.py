@@ -7,9 +7,9 @@ from collections.abc import Generator
 from contextlib import closing
 from pathlib import Path
 
+from ..progress import Progress
 from .chunk import Chunk
 from .local import chunk_rows, cores, local_chunks
-from .progress import Progress
 from .study import Study
 from .table import Parts, metadata_of
 
@@ -34,18 +34,18 @@ def run_study(
     parts = Parts(file, study, chunk_rows(study, workers), resume)
     finished = parts.finished()
     done = sum(last - first for first, last in map(parts.bounds, finished))
-    shown = Progress(study.rows, done) if progress else None
     try:
-        with closing(_chunks(study, parts, workers, dask)) as chunks:
+        with (
+            Progress("sweep", large=progress, unit="rows") as shown,
+            closing(_chunks(study, parts, workers, dask)) as chunks,
+        ):
+            shown.fraction(done, study.rows)
             for k, chunk in chunks:
                 parts.write(k, chunk)
-                if shown:
-                    shown.add(len(chunk))
+                done += len(chunk)
+                shown.fraction(done, study.rows)
     except KeyboardInterrupt:
         raise Interrupted(parts.join()) from None
-    finally:
-        if shown:
-            shown.end()
     return parts.join()
 
 
