@@ -5,24 +5,19 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.inertia_tensor import principal_axes, six_from_tensor
 from ..core.mass_properties import scale_vector
 from ..inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mesh_body import FALLBACKS, mesh_body
 from ..mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
 from ..mesh_io import MAX_TRIANGLES, load_mesh, resolve_mesh
 from ..progress import Progress
-
-if TYPE_CHECKING:
-    from ..inertia_doctor import LinkDiagnosis
+from .inspect_report import print_diagnoses, print_report
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
@@ -65,56 +60,6 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
     parser.set_defaults(run=run)
     return parser
-
-
-def print_report(inspection: Inspection, report: dict) -> None:
-    """The human-readable report on stdout."""
-    body, chosen = inspection.body, inspection.chosen
-    print(f"{body.mesh.path}: {report['vertices']} vertices, {report['triangles']} triangles, ", end="")
-    closed = "closed" if report["watertight"] else "open"
-    wound = "" if report["winding_consistent"] else ", inconsistently wound"
-    print(f"{closed}{wound}, {report['components']} component{'s' if report['components'] != 1 else ''}")
-    for finding in inspection.findings:
-        print(f"  {finding.severity}: {finding.message} [{finding.code}]")
-    size = inspection.upper - inspection.lower
-    print(f"size             {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} m")
-    if report["volume"] is not None:
-        print(f"volume           {report['volume']:.9g} m^3")
-    if report["area"] is not None:
-        print(f"area             {report['area']:.9g} m^2")
-    density = "" if report["density"] is None else f"  ({report['density']:.6g} kg/m^3)"
-    print(f"mass             {chosen.mass:.9g} kg{density}")
-    print(f"centre of mass   {_row(chosen.center_of_mass)} m")
-    for label, row in zip(("inertia          ", " " * 17, " " * 17), chosen.inertia, strict=True):
-        print(f"{label}{_row(row)}{' kg m^2, about the centre of mass' if label.strip() else ''}")
-    moments, axes = principal_axes(chosen.inertia)
-    print(f"principal        {_row(moments)} kg m^2")
-    for column, (moment, name) in enumerate(zip(moments, ("A", "B", "C"), strict=True)):
-        print(f"  axis {name}         {_row(axes[:, column])}   {moment:.6g}")
-    if any(report["principal_degenerate"]):
-        pairs = [pair for pair, same in zip(("A = B", "B = C"), report["principal_degenerate"], strict=True) if same]
-        print(f"  {' and '.join(pairs)}: axes within their span are arbitrary")
-    print(f"same inertia     box {_row(report['equimomental_box'])} m, ", end="")
-    print(f"ellipsoid of semi-axes {_row(report['equimomental_ellipsoid'])} m")
-    solid = inspection.models.get("solid")
-    print("model          mass [kg]   principal moments against the solid's    axes turned  COM offset [m]")
-    for name, properties in inspection.models.items():
-        off = ""
-        if solid is not None and name != "solid":
-            difference = inspection.difference(name)
-            moments_off = ", ".join(f"{100.0 * error:+.3g}" for error in difference.principal_moments)
-            turned = f"{math.degrees(difference.axes_turned):.3g} deg"
-            off = f"{moments_off + ' %':<41}{turned:<13}{difference.center_of_mass_offset:.3g}"
-        print(f"{'* ' if name == inspection.model else '  '}{name:<13}{properties.mass:<12.6g}{off}".rstrip())
-    if "verification" in report:
-        errors = ", ".join(
-            f"{name.removesuffix('_error')} {value:.1e}" for name, value in report["verification"].items()
-        )
-        print(f"against exact rational arithmetic: {errors}")
-
-
-def _row(values) -> str:
-    return " ".join(f"{value:>13.6g}" for value in values)
 
 
 def _scale_and_mesh(args: argparse.Namespace) -> tuple[list[float], str | None]:
@@ -203,23 +148,6 @@ def _verify(inspection: Inspection, report: dict, to_json: bool) -> int:
 def _check_amount(name: str, value: float, *, zero: bool) -> None:
     if not (value > 0.0 or (zero and value == 0.0)) or value == float("inf"):
         raise InputError(name, value, "a finite number > 0")
-
-
-def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
-    """One paragraph a link on stdout."""
-    for d in diagnoses:
-        print(f"{d.link} ({d.mesh}): {d.status}{'; ' + d.note if d.note else ''}")
-        if d.inertia_error is not None:
-            off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
-            print(
-                f"  off by: inertia {d.inertia_error:.2g}, centre of mass {d.center_of_mass_error:.2g} of the size{off}"
-            )
-        for cause in d.causes:
-            print(f"  cause: {cause}")
-        if d.status == "off" and d.expected is not None:
-            center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
-            print(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
-            print("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))
 
 
 def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:

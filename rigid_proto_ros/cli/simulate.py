@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..core.errors import InputError
 from ..output_file import output_file
+from .terminal import line, table
 
 
 def add_parser(subparsers) -> None:
@@ -97,16 +98,20 @@ def _warn(message: str) -> None:
 
 def _print_summary(result: dict, recordings: list[str]) -> None:
     def vector(name: str) -> str:
-        return "  ".join(f"{x: .9g}" for x in result[name])
+        return " ".join(f"{x:< 16.9g}" for x in result[name]).rstrip()
 
-    print(f"simulated      {result['time_ns'] / 1e9:.9g} s in {result['wall_time']:.3g} s of wall time")
-    print(f"position       {vector('position')} m")
-    print(f"attitude xyzw  {vector('orientation_xyzw')}")
-    print(f"velocity       {vector('linear_velocity')} m/s")
-    print(f"ω (world)      {vector('angular_velocity')} rad/s")
-    print(f"energy         {result['kinetic_energy']:.9g} J kinetic, {result['potential_energy']:.9g} J potential")
-    print(f"L (world)      {vector('angular_momentum')} N m s")
-    print(f"integrator     {result['integrator']}, {result['steps']} steps")
-    print(f"state hash     {result['state_hash']}")
+    rows: list[tuple[str, ...]] = [
+        ("simulated", f" {result['time_ns'] / 1e9:.9g} s in {result['wall_time']:.3g} s of wall time"),
+        ("position", vector("position"), "m"),
+        ("attitude xyzw", vector("orientation_xyzw")),
+        ("velocity", vector("linear_velocity"), "m/s"),
+        ("ω (world)", vector("angular_velocity"), "rad/s"),
+        ("kinetic energy", f" {result['kinetic_energy']:.9g}", "J"),
+        ("potential energy", f" {result['potential_energy']:.9g}", "J"),
+        ("L (world)", vector("angular_momentum"), "kg m^2/s"),
+        ("integrator", f" {result['integrator']}, {result['steps']} steps"),
+        ("state hash", f" {result['state_hash']}"),
+    ]
+    table(rows)
     for file in recordings:
-        print(f"recorded       {file}; open it with: rigid_proto replay {file}")
+        line(("recorded", "bold"), f" {file}; show it with: rigid_proto replay {file}")

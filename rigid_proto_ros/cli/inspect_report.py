@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""What ``rigid_proto inspect`` prints for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..core.inertia_tensor import principal_axes, six_from_tensor
+from ..mesh_inspection import Inspection
+from .terminal import SEVERITY_STYLES, Text, line, table
+
+if TYPE_CHECKING:
+    from ..inertia_doctor import LinkDiagnosis
+
+SHOWN_ZERO = 5e-7
+"""Of a quantity's largest entry: what is smaller is beyond the six digits shown, and stands as 0. JSON has it."""
+
+
+def shown_zero(values: Iterable[float], largest: float) -> list[float]:
+    """The values, those that don't show beside ``largest`` as 0."""
+    return [0.0 if abs(value) < SHOWN_ZERO * largest else float(value) for value in values]
+
+
+def print_report(inspection: Inspection, report: dict) -> None:
+    """The report on stdout: mesh, findings, mass properties, models."""
+    body, chosen = inspection.body, inspection.chosen
+    count = report["components"]
+    state = [
+        f"{report['vertices']} vertices, {report['triangles']} triangles",
+        "closed" if report["watertight"] else "open",
+        *([] if report["winding_consistent"] else ["inconsistently wound"]),
+        f"{count} component{'s' if count != 1 else ''}",
+    ]
+    line((str(body.mesh.path), "bold"), f": {', '.join(state)}")
+    for finding in inspection.findings:
+        style = SEVERITY_STYLES.get(finding.severity, "")
+        line("  ", (finding.severity, style), f": {finding.message} [{finding.code}]")
+    if not inspection.findings:
+        line("  ", ("no problems found", "green"))
+    size = inspection.upper - inspection.lower
+    rows: list[tuple[Text, ...]] = [("size", _row(size), "m")]
+    if report["volume"] is not None:
+        rows.append(("volume", f"{report['volume']: .9g}", "m^3"))
+    if report["area"] is not None:
+        rows.append(("area", f"{report['area']: .9g}", "m^2"))
+    density = "" if report["density"] is None else f" ({report['density']:.6g} kg/m^3)"
+    rows.append(("mass", f"{chosen.mass: .9g}", f"kg{density}"))
+    diagonal = float(np.linalg.norm(size))
+    rows.append(("centre of mass", _row(shown_zero(chosen.center_of_mass, diagonal)), "m"))
+    largest = float(np.abs(chosen.inertia).max())
+    for number, row in enumerate(chosen.inertia):
+        label, unit = ("inertia", "kg m^2, about the centre of mass") if number == 0 else ("", "")
+        rows.append((label, _row(shown_zero(row, largest)), unit))
+    moments, axes = principal_axes(chosen.inertia)
+    rows.append(("principal moments", _row(moments), "kg m^2"))
+    rows += [
+        (f"principal axis {k + 1}", _row(shown_zero(axes[:, k], 1.0)), f"of {moment:.6g} kg m^2")
+        for k, moment in enumerate(moments)
+    ]
+    rows.append(("box of equal inertia", _row(report["equimomental_box"]), "m, sides"))
+    rows.append(("ellipsoid of equal inertia", _row(report["equimomental_ellipsoid"]), "m, semi-axes"))
+    table(rows)
+    if any(report["principal_degenerate"]):
+        pairs = [
+            pair for pair, same in zip(("1 and 2", "2 and 3"), report["principal_degenerate"], strict=True) if same
+        ]
+        line(f"principal moments {' and '.join(pairs)} are equal: every axis in the span of theirs is principal")
+    line("")
+    _print_models(inspection)
+    if "verification" in report:
+        errors = (
+            f"{name.removesuffix('_error').replace('_', ' ')} {value:.1e}"
+            for name, value in report["verification"].items()
+        )
+        line(f"errors against exact rational arithmetic: {', '.join(errors)}")
+
+
+def _print_models(inspection: Inspection) -> None:
+    rows: list[tuple[Text, ...]] = []
+    for name, properties in inspection.models.items():
+        marked = f"{'* ' if name == inspection.model else '  '}{name}"
+        cells = [marked, f"{properties.mass:.6g}"]
+        if "solid" in inspection.models and name != "solid":
+            difference = inspection.difference(name)
+            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in difference.principal_moments) + " %")
+            cells.append(f"{math.degrees(difference.axes_turned):.3g}")
+            offset = difference.center_of_mass_offset
+            cells.append(f"{shown_zero([offset], float(np.linalg.norm(inspection.upper - inspection.lower)))[0]:.3g}")
+        rows.append(tuple(cells))
+    head = ("  model", "mass [kg]", "error of the principal moments", "axes turned by [deg]", "COM offset [m]")
+    table(rows, head)
+
+
+def _row(values: Iterable[float]) -> str:
+    return " ".join(f"{value:< 13.6g}" for value in values).rstrip()
+
+
+def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
+    """What ``--compare`` prints: a paragraph for each link."""
+    styles = {"ok": "green", "off": "bold red"}
+    for d in diagnoses:
+        line(
+            (d.link, "bold"),
+            f" ({d.mesh}): ",
+            (d.status, styles.get(d.status, "yellow")),
+            f"; {d.note}" if d.note else "",
+        )
+        if d.inertia_error is not None:
+            off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
+            line(
+                f"  relative errors: inertia {d.inertia_error:.2g}, centre of mass {d.center_of_mass_error:.2g} of the size{off}"
+            )
+        for cause in d.causes:
+            line(f"  cause: {cause}")
+        if d.status == "off" and d.expected is not None:
+            center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
+            line(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
+            line("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))
