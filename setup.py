@@ -16,6 +16,7 @@ VERSION = next(
 ROS = ["ros-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
+TERMINAL = ["rich>=13", "argcomplete>=3"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 TEST = [
@@ -55,6 +56,7 @@ setup(
         "mcap": MCAP,
         "workbench": WORKBENCH,
         "sweep": SWEEP,
+        "terminal": TERMINAL,
         "test": TEST,
     },
     zip_safe=False,

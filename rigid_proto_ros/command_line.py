@@ -4,14 +4,35 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NoReturn
 
 from .nearest_name import did_you_mean
 
 NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
 """argparse knows no exponents and takes -2e-4 for an option."""
+
+
+def completing() -> bool:
+    """Whether the shell asks for completions and nothing is to be done."""
+    return "_ARGCOMPLETE" in os.environ
+
+
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Answer the shell and end the process where it asks for completions and argcomplete is installed."""
+    if completing():
+        try:
+            import argcomplete
+        except ImportError:
+            return
+        argcomplete.autocomplete(parser)
+
+
+def completes(action: argparse.Action, names: Callable[[], Iterable[str]]) -> None:
+    """Complete an argument from these names; the shell completes files where none fits."""
+    action.completer = lambda **_: list(names())  # type: ignore[attr-defined]
 
 
 class Parser(argparse.ArgumentParser):

@@ -43,6 +43,8 @@ ALLOWED = {
     "matplotlib": (f"{PACKAGE}.sweep.plot",),
     "PIL": (f"{PACKAGE}.rerun_view",),
     "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
+    "rich": (f"{PACKAGE}.cli.terminal",),
+    "argcomplete": (f"{PACKAGE}.command_line",),
     "viser": (f"{PACKAGE}.workbench",),
     "websockets": (f"{PACKAGE}.workbench",),  # comes with viser
     "mcap": (f"{PACKAGE}.session_mcap",),

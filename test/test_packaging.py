@@ -156,6 +156,8 @@ def test_what_pip_is_to_install_has_the_versions_of_setup_py() -> None:
             "viser",
             "pyarrow",
             "trimesh",
+            "rich",
+            "argcomplete",
         ]
         assert set(told) <= declared
 

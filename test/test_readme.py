@@ -36,7 +36,20 @@ pytestmark = pytest.mark.skipif(not README.is_file(), reason="not run from a sou
 DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if README.is_file() else []
 OWN = ("rigid_proto", "poke_client")
 # Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
-NOT_RUN = {"sudo", "source", "cd", "rosdep", "colcon", "pip", "git", "ros2", "python", "rerun", "rigid_body_node"}
+NOT_RUN = {
+    "sudo",
+    "source",
+    "cd",
+    "rosdep",
+    "colcon",
+    "pip",
+    "git",
+    "ros2",
+    "python",
+    "rerun",
+    "rigid_body_node",
+    "eval",
+}
 SWEEP = "rigid_proto sweep"
 STAYS_UP = ("rigid_proto up", "rigid_proto workbench", "rigid_body_node --bodies")
 

@@ -30,8 +30,9 @@ def recording(tmp_path_factory):
 
 def arguments(*words: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
-    command.add_parser(parser.add_subparsers())
-    return parser.parse_args(["snapshot", *words])
+    command.add_arguments(parser)
+    parser.set_defaults(run=command.run)
+    return parser.parse_args(words)
 
 
 def take(*words: str) -> None:

@@ -17,9 +17,14 @@ FLIGHT_S = 10.0
 OUT = Path("out")
 
 
-def add_parser(subparsers) -> None:
+EXAMPLES = (
+    ("rigid_proto demo", "the bundled T-handle, poked, 10 s"),
+    ("rigid_proto demo --mesh part.obj --duration 20", "your own mesh, 20 s"),
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("demo", help="node, scripted pokes and recording in one go, ending by itself")
     parser.add_argument("--mesh", metavar="PATH", help="fly this mesh instead of the bundled T-handle")
     parser.add_argument("--out", type=Path, default=OUT, metavar="FOLDER", help="for the session (default out)")
     parser.add_argument(
@@ -29,7 +34,6 @@ def add_parser(subparsers) -> None:
         metavar="S",
         help="simulated seconds, or until the last poke (default 10)",
     )
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

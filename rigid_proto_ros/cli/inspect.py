@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bundled import body_names
+from ..command_line import completes
 from ..core.errors import InputError
 from ..core.mass_properties import scale_vector
 from ..inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
@@ -27,14 +29,24 @@ VERIFIED = 1e-13
 """Largest error against rational arithmetic with which ``--verify`` is content."""
 
 
-def add_parser(subparsers) -> argparse.ArgumentParser:
-    """Declare the command on ``subparsers``."""
-    parser = subparsers.add_parser(
-        "inspect",
-        help="mass properties of a mesh, and a verdict on it",
-        description="Mass, centre of mass and inertia of a mesh under every model; a broken mesh is told, not summed.",
+EXAMPLES = (
+    ("rigid_proto inspect hammer --density 7850", "mass, COM, inertia and what is wrong with the mesh"),
+    (
+        "rigid_proto inspect part.stl --scale 0.001 --mass 1.2 --urdf",
+        "a part drawn in mm that weighs 1.2 kg, as a URDF <inertial>",
+    ),
+    ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
+    ("rigid_proto inspect --compare robot.urdf", "how far a robot's inertials are off"),
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = (
+        "Mass, centre of mass and inertia of a mesh under every model; a broken mesh is told, not summed."
     )
-    parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
+    mesh = parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
+    completes(mesh, body_names)
     mass = parser.add_mutually_exclusive_group()
     mass.add_argument("--density", type=float, metavar="D", help=f"kg/m^3 (default {DENSITY:g})")
     mass.add_argument("--mass", type=float, default=0.0, metavar="M", help="kg, whatever the size")
@@ -58,8 +70,6 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     output.add_argument("--urdf", action="store_true", help="a URDF <inertial> on stdout")
     output.add_argument("--sdf", action="store_true", help="an SDF <inertial> on stdout")
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
-    parser.set_defaults(run=run)
-    return parser
 
 
 def _scale_and_mesh(args: argparse.Namespace) -> tuple[list[float], str | None]:

@@ -12,7 +12,7 @@ import signal
 import sys
 
 from .. import __version__
-from ..command_line import Parser
+from ..command_line import Parser, complete, completing
 from ..core.errors import InputError
 
 COMMANDS = {
@@ -26,19 +26,33 @@ COMMANDS = {
     "workbench": "node and interactive page, until Ctrl-C",
 }
 
+EXAMPLES = (
+    ("rigid_proto inspect hammer", "mass, COM and inertia of a bundled mesh"),
+    ("rigid_proto simulate t_handle --record out/flight.rrd", "simulate a bundled scene, recorded for Rerun"),
+    ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
+    ('eval "$(register-python-argcomplete rigid_proto)"', "completion in bash and zsh, where argcomplete is installed"),
+)
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
     argv = sys.argv[1:] if argv is None else argv
-    parser = Parser(prog="rigid_proto", description="Prototype the properties of one rigid body.")
+    parser = Parser(
+        prog="rigid_proto",
+        description="Simulate a rigid body from its mesh, inspect it, record and replay it.",
+        examples=EXAMPLES,
+    )
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
-    # Only the command that runs is imported, so that each starts as fast as it can.
     for name, summary in COMMANDS.items():
-        if argv and argv[0] == name:
-            importlib.import_module(f".{name}", __package__).add_parser(subparsers)
-        else:
-            subparsers.add_parser(name, help=summary)
+        command = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        # Only the command that runs is imported, so that each starts as fast as it can.
+        if (argv and argv[0] == name) or completing():
+            module = importlib.import_module(f".{name}", __package__)
+            module.add_arguments(command)
+            command.show_examples(module.EXAMPLES)
+            command.set_defaults(run=module.run)
+    complete(parser)
     args = parser.parse_args(argv)
     # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in the
     # background had it ignored.

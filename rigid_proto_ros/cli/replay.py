@@ -12,10 +12,16 @@ from ..core.errors import InputError
 from ..output_file import output_file
 from ..progress import Progress
 
+EXAMPLES = (
+    ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
+    ("rigid_proto replay out/flight.mcap --record out/seen.rrd", "a bag as a Rerun recording"),
+    ("rigid_proto replay out/flight.rrd --at 4 --as-scene out/branch.yaml", "the scene at 4 s, to continue otherwise"),
+    ("rigid_proto replay out/flight.mcap --publish states --speed 20", "publish its states over ROS, 20 times as fast"),
+)
 
-def add_parser(subparsers) -> None:
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("replay", help="show, check or branch a recorded session")
     parser.add_argument(
         "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
     )
@@ -28,7 +34,6 @@ def add_parser(subparsers) -> None:
     parser.add_argument("--publish", choices=("states", "commands"), help="send it again, over ROS")
     parser.add_argument("--node", metavar="NAME", help="the node to send commands to; the body in a bag with several")
     parser.add_argument("--speed", type=float, metavar="X", help="times as fast, for --publish states (default 1)")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

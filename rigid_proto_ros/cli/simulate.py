@@ -9,22 +9,46 @@ import math
 import sys
 from pathlib import Path
 
+from ..bundled import scene_names
+from ..command_line import completes
 from ..core.errors import InputError
 from ..output_file import output_file
 from .terminal import line, table
 
+EXAMPLES = (
+    ("rigid_proto simulate t_handle", "the bundled T-handle, 10 s"),
+    (
+        "rigid_proto simulate config/t_handle.yaml --script msg_examples/flip_and_poke.yaml --json",
+        "a scene with scripted pokes; one JSON object",
+    ),
+    (
+        'rigid_proto simulate hammer --set gravity="[0, 0, -9.81]" --duration 2 --record out/hammer.rrd',
+        "with gravity, recorded for Rerun",
+    ),
+)
 
-def add_parser(subparsers) -> None:
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("simulate", help="the simulation without ROS, as fast as the machine goes")
-    parser.add_argument("scene", metavar="SCENE.yaml", help="a ROS parameter file, or the name of a bundled scene")
+    scene = parser.add_argument(
+        "scene", metavar="SCENE.yaml", help="a ROS parameter file, or the name of a bundled scene"
+    )
+    completes(scene, scene_names)
     parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="simulated seconds (default 10)")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter")
+    setting = parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter; may be repeated"
+    )
+    completes(setting, _settings)
     parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
     parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run)
+
+
+def _settings() -> list[str]:
+    from ..parameters import PARAMETERS
+
+    return [f"{name}=" for name in PARAMETERS]
 
 
 def run(args: argparse.Namespace) -> int:

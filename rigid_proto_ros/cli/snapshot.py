@@ -10,15 +10,15 @@ from pathlib import Path
 from ..core.errors import InputError
 from ..progress import Progress
 
+EXAMPLES = (
+    ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
+    ("rigid_proto snapshot out/flight.rrd --at 4 -o out/view.png --view Flight --size 800x600", "one view of it"),
+)
 
-def add_parser(subparsers: argparse._SubParsersAction) -> None:
-    """Add the ``snapshot`` command."""
-    parser = subparsers.add_parser(
-        "snapshot",
-        help="a picture of a recording at one time, without a display",
-        description="Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a "
-        "Vulkan driver; mesa-vulkan-drivers will do.",
-    )
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = "Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a Vulkan driver; mesa-vulkan-drivers will do."
     parser.add_argument(
         "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
     )
@@ -33,7 +33,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument("--scene", metavar="FILE", help="the scene of a bag that lacks it")
     parser.add_argument("--node", metavar="NAME", default="", help="the body, in a bag with several")
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,13 +8,21 @@ import json
 import sys
 from pathlib import Path
 
+from ..bundled import study_names
+from ..command_line import completes
 from ..core.errors import InputError
 
+EXAMPLES = (
+    ("rigid_proto sweep box_tensor -o out/box_tensor.parquet", "a bundled study, on all cores"),
+    ("rigid_proto sweep box_tensor -o out/box_tensor.parquet --resume", "continue after it was stopped"),
+    ("rigid_proto sweep box_tensor --row 7 --record out/row.rrd", "one row of it, recorded for Rerun"),
+)
 
-def add_parser(subparsers) -> None:
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("sweep", help="many variations of one scene into one table")
-    parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
+    study = parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
+    completes(study, study_names)
     parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="threads here (default: one a core)")
     parser.add_argument("--dask", default="", metavar="ADDRESS", help="fly on the cluster of this scheduler")
@@ -28,7 +36,6 @@ def add_parser(subparsers) -> None:
     )
     parser.add_argument("--plot", metavar="x=..,y=..", help="picture of the table: x, y, color, to=FILE.svg")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,14 +7,24 @@ import argparse
 import os
 import sys
 
+from ..bundled import scene_names
+from ..command_line import completes
 
-def add_parser(subparsers) -> None:
+EXAMPLES = (
+    ("rigid_proto up", "the T-handle, with a live view"),
+    ("rigid_proto up hammer --viewer web", "another scene, shown in the browser"),
+    ("rigid_proto up --mesh part.obj", "your own mesh"),
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("up", help="node and live view, until Ctrl-C")
-    parser.add_argument("scene", nargs="?", default="t_handle", metavar="SCENE.yaml", help="scene file or bundled name")
+    scene = parser.add_argument(
+        "scene", nargs="?", default="t_handle", metavar="SCENE.yaml", help="scene file or bundled name"
+    )
+    completes(scene, scene_names)
     parser.add_argument("--mesh", metavar="PATH", help="fly this mesh")
     parser.add_argument("--viewer", choices=("auto", "web", "native", "none"), default="auto")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,23 +8,31 @@ import importlib.util
 import sys
 import time
 
+from ..bundled import scene_names
+from ..command_line import completes
 from ..core.errors import InputError
 
 RESTART_S = 3.0
 """[s] A page that is killed sooner after its start isn't started again."""
 
 
-def add_parser(subparsers) -> None:
+EXAMPLES = (
+    ("rigid_proto workbench hammer", "a bundled scene"),
+    ("rigid_proto workbench --mesh part.obj", "your own mesh"),
+    ("rigid_proto workbench --node /rigid_body", "the page of a node that runs already"),
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser = subparsers.add_parser("workbench", help="node and interactive page, until Ctrl-C")
-    parser.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="scene file or bundled name (t_handle)")
+    scene = parser.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="scene file or bundled name (t_handle)")
+    completes(scene, scene_names)
     parser.add_argument("--mesh", metavar="PATH", help="fly this mesh")
     parser.add_argument("--node", metavar="NAME", help="show the node of this name, which runs already")
     parser.add_argument("--link", metavar="LINK", help="open this situation, made by a page's button")
     parser.add_argument("--port", type=int, metavar="PORT", help="of the page (8080, or the next free one)")
     parser.add_argument("--host", metavar="ADDRESS", help="that the page is served on (this machine only)")
     parser.add_argument("--no-browser", action="store_true", help="only say the address")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -47,7 +55,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _stay(args: argparse.Namespace) -> int:
-    from ..bundled import scene_names
     from ..parameters import PARAMETERS
     from ..rerun_view.ports import LOOPBACK
     from ..workbench.listening import choose_page_port

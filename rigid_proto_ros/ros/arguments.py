@@ -7,7 +7,8 @@ import argparse
 import textwrap
 from collections.abc import Callable
 
-from ..command_line import Parser
+from ..bundled import scene_names
+from ..command_line import Parser, complete, completes
 from ..core.errors import InputError
 from ..nearest_name import did_you_mean
 from ..parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named
@@ -39,13 +40,14 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         description="Simulate a rigid body as a ROS 2 node until Ctrl-C. A scene is a ROS parameter file.",
         examples=EXAMPLES,
     )
-    parser.add_argument(
+    bodies = parser.add_argument(
         "--bodies",
         nargs="+",
         default=[],
         metavar="SCENE",
         help="several bodies: scene files or bundled names, a node each",
     )
+    completes(bodies, scene_names)
     own, ros = _split(argv[1:])
     for word in ros:
         _check_ros_option(word)
@@ -53,6 +55,7 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         parser.epilog = f"{_parameter_help()}\n\n{parser.epilog}"
     if own and not any(word.startswith("-") for word in own):
         raise InputError(own[0], f"not an option; a scene is given by --ros-args --params-file {own[0]}")
+    complete(parser)
     return parser.parse_args(own)
 
 

@@ -14,7 +14,7 @@ import argparse
 import signal
 import sys
 
-from ..command_line import Parser
+from ..command_line import Parser, complete, completes
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
 from ..poke_script import MAX_TIME_S, ScriptCommand, parse_script, read_script
@@ -63,7 +63,10 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         usage="poke_client (SCRIPT.yaml | poke ... | wrench ...) [--reset] [--lead S] [--node NAME]",
         examples=EXAMPLES,
     )
-    parser.add_argument("what", metavar="SCRIPT.yaml | poke | wrench", help="a script, or one command from the line")
+    what = parser.add_argument(
+        "what", metavar="SCRIPT.yaml | poke | wrench", help="a script file, or one command given by the options below"
+    )
+    completes(what, lambda: _ONE_LINE_COMMANDS)
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
     parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="added to every t (default 0.2)")
@@ -79,6 +82,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--angular-impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m s (poke only)")
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
     line.add_argument("--for", dest="duration", type=float, metavar="S", help="seconds that it lasts")
+    complete(parser)
     args = parser.parse_args(argv)
     limits = (
         ("--lead", args.lead, 3600.0),
