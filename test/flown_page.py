@@ -156,7 +156,7 @@ class FlownLink:
 class FlownPage:
     """A user at the page, by its own callbacks. All times are simulated."""
 
-    def __init__(self, lesson: str = "") -> None:
+    def __init__(self, lesson: str = "", anew: bool = False) -> None:
         from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
         from rigid_proto_ros.ros.warm_up import warm_up
         from rigid_proto_ros.workbench.page import Page
@@ -164,7 +164,7 @@ class FlownPage:
 
         warm_up(make_scenario({}).setup)  # compiled on the page's thread, kernels would let its socket time out
         self.server = make_server(LOOPBACK, any_free_port(), lambda link: None)
-        self.page: Page = self.do(lambda: Page(self.server, "/rigid_body", "http://here", lesson))
+        self.page: Page = self.do(lambda: Page(self.server, "/rigid_body", "http://here", lesson, anew))
         self.link: FlownLink = self.page.link
         self.said: list[str] = []
         self.page.say = self.said.append

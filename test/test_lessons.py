@@ -165,6 +165,8 @@ def test_true_tensor_wobbles_and_turns_over_where_the_box_spins_as_on_an_axle() 
     assert degrees_between(true.rotation[:, :, 2], Z).max() > 150.0
     assert degrees_between(box.spin, Z).max() == 0.0
     assert box.body.mass == true.body.mass
+    assert np.array_equal(box.body.center_of_mass, true.body.center_of_mass)
+    box = fly("true_or_box_tensor", 0.01, inertia_model="bounding_box", inertia_model_com="model")
     apart = np.linalg.norm(box.body.center_of_mass - true.body.center_of_mass)
     assert apart == pytest.approx(0.0244, abs=1e-4)
     error = np.abs(box.body.principal_moments / true.body.principal_moments - 1.0)

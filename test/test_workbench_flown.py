@@ -123,3 +123,38 @@ def test_the_ballast_form_shows_the_prepared_weight_at_its_place(flown: FlownPag
     flown.set("Its mass [kg]", "heavy")
     flown.press("Put it there")
     assert len(flown.said) == 1 and "'heavy'" in flown.said[0]
+
+
+def test_a_lesson_begins_when_the_page_is_there_to_show_it(flown: FlownPage, monkeypatch) -> None:
+    class Aloft(FlownLink):
+        def __init__(self, *arguments) -> None:
+            super().__init__(*arguments)
+            self.set_parameters({"ghost.inertia_model": "bounding_box"})
+            super().call("reset")
+            self.fly(5.0)
+
+    monkeypatch.setattr(page_module, "RosLink", Aloft)
+    late = FlownPage(anew=True)
+    try:
+        late.until(lambda: late.link.rows[0][0] == 0, "flight that begins")
+        late.fly(0.1)
+        ghost, _ = late.until(lambda: (ghost := late.page._ghost_row(False))[0] is not None and ghost, "ghost")
+        assert np.abs(ghost[:3] - late.page.state.row[:3]).max() < 1e-3
+    finally:
+        late.end()
+
+
+def test_one_click_shows_body_and_ghost_released_alike_and_the_angle_that_grows_between_them(flown: FlownPage) -> None:
+    shown = flown.page.side_by_side
+    assert not shown.sentence
+    flown.press("True tensor against its box's")
+    angles = []
+    for _ in range(4):
+        flown.fly(0.25)
+        angles.append(flown.until(lambda: shown.angle, "angle between the two"))
+    assert np.all(np.diff(angles) > 0.0) and np.degrees(angles[-1]) > 10.0
+    degrees = f"**{np.degrees(angles[-1]):.0f}° apart**"
+    flown.until(lambda: degrees in shown.sentence, "the number")
+    assert "only the tensor differs" in shown.sentence and flown.page.scenario.values["inertia_model_com"] == "solid"
+    flown.pick("One book, three throws")
+    flown.until(lambda: not shown.sentence, "end of the comparison")

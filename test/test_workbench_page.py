@@ -378,6 +378,13 @@ def drag_message(phase: str, start: tuple, end: tuple) -> bytes:
     return msgspec.msgpack.encode({**message, **places, "button": "left", "modifier": None, "owner": ""})
 
 
+def test_a_killed_node_is_said_on_the_page_which_goes_on_with_the_next_one(page, bench) -> None:
+    os.kill(bench.children()["node"], signal.SIGKILL)
+    page.until(lambda: "has ended, or hangs" in page.text and "Start it again" in page.text, "word of the node's end")
+    assert "is flying" not in page.text and "is sleeping" not in page.text
+    page.until(lambda: "is sleeping" in page.text and "has ended" not in page.text, "another node on the same page")
+
+
 STATE_TOPICS = ("pose", "twist", "events", "scene")
 
 

@@ -13,7 +13,10 @@ from ..command_line import completes
 from ..core.errors import InputError
 
 RESTART_S = 3.0
-"""[s] A page that is killed sooner after its start isn't started again."""
+"""[s] A page or node that is killed sooner after its start isn't started again."""
+
+AT_FIRST = ("--open", "--anew")
+"""What a page that takes a killed one's place doesn't do again."""
 
 
 EXAMPLES = (
@@ -68,23 +71,33 @@ def _stay(args: argparse.Namespace) -> int:
     page_arguments += ["--lesson", scene] if not args.mesh and not args.node and scene in scene_names() else []
     page_arguments += ["--link", args.link] if args.link else []
     page_arguments += [] if args.no_browser else ["--open"]
-    page_arguments += ["--running"] if args.node else []
+    page_arguments += ["--running"] if args.node else ["--anew"]
     page_command = [*own_executable("workbench"), *page_arguments]
     with Processes() as processes:
-        node = None if args.node else processes.start([*own_executable("rigid_body_node"), *node_arguments])
-        page, began = processes.start(page_command), time.monotonic()
+        node_command = [*own_executable("rigid_body_node"), *node_arguments]
+        node = None if args.node else processes.start(node_command)
+        page = processes.start(page_command)
+        node_began = page_began = time.monotonic()
         while True:
             time.sleep(0.1)
             if node is not None and node.poll() is not None:
-                return _ended("rigid_body_node", node.returncode)
+                if node.returncode >= 0 or time.monotonic() < node_began + RESTART_S:
+                    return _ended("rigid_body_node", node.returncode)
+                # The page has said that it is gone, and finds the next one by its name.
+                print(
+                    "rigid_proto workbench: the node was killed; here is another one, at the start of its scene",
+                    file=sys.stderr,
+                )
+                node, node_began = processes.start(node_command), time.monotonic()
             if page.poll() is not None:
                 if page.returncode == 2:
                     return 2  # it has said what was refused
-                if page.returncode >= 0 or time.monotonic() < began + RESTART_S:
+                if page.returncode >= 0 or time.monotonic() < page_began + RESTART_S:
                     return _ended("the page", page.returncode)
                 # Killed: the body flies on, and the browsers find the next page by themselves.
                 print("rigid_proto workbench: the page was killed; here is another one", file=sys.stderr)
-                page, began = processes.start([part for part in page_command if part != "--open"]), time.monotonic()
+                page_command = [part for part in page_command if part not in AT_FIRST]
+                page, page_began = processes.start(page_command), time.monotonic()
 
 
 def _ended(name: str, status: int) -> int:

@@ -43,6 +43,11 @@ class BodyTab:
             self._inertia_folder()
             self._ballast_folder()
 
+    @property
+    def table(self) -> str:
+        """The true tensor beside another, as it is shown."""
+        return self._table.content
+
     def changed(self, scenario: Scenario, another: bool) -> None:
         """Show what follows from the parameters in force; ``another`` body is the measure of "times" from now on."""
         body = scenario.setup.body

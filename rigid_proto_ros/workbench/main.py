@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import sys
+import time
 import webbrowser
 
 from ..core.errors import InputError
@@ -16,6 +17,9 @@ from ..ros.ending import Ending
 PATIENCE_S = 10.0
 """[s] For a node that is said to be running: discovery takes less than one of them."""
 
+LAST_WORD_S = 0.2
+"""[s] For the last word to reach the browsers."""
+
 
 def main(argv: list[str] | None = None) -> int:
     """Serve the page; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
@@ -25,6 +29,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--host", default=LOOPBACK)
     parser.add_argument("--open", action="store_true")
+    parser.add_argument("--anew", action="store_true", help="begin the flight when the first browser is there")
     parser.add_argument("--lesson", default="")
     parser.add_argument("--link", default="")
     args = parser.parse_args(argv)
@@ -55,7 +60,7 @@ def serve(args: argparse.Namespace, ending: Ending) -> int:
             page.deliver(page.follow_link, link)
 
     server = make_server(args.host, args.port, on_link)
-    page = Page(server, args.node, address, args.lesson)
+    page = Page(server, args.node, address, args.lesson, args.anew)
     pages.append(page)
     running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
     try:
@@ -69,6 +74,8 @@ def serve(args: argparse.Namespace, ending: Ending) -> int:
         ending.wait()
     finally:
         running.cancel()
+        page.deliver(page.show_ended)
+        time.sleep(LAST_WORD_S)
         stop_server(server)
         page.close()
     return 0

@@ -12,6 +12,7 @@ import json
 import time
 from collections import deque
 from collections.abc import Awaitable
+from typing import Any
 
 import numpy as np
 import viser
@@ -34,9 +35,10 @@ from .scene_view import SceneView
 from .session_tab import SessionTab
 from .shadow import Shadow
 from .show_tab import ShowTab
+from .side_by_side import SideBySide
 from .sighting import DrawnPose, Sightings
 from .situation import Situation, bring_about
-from .status import Status
+from .status import ENDED, Status
 from .upload_button import UploadButton
 
 FRAME_S = 0.02
@@ -44,6 +46,9 @@ FRAME_S = 0.02
 
 GRACE_S = 2.0
 """[s] After the last browser left: a page that is loaded anew finds its history."""
+
+COMPARED = "true_or_box_tensor"
+"""The lesson that shows a body and its ghost."""
 
 LEASH = 1.0
 """Body sizes that the body may fly from the picture's middle before the picture follows."""
@@ -75,6 +80,7 @@ class Page:
         self.link = RosLink(target, self.deliver, self._on_scene, self._on_diagnostics)
         self._scenes = SceneLoader(self.loop, self._take_on, self._unshown)
         self.view = SceneView(server)
+        self._com: Any = None
         self.sightings = Sightings()
         self.acting = Acting()
         self.shadow = Shadow(self._ghost_refuses)
@@ -83,6 +89,7 @@ class Page:
         self._controls = Controls(server.gui, self._setter.set, lambda text: self.say(text))
         self._readouts = ReadoutPanel(server, 300)
         self._status = server.gui.add_markdown("")
+        self.side_by_side = SideBySide(server.gui, lambda: self._session.fly_lesson(COMPARED))
         tabs = server.gui.add_tab_group()
         self._panel = Panel(self, self._controls, tabs)
         self.body_tab = BodyTab(self, self._controls, tabs)
@@ -135,6 +142,11 @@ class Page:
             self.link.call("pause", self._paused_before_looking)
         self.link.close()
         self._upload.close()
+
+    def show_ended(self) -> None:
+        """The last word: browsers show what was sent last for as long as they are open."""
+        self._status.content = ENDED
+        self.server.flush()
 
     # Browsers come and go
 
@@ -281,6 +293,9 @@ class Page:
             self.sightings.forget()
             self.pointer.attach(self.view.body)
             self._another_body = True
+        if self.view.com is not self._com:
+            self._com = self.view.com
+            self.pointer.attach_com(self._com)
         if old is not None and self.state is not None:
             self.acting.changed(old, scenario, self.state)
             self.shadow.changed(scenario, self.state)
@@ -354,6 +369,7 @@ class Page:
         self.acting.begin(self.scenario.setup, state)
         self.shadow.begin(self.scenario, state)
         self._refusals_said.clear()
+        self.side_by_side.restart()
         self._readouts.restart()
 
     def _event(self, line: str) -> dict | None:
@@ -431,6 +447,7 @@ class Page:
             # ω reaches beyond L, for they are parallel where the body turns about a principal axis.
             view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.85 * size))
             view.show_ghost(ghost, com)
+            self.side_by_side.show(now_s, self.scenario, state, ghost, self.history.ghost is not None)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else self.acting.string_energy(setup, state)
         self._readouts.show(now_s, self.scenario, state, stretched)

@@ -84,6 +84,15 @@ class Pointer:
             node.on_click(modifier=modifier)(self._on_click)
         node.on_drag("left")(self._on_drag)
 
+    def attach_com(self, node) -> None:
+        """The same for the mark of the centre of mass, which can lie where there is no body: a click acts there."""
+
+        async def clicked(event) -> None:
+            self.click_com(event.ray_direction)
+
+        for modifier in (None, "shift"):
+            node.on_click(modifier=modifier)(clicked)
+
     def knot_moved(self) -> None:
         """Somebody published ~/string/attach: the parameter ``string.attach`` doesn't say any more where the knot is."""
         self._knot_by_message = True
@@ -116,6 +125,11 @@ class Pointer:
         else:
             self._link.wrench("poke", f"world@{point}", tuple(self._tools.force * direction))
         return True
+
+    def click_com(self, ray_direction) -> None:
+        """Poke at the centre of mass, along the view."""
+        direction = np.asarray(ray_direction, dtype=float)
+        self._link.wrench("poke", "world@com", tuple(self._tools.force * direction / np.linalg.norm(direction)))
 
     # Drag
 

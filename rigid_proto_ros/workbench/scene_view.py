@@ -75,6 +75,7 @@ class SceneView:
         self.unit = 1.0
         self.origin = np.zeros(3)
         self.body: Any = None
+        self.com: Any = None
         self._shown = dict(SWITCHES)
         self._radius = 0.5
         self._drawn_body: tuple = ()
@@ -228,6 +229,7 @@ class SceneView:
             made["Bounding box"] = scene.add_line_segments("/body/bounds", edges, BOUNDS_COLOUR, thickness=0.005)
         else:
             self._handles["Bounding box"] = []
+        self.com = made["COM"]
         for name, handle in made.items():
             handle.visible = self._shown[name]
             self._handles[name] = [handle]

@@ -88,6 +88,11 @@ class SessionTab:
             if lesson.name == name:
                 self._choice.value = title
 
+    async def fly_lesson(self, name: str) -> None:
+        """As if it had been picked from the list."""
+        self.show_lesson_named(name)
+        await self._fly(self._lessons[self._choice.value].path.read_text("utf-8"), "")
+
     async def _fly(self, scene: str, script: str) -> None:
         await self._page.doing("setting the scene", self._bring(scene, script))
 
