@@ -95,7 +95,7 @@ def measure() -> dict[str, list[float]]:
     def drag(phase: str, x: float):
         return SimpleNamespace(phase=phase, client_id=1, start_position=(0.0, 0.0, 0.0), end_position=(x, 0.0, 0.0))
 
-    click = SimpleNamespace(modifier=None, ray_origin=(1.3, -2.2, 1.1), ray_direction=(-1.3, 2.2, -1.1))
+    click = SimpleNamespace(modifier=None, ray_origin=(1.45, -2.45, 1.2), ray_direction=(-1.45, 2.45, -1.2))
     page.tools.force = 1e-9
     found: dict[str, list[float]] = {"click": [], "drag": []}
     for _ in range(EVENTS):

@@ -25,8 +25,8 @@ PASSING = "rigid_proto_upload_"
 
 
 def is_passing(path: str | Path) -> bool:
-    """Whether a file lies in such a folder."""
-    return Path(path).parent.name.startswith(PASSING)
+    """Whether a file lies in such a folder, or in one of its own."""
+    return any(folder.name.startswith(PASSING) for folder in Path(path).parents)
 
 
 def folder() -> Path | None:

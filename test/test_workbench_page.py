@@ -307,7 +307,8 @@ def test_an_upload_shows_the_verdict_and_a_broken_one_leaves_the_body_as_it_is(p
     field.set_input_files(str(open_box))
     page.until(lambda: "open_box.obj" in page.text and "boundary" in page.text, "a verdict on the open box")
     assert ear.values()["mesh"] == "teapot"
-    page.button("Fly its hull")
+    assert page.page.get_by_text("1 × 1 × 1 m").count() == 1
+    page.button("Simulate its hull")
     assert ear.until_value("mesh", lambda mesh: mesh.endswith("open_box.obj"))
     ear.set_named({"mesh": "teapot", "mesh_fallback": ""}, atomically=True)
     folder = bench.process._out.parent

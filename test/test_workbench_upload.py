@@ -17,6 +17,8 @@ from rigid_proto_ros import mesh_cache
 from rigid_proto_ros.bundled import body_path
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.core.errors import InputError, MeshError
+from rigid_proto_ros.core.rotation import matrix_from_quaternion
+from rigid_proto_ros.offline import read_scene
 from rigid_proto_ros.workbench.upload import MAX_BYTES, Uploads, shown_name
 
 BOOK = body_path("book").read_bytes()
@@ -44,7 +46,7 @@ def test_an_upload_gets_the_verdict_that_inspect_gives(place: Path, capsys: pyte
     assert main(["inspect", upload.path, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(upload.report))
     assert upload.refusal == ""
-    assert upload.name == "my_book.obj"
+    assert upload.name == "my_book.obj" == Path(upload.path).name
     broken = uploads.take("broken.obj", OPEN)
     assert main(["inspect", broken.path, "--json"]) == 2
     assert json.loads(capsys.readouterr().out)["verdict"] == broken.report["verdict"]
@@ -80,6 +82,65 @@ def test_what_is_no_mesh_is_refused_and_nothing_is_kept_of_it(place: Path, name:
     assert files(place) == [Path(flown.path)]
     uploads.close()
     assert not list(place.iterdir())
+
+
+def bust_in_millimetres() -> bytes:
+    """A box as large as a bust of half a metre, in a file whose numbers are millimetres."""
+    sides = (200.0, 250.0, 480.0)
+    corners = [[s * bool(k >> axis & 1) for axis, s in enumerate(sides)] for k in range(8)]
+    faces = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"]
+    return "".join(f"v {x} {y} {z}\n" for x, y, z in corners).encode() + "".join(f"f {f}\n" for f in faces).encode()
+
+
+def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as_much_as_a_mountain(
+    place: Path,
+) -> None:
+    upload = Uploads().take("bust.obj", bust_in_millimetres())
+    assert (upload.likely_unit, upload.likely_up) == ("mm", "z")
+    assert upload.size_and_mass("mm") == "0.2 × 0.25 × 0.48 m, 24 kg at 1000 kg/m³"
+    assert upload.size_and_mass("m") == "200 × 250 × 480 m, 2.4e+10 kg at 1000 kg/m³"
+    values = upload.flight("mm", "y")
+    body = read_scene("t_handle", {**values, "mass": 0.0}).setup
+    assert body.body.mass == pytest.approx(24.0, rel=1e-12)
+    # Its y is up now, and nothing is left of the spin and the stand-in of the body before.
+    assert matrix_from_quaternion(values["initial.orientation_xyzw"])[:, 1] == pytest.approx([0.0, 0.0, 1.0])
+    assert matrix_from_quaternion(upload.flight("mm", "x")["initial.orientation_xyzw"])[:, 0] == pytest.approx(
+        [0, 0, 1]
+    )
+    assert not body.initial[7:13].any()
+    assert (values["mesh_fallback"], values["inertia_model"], values["density"]) == ("", "solid", 1000.0)
+
+
+def test_an_upload_that_bounds_no_solid_has_a_size_and_no_mass(place: Path) -> None:
+    assert Uploads().take("open.obj", OPEN).size_and_mass("cm") == "0.01 × 0.01 × 0.01 m"
+
+
+def glb(buffer_uri: str | None = None) -> bytes:
+    trimesh = pytest.importorskip("trimesh")
+    data = trimesh.creation.box((1.0, 2.0, 3.0)).export(file_type="glb")
+    if buffer_uri is None:
+        return data
+    length = struct.unpack_from("<I", data, 12)[0]
+    parts = json.loads(data[20 : 20 + length])
+    parts["buffers"][0]["uri"] = buffer_uri
+    text = json.dumps(parts).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + length :]
+    header = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(rest))
+    return header + struct.pack("<I4s", len(text), b"JSON") + text + rest
+
+
+def test_a_glb_is_taken_in_metres_with_y_up(place: Path) -> None:
+    upload = Uploads().take("Box.glb", glb())
+    assert (upload.likely_unit, upload.likely_up, upload.refusal) == ("m", "y", "")
+    assert upload.size_and_mass("m") == "1 × 2 × 3 m, 6e+03 kg at 1000 kg/m³"
+
+
+@pytest.mark.parametrize("uri", ["../../../etc/passwd", "/etc/passwd", "file:///etc/passwd", "http://127.0.0.1/x"])
+def test_a_glb_that_names_other_files_is_refused_unread(place: Path, uri: str) -> None:
+    with pytest.raises(MeshError, match="holds all of its parts"):
+        Uploads().take("Box.glb", glb(uri))
+    assert not files(place)
 
 
 class Large(bytes):
@@ -120,7 +181,7 @@ def test_a_name_leads_nowhere(place: Path, name: str) -> None:
     uploads = Uploads()
     upload = uploads.take(name, BOOK)
     path = Path(upload.path)
-    assert path.parent.parent == place
+    assert path.parent.parent.parent == place
     assert path.resolve() == path
     assert path.suffix == ".obj"
     assert len(path.name) < 60
@@ -157,7 +218,7 @@ def test_the_end_of_the_process_removes_its_uploads(place: Path) -> None:
     )
     environment = {**os.environ, "TMPDIR": str(place), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
-    assert Path(done.stdout.strip()).parent.parent == place
+    assert Path(done.stdout.strip()).parent.parent.parent == place
     assert not list(place.iterdir())
 
 

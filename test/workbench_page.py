@@ -27,7 +27,7 @@ DRAWN_MS = 120
 SAID_S = 0.06
 """[s] A page says at most every 0.05 s where the pointer is."""
 
-CAMERA, FIELD_OF_VIEW = np.array([1.3, -2.2, 1.1]), math.radians(40.0)
+CAMERA, FIELD_OF_VIEW = np.array([1.45, -2.45, 1.2]), math.radians(40.0)
 """Where a page looks from at first, to its middle, in units of the picture."""
 
 

@@ -25,6 +25,7 @@ from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
 from .heard_command import heard_command
 from .history import SCENE_GRACE_S, History
+from .keys import add_keys
 from .panel import Panel
 from .pointer import Pointer, Tools, suggested_force
 from .readout_panel import ReadoutPanel
@@ -50,7 +51,7 @@ GRACE_S = 2.0
 COMPARED = "true_or_box_tensor"
 """The lesson that shows a body and its ghost."""
 
-LEASH = 1.0
+LEASH = 0.2
 """Body sizes that the body may fly from the picture's middle before the picture follows."""
 
 
@@ -87,7 +88,7 @@ class Page:
         self.pointer = Pointer(self.link, self, self.sightings, self.tools)
         self._setter = ParameterSetter(self.link.set_parameters, self._refused)
         self._controls = Controls(server.gui, self._setter.set, lambda text: self.say(text))
-        self._readouts = ReadoutPanel(server, 300)
+        self._readouts = ReadoutPanel(server)
         self._status = server.gui.add_markdown("")
         self.side_by_side = SideBySide(server.gui, lambda: self._session.fly_lesson(COMPARED))
         tabs = server.gui.add_tab_group()
@@ -96,6 +97,7 @@ class Page:
         self._session = SessionTab(self, tabs, self._panel.play_tab)
         self.show_tab = ShowTab(self, tabs)
         self._upload = UploadButton(self)
+        add_keys(self)
         self._session.show_lesson_named(lesson)
         self._open = asyncio.Event()
         self._known = asyncio.Event()
@@ -264,6 +266,19 @@ class Page:
             self.looking_from = from_ns
             self.pause(True)
         self.looking_at = max(from_ns - round(back_s * 1e9), self.history.span[0])
+
+    @property
+    def step_s(self) -> float:
+        """[s] What ``~/step`` and the keys for steps go on by: one publication period."""
+        return 0.01 if self.scenario is None else 1.0 / float(self.scenario.values["publish_rate"])
+
+    def look_by(self, seconds: float) -> None:
+        """Look further back, or less far with a negative number."""
+        self._session.look_by(seconds)
+
+    async def go_on_from_here(self) -> None:
+        """Take the node to the moment that is looked at."""
+        await self._session.go_on_from_here()
 
     def resume_after_looking(self) -> None:
         """Back to now, running or paused as it was."""
@@ -437,20 +452,20 @@ class Page:
         looking = self.looking_at is not None
         ghost, com = self._ghost_row(looking)
         with self.server.atomic():
-            view.place(state.row)
-            view.place_grid()
+            view.place(state.row, now_s)
+            view.place_surroundings(bool(np.any(setup.gravity)))
+            view.look_again(now_s)
             view.draw_trails(now_s, state.time_ns, self.scenario)
             view.show_string(None if looking else self.acting.string_ends(setup, state))
             view.show_loads([] if looking else self.acting.arrows(setup, state, size))
             view.show_hit(None if looking else self.acting.hit(setup, state))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
-            # ω reaches beyond L, for they are parallel where the body turns about a principal axis.
-            view.show_momentum(state.position, _direction(momentum, 0.7 * size), _direction(spin, 0.85 * size))
+            scales = view.show_motion(state.position, momentum, spin)
             view.show_ghost(ghost, com)
             self.side_by_side.show(now_s, self.scenario, state, ghost, self.history.ghost is not None)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else self.acting.string_energy(setup, state)
-        self._readouts.show(now_s, self.scenario, state, stretched)
+        self._readouts.show(now_s, self.scenario, state, stretched, scales)
 
     def _ghost_row(self, looking: bool) -> tuple[np.ndarray | None, np.ndarray]:
         """The ghost's state, and its COM in scaled mesh coordinates: the future that was left, or the scene's own ghost."""
@@ -479,8 +494,3 @@ class Page:
         status = self._status_of.text(now_s, self._doing)
         if self._status.content != status:
             self._status.content = status
-
-
-def _direction(vector: np.ndarray, length: float) -> np.ndarray:
-    size = float(np.linalg.norm(vector))
-    return vector * (length / size) if size > 0.0 else np.zeros(3)

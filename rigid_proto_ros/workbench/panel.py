@@ -30,6 +30,7 @@ STRONGEST = 1e12
 HELP = """
 **Drag** the body: a string ties it to the pointer. **Click**: a poke along the view. **Shift-click**: a push inward.
 Drag beside it: turn the view; right button: move it; wheel or two fingers: closer.
+**Keys**: space, arrows, backspace, R; **?** lists them.
 """
 
 

@@ -22,6 +22,9 @@ ABOVE = 0.06
 
 SIDES = 40
 
+UNWRITTEN = "-"
+"""A label's text before it is first shown: one that is empty as it is made stays empty in viser 1.1, whatever it is given."""
+
 
 class PokeMark:
     """One ring and one label in the picture. Lengths are in the picture's units."""
@@ -31,7 +34,7 @@ class PokeMark:
         self._ring: Any = scene.add_mesh_simple(
             "/poke/ring", vertices, triangles, color=colour, side="double", opacity=1.0, visible=False
         )
-        self._label: Any = scene.add_label("/poke/label", "", visible=False, anchor="bottom-center")
+        self._label: Any = scene.add_label("/poke/label", UNWRITTEN, visible=False, anchor="bottom-center")
 
     def show(self, point: np.ndarray, direction: np.ndarray, text: str, age: float, size: float) -> None:
         """At ``point`` (3,), lying across the force's unit ``direction`` (3,). age: 0 when it hit, 1 when it is forgotten.

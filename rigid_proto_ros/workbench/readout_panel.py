@@ -4,13 +4,30 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
 
 import numpy as np
 import viser
 
+from ..appearance import (
+    ANGLE_UNIT,
+    ENERGY_SERIES,
+    ENERGY_TITLE,
+    ENERGY_UNIT,
+    MOMENTUM_ANGLE_SERIES,
+    MOMENTUM_ANGLE_TITLE,
+    MOMENTUM_UNIT,
+    OMEGA_SERIES,
+    OMEGA_TITLE,
+    OMEGA_UNIT,
+    css,
+)
 from ..core.inertia_tensor import principal_axes
 from ..core.state import State
 from ..scenario import Scenario
+from .plot_range import AXIS_PIXELS, PlotRange, plot_range
 from .readouts import angle_between
 
 PLOTTED_S = 20.0
@@ -22,43 +39,95 @@ SAMPLE_S = 0.1
 NUMBERS_S, PLOTS_S = 0.2, 0.5
 """[s] How often numbers and plots are drawn anew."""
 
-COLOURS = ("rgb(235,85,85)", "rgb(70,170,90)", "rgb(85,130,250)", "rgb(60,60,60)")
-PLOTS = {
-    "Energy [J]": ("turning", "moving", "potential", "total"),
-    "ω in principal axes [rad/s]": ("ω₁", "ω₂", "ω₃"),
-    "Angle of L to its start [°]": ("angle",),
-}
+PLOT_PIXELS = 130
+
+AXES: Any = ({"label": "t [s]", "labelSize": 14, "size": 30}, {"size": AXIS_PIXELS})
+
+FLAT_ANGLE = 1.0
+"""[°] An angle's plot spans at least this much: rounding isn't blown up to fill it."""
+
+
+def table(rows: Iterable[tuple[str, str]]) -> str:
+    """Names and values as HTML, which a browser takes at once; Markdown it would compile anew at every change."""
+    cells = "".join(
+        f'<tr><td style="color: gray; padding: 0 1em 0 0">{escape(name)}</td><td>{escape(value)}</td></tr>'
+        for name, value in rows
+    )
+    return f'<table style="margin: 0.6em 0.9em; font-size: 0.85em; line-height: 1.45">{cells}</table>'
+
+
+class Plot:
+    """One small plot of values over the simulated time. series: name and colour of each; least: as ``plot_range`` takes it."""
+
+    def __init__(
+        self,
+        gui: Any,
+        title: str,
+        unit: str,
+        series: Sequence[tuple[str, tuple[int, int, int]]],
+        least: float = 0.0,
+    ) -> None:
+        self._title, self._unit, self._least = title, unit, least
+        self._range = PlotRange(0, -1.0, 1.0)
+        self.columns = len(series)
+        styles = [{"label": "t"}, *({"label": name, "stroke": css(colour), "width": 1.5} for name, colour in series)]
+        self._handle = gui.add_uplot(
+            tuple(np.zeros(1) for _ in styles),
+            tuple(styles),
+            title=self._range.title(title, unit),
+            scales=self._scales,
+            axes=AXES,
+            height=PLOT_PIXELS,
+            # Its values are those under the pointer, "--" while there is none.
+            legend={"show": len(series) > 1, "live": False},
+            padding=(4, 12, 0, 0),
+        )
+
+    @property
+    def _scales(self) -> Any:
+        return {"x": {"time": False}, "y": {"range": (self._range.low, self._range.high)}}
+
+    def show(self, times_s: np.ndarray, values: np.ndarray) -> None:
+        """Draw values (n, columns) at times (n,) [s]."""
+        suited = plot_range(values, self._least)
+        if suited != self._range:
+            # The page makes the plot anew for these, so they change in steps.
+            self._range = suited
+            self._handle.scales = self._scales
+            title = suited.title(self._title, self._unit)
+            if self._handle.title != title:
+                self._handle.title = title
+        self._handle.data = (times_s, *(values / 10.0**suited.exponent).T)
 
 
 class ReadoutPanel:
     """Follows one flight; ``restart`` at every reset."""
 
-    def __init__(self, server: viser.ViserServer, width: float) -> None:
-        panel = server.gui.add_panel()
+    def __init__(self, server: viser.ViserServer) -> None:
+        gui = server.gui
+        panel = gui.add_panel()
         with panel.add_tab("Readouts"):
-            self._numbers = server.gui.add_markdown("waiting for the node …")
-            self._plots = [self._plot(server, title, names) for title, names in PLOTS.items()]
-        panel.dock_left()
-        panel.set_width(width)
+            self._numbers = gui.add_html("waiting for the node …")
+            self._plots = (
+                Plot(gui, ENERGY_TITLE, ENERGY_UNIT, ENERGY_SERIES),
+                Plot(gui, OMEGA_TITLE, OMEGA_UNIT, OMEGA_SERIES),
+                Plot(gui, MOMENTUM_ANGLE_TITLE, ANGLE_UNIT, MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE),
+            )
+        # One column beside the picture, which keeps most of the window's width.
+        panel.dock_below(gui.main_panel)
         self._samples: deque[tuple[float, ...]] = deque()
         self._start: np.ndarray | None = None
         self._numbers_due_s = self._plots_due_s = self._sample_due_s = 0.0
-
-    def _plot(self, server: viser.ViserServer, title: str, names: tuple[str, ...]):
-        series = [{"label": "t"}] + [
-            {"label": name, "stroke": colour, "width": 1.5} for name, colour in zip(names, COLOURS, strict=False)
-        ]
-        data = tuple(np.zeros(1) for _ in series)
-        scales = {"x": {"time": False}}
-        return server.gui.add_uplot(data, tuple(series), title=title, scales=scales, height=150, legend={"show": True})
 
     def restart(self) -> None:
         """The flight began anew."""
         self._samples.clear()
         self._start = None
 
-    def show(self, now_s: float, scenario: Scenario, state: State, string_energy: float) -> None:
-        """Take a state; draw where that is due."""
+    def show(
+        self, now_s: float, scenario: Scenario, state: State, string_energy: float, scales: Mapping[str, str]
+    ) -> None:
+        """Take a state; draw where that is due. scales: of the picture's arrows, by their names."""
         if now_s < self._sample_due_s and now_s < self._numbers_due_s:
             return
         body = scenario.setup.body
@@ -68,14 +137,16 @@ class ReadoutPanel:
             self._start = momentum
         angle = 0.0 if self._start is None else float(np.degrees(angle_between(momentum, self._start)))
         w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
-        total = state.kinetic_energy(body.mass, body.inertia)
-        moving = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
+        kinetic = state.kinetic_energy(body.mass, body.inertia)
+        translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
+        rotational = kinetic - translational
         potential = -body.mass * float(scenario.setup.gravity @ state.position) + string_energy
         time_s = state.time_ns * 1e-9
         if now_s >= self._sample_due_s:
             self._sample_due_s = now_s + SAMPLE_S
             if not self._samples or time_s > self._samples[-1][0]:
-                self._samples.append((time_s, total - moving, moving, potential, total + potential, *w.tolist(), angle))
+                energies = (translational, rotational, potential, kinetic + potential)
+                self._samples.append((time_s, *energies, *w.tolist(), angle))
             while self._samples and self._samples[0][0] < time_s - PLOTTED_S:
                 self._samples.popleft()
         if now_s >= self._numbers_due_s:
@@ -83,25 +154,21 @@ class ReadoutPanel:
             spin = float(np.linalg.norm(state.angular_velocity_body))
             rows = (
                 ("time", f"{time_s:.2f} s"),
-                ("energy", f"{total + potential:.5g} J"),
-                ("… turning, moving", f"{total - moving:.4g}, {moving:.4g} J"),
-                ("\\|L\\|", f"{length:.5g} N m s"),
-                ("L off its start", f"{angle:.3g}°"),
-                ("\\|ω\\|", f"{spin:.4g} rad/s"),
+                ("energy", f"{kinetic + potential:.5g} {ENERGY_UNIT}"),
+                ("translational", f"{translational:.4g} {ENERGY_UNIT}"),
+                ("rotational", f"{rotational:.4g} {ENERGY_UNIT}"),
+                ("|L|", f"{length:.5g} {MOMENTUM_UNIT}"),
+                ("drift of L's direction", f"{angle:.3g}{ANGLE_UNIT}"),
+                ("|ω|", f"{spin:.4g} {OMEGA_UNIT}"),
                 ("ω₁ ω₂ ω₃", " ".join(f"{x:.3g}" for x in w)),
+                ("COM", " ".join(f"{x:.4g}" for x in state.position) + " m"),
+                *scales.items(),
             )
-            table = "\n".join(f"| {name} | {value} |" for name, value in rows)
-            self._numbers.content = "|  |  |\n| --- | --- |\n" + table
+            self._numbers.content = table(rows)
         if now_s >= self._plots_due_s and len(self._samples) > 1:
             self._plots_due_s = now_s + PLOTS_S
-            columns = np.array(self._samples).T
+            samples = np.array(self._samples)
             first = 1
-            for plot, names in zip(self._plots, PLOTS.values(), strict=True):
-                plot.data = (columns[0], *(columns[first + k] for k in range(len(names))))
-                if names == ("angle",):
-                    # Round-off isn't blown up to fill the plot.
-                    plot.scales = {
-                        "x": {"time": False},
-                        "y": {"range": (0.0, max(1.0, 1.1 * float(columns[first].max())))},
-                    }
-                first += len(names)
+            for plot in self._plots:
+                plot.show(samples[:, 0], samples[:, first : first + plot.columns])
+                first += plot.columns

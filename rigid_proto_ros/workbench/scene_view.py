@@ -21,7 +21,6 @@ from ..appearance import (
     GHOST_COLOUR,
     HAND_COLOUR,
     MOMENTUM_COLOUR,
-    OMEGA_COLOUR,
     STRING_COLOUR,
 )
 from ..core.inertia_tensor import equimomental_shapes
@@ -30,7 +29,11 @@ from ..core.surface import Surface
 from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
 from .acting import Hit
+from .motion_arrows import MotionArrows
+from .plot_range import nice_step
 from .poke_mark import PokeMark
+from .soft_shadow import SoftShadow
+from .surroundings import FLOOR, Surroundings
 from .trails import COM_TRAIL, POINT_TRAIL, Trails
 
 BOUNDS_COLOUR = (90, 90, 90)
@@ -58,11 +61,20 @@ SWITCHES = {
 COM_SIZE = 0.025
 """Radius of the centre of mass as drawn, in body sizes."""
 
+GHOST_OPACITY = 0.4
 SEE_THROUGH = 0.45
 """Opacity of a body that one can look into."""
 
-GRID_CELLS = 40
-CAMERA = (1.3, -2.2, 1.1)
+ZOOM = (0.15, 1.2)
+"""Body sizes in the picture's units between which a body may grow or shrink before the picture is scaled anew."""
+
+LOOK_AGAIN_S = 0.25
+"""[s] Between two looks of the browsers at whether the pointer is still on a body that moves."""
+
+ABOVE_FLOOR = 2e-3
+"""Picture units that the shadow lies above the floor, whose lines would flicker through it."""
+
+CAMERA = (1.45, -2.45, 1.2)
 """Where a page looks from at first, in the picture's units."""
 
 
@@ -76,13 +88,16 @@ class SceneView:
         self.origin = np.zeros(3)
         self.body: Any = None
         self.com: Any = None
+        self._ghost: Any = None
         self._shown = dict(SWITCHES)
         self._radius = 0.5
         self._drawn_body: tuple = ()
-        self._scale = np.ones(3)
+        self._scale, self._center_of_mass = np.ones(3), np.zeros(3)
         self._middle = np.zeros(3)
         self._handles: dict[str, list] = {name: [] for name in SWITCHES}
         self._surface: Surface | None = None
+        self._drawn_mesh: Any = None
+        self._look_due_s, self._look_odd = 0.0, False
         scene = self._scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -92,29 +107,23 @@ class SceneView:
         server.initial_camera.fov = math.radians(40.0)
         self._body_frame = scene.add_frame("/body", show_axes=False)
         self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
-        self._grid = scene.add_grid(
-            "/grid",
-            width=GRID_CELLS * 0.5,
-            height=GRID_CELLS * 0.5,
-            cell_size=0.5,
-            section_size=2.5,
-            shadow_opacity=0.0,
-        )
-        self._handles["Grid"] = [self._grid]
+        self._surroundings = Surroundings(scene)
+        self._shadow = SoftShadow(scene, "/grid/shadow")
         # Length 1 is the picture's unit; the body's own are scaled to it.
         triad: dict[str, Any] = {"axes_radius": 0.008, "origin_radius": 0.0, "visible": False}
         self._world_axes = scene.add_frame("/world", axes_length=0.8, **triad)
         self._body_axes = scene.add_frame("/body/own_axes", **triad)
+        self._body_axes_labels = [scene.add_label(f"/body/own_axes/{axis}", f"body {axis}") for axis in "xyz"]
+        for axis, direction in zip("xyz", np.eye(3), strict=True):
+            scene.add_label(f"/world/{axis}", axis, position=0.85 * direction)
         self._handles["World axes"], self._handles["Body axes"] = [self._world_axes], [self._body_axes]
         none = np.zeros((1, 2, 3))
         self._string = scene.add_line_segments("/string/line", none, STRING_COLOUR, thickness=0.012, visible=False)
         self._hand = scene.add_icosphere("/string/hand", 0.018, HAND_COLOUR, visible=False)
-        thin: dict[str, Any] = {"shaft_radius": 0.01, "head_radius": 0.026, "head_length": 0.07, "visible": False}
         thick: dict[str, Any] = {"shaft_radius": 0.013, "head_radius": 0.034, "head_length": 0.09, "visible": False}
         self._loads = scene.add_arrows("/forces", none, FORCE_COLOUR, **thick)
         self._poke = PokeMark(scene, FORCE_COLOUR)
-        self._momentum = scene.add_arrows("/momentum", none, MOMENTUM_COLOUR, **thin)
-        self._omega = scene.add_arrows("/omega", none, OMEGA_COLOUR, **thin)
+        self._motion = MotionArrows(scene)
         self.trails = Trails(scene)
 
     @property
@@ -134,12 +143,20 @@ class SceneView:
             self._body_opacity()
         if name in (COM_TRAIL, POINT_TRAIL):
             self.trails.switch(name, shown)
+        if name == "Grid":
+            self._surroundings.switch(shown)
         for handle in self._handles[name]:
             handle.visible = shown
 
     def _body_opacity(self) -> None:
-        if self.body is not None:
-            self.body.opacity = SEE_THROUGH if self._shown["See through the body"] else None
+        if self.body is None:
+            return
+        seen_through = self._shown["See through the body"]
+        if self._drawn_mesh is self.body:
+            self.body.opacity = SEE_THROUGH if seen_through else None
+        else:
+            self.body.opacity = SEE_THROUGH if seen_through else 0.0
+            self._drawn_mesh.visible = not seen_through
 
     # The body
 
@@ -153,8 +170,8 @@ class SceneView:
         corners = _box_corners(surface, body.scale) if surface else np.array([-ellipsoid, ellipsoid])
         size = float(np.linalg.norm(corners[1] - corners[0]))
         self._radius = 0.5 * size
-        if zoom or replaced or not 0.1 <= size / self.unit <= 4.0:
-            self.unit = nice_length(size)
+        if zoom or replaced or not ZOOM[0] <= size / self.unit <= ZOOM[1]:
+            self.unit = nice_step(size)
         unit = self.unit
         if replaced:
             self._surface = surface
@@ -162,15 +179,16 @@ class SceneView:
                 # Drawn vertices are relative to it: single precision is enough then, however far out the mesh lies.
                 self._middle = 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
             self._make_body(surface)
+            self._shadow.of(surface)
         if surface is not None:
             offset = (self._middle * body.scale - body.center_of_mass) / unit
             scale = tuple((body.scale / unit).tolist())
         else:
             offset, scale = np.zeros(3), tuple((ellipsoid / unit).tolist())
         turned = (1.0, 0.0, 0.0, 0.0) if surface is not None else _wxyz(body.principal_quaternion)
-        for mesh in (self.body, self._ghost):
+        for mesh in (self.body, self._drawn_mesh, self._ghost):
             mesh.scale, mesh.position, mesh.wxyz = scale, offset, turned
-        self._scale = body.scale
+        self._scale, self._center_of_mass = body.scale, body.center_of_mass
         drawn = (body.inertia.tobytes(), body.center_of_mass.tobytes(), *scale)
         if replaced or drawn != self._drawn_body:
             self._drawn_body = drawn
@@ -178,29 +196,65 @@ class SceneView:
         return replaced
 
     def _make_body(self, surface) -> None:
-        """The nodes of body and ghost: mesh coordinates about the middle of the box, to be scaled by the node itself."""
+        """The nodes of body and ghost: mesh coordinates about the middle of the box, to be scaled by the node itself.
+
+        The pointer meets the mesh as it is, whose outline under the pointer is whole; what is drawn has its vertices split where
+        edges are sharp, and an outline made of it would be torn there.
+        """
+        scene = self._scene
         if surface is None:
-            drawn = self._scene.add_icosphere("/body/mesh", 1.0, BODY_COLOUR, subdivisions=4)
-            ghost = self._scene.add_icosphere("/ghost/mesh", 1.0, GHOST_COLOUR, opacity=0.35)
-        else:
-            vertices, triangles, _ = shaded_surface(surface.vertices - self._middle, surface.triangles)
-            drawn = self._scene.add_mesh_simple("/body/mesh", vertices, triangles, color=BODY_COLOUR, side="double")
-            ghost = self._scene.add_mesh_simple(
-                "/ghost/mesh", vertices, triangles, color=GHOST_COLOUR, opacity=0.35, side="double"
+            self.body = self._drawn_mesh = scene.add_icosphere("/body/mesh", 1.0, BODY_COLOUR, subdivisions=4)
+            self._ghost = scene.add_icosphere(
+                "/ghost/mesh", 1.0, GHOST_COLOUR, opacity=GHOST_OPACITY, cast_shadow=False
             )
-        self.body, self._ghost = drawn, ghost
+        else:
+            whole = surface.vertices - self._middle
+            vertices, triangles, _ = shaded_surface(whole, surface.triangles)
+            style: dict[str, Any] = {"color": BODY_COLOUR, "side": "double"}
+            if len(vertices) == len(whole):
+                self.body = self._drawn_mesh = scene.add_mesh_simple("/body/mesh", vertices, triangles, **style)
+            else:
+                self.body = scene.add_mesh_simple(
+                    "/body/mesh",
+                    whole,
+                    surface.triangles,
+                    opacity=0.0,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                    **style,
+                )
+                self._drawn_mesh = scene.add_mesh_simple("/body/drawn", vertices, triangles, **style)
+            self._ghost = scene.add_mesh_simple(
+                "/ghost/mesh",
+                vertices,
+                triangles,
+                color=GHOST_COLOUR,
+                opacity=GHOST_OPACITY,
+                side="double",
+            )
         self._body_opacity()
+
+    def look_again(self, now_s: float) -> None:
+        """Have the browsers look whether the pointer is still on the body. They do so where the pointer moves, and when something
+        about the node changes: so its colour does, by less than can be seen."""
+        if self.body is not None and now_s >= self._look_due_s:
+            self._look_due_s = now_s + LOOK_AGAIN_S
+            red, green, blue = BODY_COLOUR
+            self._look_odd = not self._look_odd
+            self.body.color = (red, green, blue + self._look_odd)
 
     def _draw_inertia(self, scenario: Scenario, box, ellipsoid, corners) -> None:
         body, unit, scene = scenario.setup.body, self.unit, self._scene
         size = 2.0 * self._radius / unit
         self._body_axes.axes_length = 0.7 * size
+        for label, direction in zip(self._body_axes_labels, np.eye(3), strict=True):
+            label.position = 0.75 * size * direction
         turned = _wxyz(quaternion_from_matrix(body.principal_axes))
         axes = np.zeros((3, 2, 3))
         # All end outside the body, or the shortest would lie inside a rod.
         lengths = 1.0 + 0.35 * np.sqrt(body.principal_moments / body.principal_moments[2])
         axes[:, 1] = np.diag(self._radius / unit * lengths)
-        see_through = {"opacity": 0.3, "cast_shadow": False, "receive_shadow": False}
+        see_through = {"opacity": 0.3}
         made = {
             "COM": scene.add_icosphere("/body/com", COM_SIZE * size, (30, 30, 30)),
             "Principal axes": scene.add_arrows(
@@ -233,21 +287,30 @@ class SceneView:
         for name, handle in made.items():
             handle.visible = self._shown[name]
             self._handles[name] = [handle]
+        ends = axes[:, 1] * 1.08 @ body.principal_axes.T
+        for k, end in enumerate(ends):
+            label = scene.add_label(
+                f"/body/axis{k + 1}", f"I{'₁₂₃'[k]}", position=end, visible=self._shown["Principal axes"]
+            )
+            self._handles["Principal axes"].append(label)
 
     # Every frame
 
-    def place(self, row: np.ndarray) -> None:
+    def place(self, row: np.ndarray, now_s: float) -> None:
         """Move the body to a state's pose (13,)."""
-        self._body_frame.position = self._drawn(row[0:3])
+        self._body_frame.position = at = self._drawn(row[0:3])
         self._body_frame.wxyz = _wxyz(row[3:7])
+        if self._shown["Grid"]:
+            below = np.array([at[0], at[1], FLOOR + ABOVE_FLOOR])
+            scale, offset = self._scale / self.unit, self._center_of_mass / self.unit
+            self._shadow.draw(now_s, row[3:7], scale, offset, self._radius / self.unit, below)
+        else:
+            self._shadow.hide()
 
-    def place_grid(self) -> None:
-        """Grid and world axes stand still in the world while the picture follows the body; the grid has no end, it moves by
-        whole sections."""
-        section = 2.5
-        shift = -(self.origin / self.unit)
-        self._world_axes.position = shift
-        self._grid.position = (shift[0] % section, shift[1] % section, shift[2] - 1.2 if abs(shift[2]) < 3.0 else -1.2)
+    def place_surroundings(self, falls: bool) -> None:
+        """Floor, wall and world axes stand still in the world while the picture follows the body. falls: there is gravity."""
+        self._world_axes.position = -(self.origin / self.unit)
+        self._surroundings.place(self.origin, self.unit, falls)
 
     def draw_trails(self, now_s: float, until_ns: int, scenario: Scenario) -> None:
         """The paths of COM and point up to a moment of the flight."""
@@ -276,10 +339,10 @@ class SceneView:
             size = 2.0 * self._radius / self.unit
             self._poke.show(self._drawn(hit.point), hit.direction, hit.text, hit.age, size)
 
-    def show_momentum(self, position, momentum, omega) -> None:
-        """L and ω at the COM, drawn vectors [m]."""
-        self._show_arrows(self._momentum, [(position, momentum)], "Angular momentum L")
-        self._show_arrows(self._omega, [(position, omega)], "Angular velocity ω")
+    def show_motion(self, position: np.ndarray, momentum: np.ndarray, omega: np.ndarray) -> dict[str, str]:
+        """L [kg m²/s] and ω [rad/s], both (3,) in world axes, at the COM; returns what each arrow's length stands for."""
+        shown = (self._shown["Angular momentum L"], self._shown["Angular velocity ω"])
+        return self._motion.show(self._drawn(position), momentum, omega, 2.0 * self._radius, self.unit, shown)
 
     def _show_arrows(self, handle, arrows, switch: str) -> None:
         arrows = [(p, v) for p, v in arrows if float(np.abs(v).max()) > 0.02 * self.unit]
@@ -300,12 +363,6 @@ class SceneView:
 
     def _drawn(self, world_point) -> np.ndarray:
         return (np.asarray(world_point) - self.origin) / self.unit
-
-
-def nice_length(length: float) -> float:
-    """1, 2 or 5 times a power of ten, the next above a length [m]."""
-    power = 10.0 ** math.floor(math.log10(length))
-    return next(nice for nice in (power, 2.0 * power, 5.0 * power, 10.0 * power) if nice >= length)
 
 
 def _box_edges(corners: np.ndarray) -> np.ndarray:

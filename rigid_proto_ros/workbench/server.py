@@ -17,6 +17,7 @@ from viser import _messages
 
 from ..core.errors import InputError
 from .listening import check_address
+from .page_style import lay_out
 
 PANEL_PIXELS = 380
 TITLE = "rigid_proto workbench"
@@ -44,6 +45,7 @@ def make_server(host: str, port: int, on_link: Callable[[str], None]) -> viser.V
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(PANEL_PIXELS)
+    lay_out(server)
     return server
 
 

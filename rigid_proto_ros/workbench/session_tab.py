@@ -120,7 +120,7 @@ class SessionTab:
 
         @self._go_on.on_click
         async def _(event) -> None:
-            await self._page.doing("going back", self._rewind())
+            await self.go_on_from_here()
 
         @self._forget.on_click
         async def _(event) -> None:
@@ -143,6 +143,20 @@ class SessionTab:
         page.look_at(page.history.span[1] if page.looking_from is None else page.looking_from, back_s)
         self._go_on.disabled = False
         self._looking.content = f"Looking at {page.history.simulated_ns(page.looking_at) * 1e-9:.2f} s"
+
+    def look_by(self, seconds: float) -> None:
+        """Look further back than now, or less far with a negative number."""
+        page = self._page
+        last_ns = page.history.span[1] if page.looking_from is None else page.looking_from
+        present_ns = last_ns if page.looking_at is None else page.looking_at
+        back_s = max(0.0, (last_ns - present_ns) * 1e-9 + seconds)
+        self._look(back_s)
+        if page.looking_at is not None:
+            self._back.value = min(back_s, self._back.max)
+
+    async def go_on_from_here(self) -> None:
+        """Take the node to the moment that is looked at."""
+        await self._page.doing("going back", self._rewind())
 
     def show_now(self) -> None:
         """Nobody looks back any more."""

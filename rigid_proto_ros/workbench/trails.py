@@ -16,8 +16,8 @@ from ..core.surface import Surface
 LASTS_S = 4.0
 """[s, simulated] Length of a path."""
 
-POINTS_MAX = 400
-"""Of one path: it goes to every page some times a second."""
+POINTS = 300
+"""Of one path, always: it goes to every page some times a second, and viser loses the colours of lines whose number changes."""
 
 DRAWN_S = 0.1
 """[s] Between two drawings."""
@@ -42,9 +42,9 @@ class Trails:
 
     def __init__(self, scene: Any) -> None:
         self._frame = scene.add_frame("/trails", show_axes=False)
-        none = np.zeros((1, 2, 3))
+        none = np.zeros((POINTS - 1, 2, 3))
         self._lines = {
-            name: scene.add_line_segments(f"/trails/{k}", none, colour, thickness=0.012, visible=False)
+            name: scene.add_line_segments(f"/trails/{k}", none, _faded(colour), thickness=0.012, visible=False)
             for k, (name, colour) in enumerate(COLOURS.items())
         }
         self._shown = dict.fromkeys(COLOURS, False)
@@ -78,7 +78,7 @@ class Trails:
         rows = [row for time_ns, row in self._states if time_ns <= until_ns]
         if len(rows) < 2:
             return {}
-        every = -(-len(rows) // POINTS_MAX)
+        every = -(-len(rows) // POINTS)
         rows = rows[::-every][::-1]  # the last one is always among them
         found = {}
         if self._shown[COM_TRAIL]:
@@ -100,16 +100,17 @@ class Trails:
             for name, line in self._lines.items():
                 path = paths.get(name)
                 if path is not None:
-                    drawn = (path - self._base) / unit
+                    drawn = np.zeros((POINTS, 3))
+                    drawn[-len(path) :] = (path - self._base) / unit
+                    drawn[: -len(path)] = drawn[-len(path)]  # a path that is still short begins with nothing
                     line.points = np.stack([drawn[:-1], drawn[1:]], axis=1)
-                    line.colors = _faded(COLOURS[name], len(drawn))
                 if line.visible != (path is not None):
                     line.visible = path is not None
         self._frame.position = (self._base - origin) / unit
 
 
-def _faded(colour: tuple[int, int, int], points: int) -> np.ndarray:
-    """Colours (points - 1, 2, 3) of a path's pieces, the oldest end nearly that of the background."""
-    share = np.linspace(0.1, 1.0, points)[:, np.newaxis]
+def _faded(colour: tuple[int, int, int]) -> np.ndarray:
+    """Colours (POINTS - 1, 2, 3) of a path's pieces, the oldest end nearly that of the background."""
+    share = np.linspace(0.1, 1.0, POINTS)[:, np.newaxis]
     fading = (share * np.array(colour) + (1.0 - share) * BACKGROUND).astype(np.uint8)
     return np.stack([fading[:-1], fading[1:]], axis=1)

@@ -8,12 +8,17 @@ The next upload replaces it, and the folder goes with the process; one that was 
 from __future__ import annotations
 
 import atexit
+import json
+import math
 import os
 import re
 import shutil
+import struct
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
+
+import numpy as np
 
 from ..core.errors import MeshError
 from ..mesh_body import mesh_body
@@ -24,8 +29,21 @@ from ..mesh_io import BYTES_PER_TRIANGLE, MAX_TRIANGLES, OWN_FORMATS, load_mesh
 MAX_BYTES = 256_000_000
 """Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""
 
-ACCEPTED = OWN_FORMATS
-"""Endings of files that are read here and hold all of the mesh: .glb, .gltf and .dae may name other files, .3mf is a zip."""
+ACCEPTED = (*OWN_FORMATS, "glb")
+"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip. A .glb that names others is refused."""
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+"""Metres, by the name of what a file's numbers may be in."""
+
+HALF = math.sqrt(0.5)
+UPRIGHT = {"z": [0.0, 0.0, 0.0, 1.0], "y": [HALF, 0.0, 0.0, HALF], "x": [0.0, -HALF, 0.0, HALF]}
+"""Attitudes xyzw that turn a file's up axis to the world's z."""
+
+ROOM_SIZE = 20.0
+"""A file whose longest side is more than this isn't in metres: meshes are of things, and most of these are in millimetres."""
+
+SENSIBLE_DENSITY = 1000.0
+"""[kg/m³] Water's, the node's own default."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +54,45 @@ class Upload:
     path: str
     inspection: Inspection
     report: dict
+
+    @property
+    def sides(self) -> np.ndarray:
+        """Sides (3,) of its bounding box, in the file's numbers."""
+        return self.inspection.upper - self.inspection.lower
+
+    @property
+    def likely_unit(self) -> str:
+        """Which of UNITS it is most likely in."""
+        return "m" if self.name.endswith(".glb") or float(self.sides.max()) <= ROOM_SIZE else "mm"
+
+    @property
+    def likely_up(self) -> str:
+        """Which of its axes points up most likely: glTF says y."""
+        return "y" if self.name.endswith(".glb") else "z"
+
+    def size_and_mass(self, unit: str) -> str:
+        """Its size and mass in one line, its numbers being in this unit and its density SENSIBLE_DENSITY."""
+        metres = UNITS[unit]
+        sides = " × ".join(f"{side * metres:.3g}" for side in self.sides)
+        volume = self.report["volume"]
+        if volume is None:
+            return f"{sides} m"
+        return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
+
+    def flight(self, unit: str, up: str) -> dict[str, object]:
+        """Parameters to fly it with: what another body left behind, its mass, spin or stand-in, isn't its own."""
+        at_rest = {f"initial.{name}": [0.0, 0.0, 0.0] for name in ("position", "linear_velocity", "angular_velocity")}
+        return {
+            "mesh": self.path,
+            "scale": [UNITS[unit]] * 3,
+            "mass": 0.0,
+            "density": SENSIBLE_DENSITY,
+            "inertia_model": "solid",
+            "mesh_repair": False,
+            "mesh_fallback": "",
+            "initial.orientation_xyzw": UPRIGHT[up],
+            **at_rest,
+        }
 
     @property
     def verdict(self) -> list[str]:
@@ -78,18 +135,21 @@ class Uploads:
             )
         self._remove_all_but(self._flown)
         self._count += 1
-        # Another name each time: a node that is told the same path again sees no change.
-        path = self._home() / f"{self._count}_{name}"
+        if suffix == "glb":
+            refuse_other_files(name, data)
+        # Another folder each time: a node that is told the same path again sees no change.
+        path = self._home() / str(self._count) / name
         try:
+            path.parent.mkdir()
             path.write_bytes(data)
             body = mesh_body(load_mesh(str(path), max_triangles=self._max_triangles), repair=repair, fallback=fallback)
             inspection = inspect_mesh(body)
             return Upload(name, str(path), inspection, as_json(inspection))
         except OSError as error:
-            path.unlink(missing_ok=True)
+            shutil.rmtree(path.parent, ignore_errors=True)
             raise MeshError("upload", name, f"room for it ({error.strerror})") from None
         except BaseException:
-            path.unlink(missing_ok=True)
+            shutil.rmtree(path.parent, ignore_errors=True)
             raise
 
     def fly(self, upload: Upload | None) -> None:
@@ -111,9 +171,21 @@ class Uploads:
         return self._folder
 
     def _remove_all_but(self, kept: Path | None) -> None:
-        for path in self._folder.iterdir() if self._folder else ():
-            if path != kept:
-                path.unlink(missing_ok=True)
+        for folder in self._folder.iterdir() if self._folder else ():
+            if kept is None or folder != kept.parent:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def refuse_other_files(name: str, data: bytes) -> None:
+    """Raise MeshError for a .glb that isn't one, or that has parts in other files: they would be read from this machine."""
+    try:
+        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", data)
+        parts = json.loads(data[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else None
+        named = [part.get("uri") for part in (*parts.get("buffers", ()), *parts.get("images", ()))]
+    except (struct.error, ValueError, AttributeError, TypeError) as error:
+        raise MeshError("upload", name, "a binary glTF file") from error
+    if any(uri is not None and not str(uri).startswith("data:") for uri in named):
+        raise MeshError("upload", name, "a .glb that holds all of its parts itself")
 
 
 def shown_name(file_name: str) -> tuple[str, str]:

@@ -11,7 +11,8 @@ import viser
 from viser import _messages
 
 from ..core.errors import InputError
-from .upload import ACCEPTED, MAX_BYTES, Upload, Uploads, shown_name
+from .situation import Situation
+from .upload import ACCEPTED, MAX_BYTES, UNITS, UPRIGHT, Upload, Uploads, shown_name
 
 if TYPE_CHECKING:
     from .page import Page
@@ -24,7 +25,7 @@ MAX_TRANSFERS = 4
 
 
 class UploadButton:
-    """Takes a file, shows the verdict on it, and flies it where it can fly."""
+    """Takes a file, shows the verdict on it, asks for its unit and up axis, and flies it where it can fly."""
 
     def __init__(self, page: Page) -> None:
         self._page = page
@@ -39,8 +40,12 @@ class UploadButton:
                 mime_type=",".join(f".{suffix}" for suffix in ACCEPTED),
                 hint=f".{', .'.join(ACCEPTED)}; at most {MAX_BYTES // 1_000_000} MB",
             )
-            self._repaired = gui.add_button("Fly it repaired", visible=False)
-            self._hull = gui.add_button("Fly its hull", visible=False)
+            self._unit = gui.add_dropdown("Its unit", tuple(UNITS), visible=False, hint="Of the file's numbers (scale)")
+            self._up = gui.add_dropdown("Its up axis", tuple(UPRIGHT), visible=False, hint="initial.orientation_xyzw")
+            self._size = gui.add_markdown("", visible=False)
+            self._as_it_is = gui.add_button("Simulate it", visible=False)
+            self._repaired = gui.add_button("Simulate it repaired", visible=False)
+            self._hull = gui.add_button("Simulate its hull", visible=False)
         guard_uploads(page.server, self._refuse)
 
         @self._button.on_upload
@@ -49,13 +54,19 @@ class UploadButton:
             self._button._impl.value = viser.UploadedFile("", b"")  # so that it isn't kept in memory
             await page.doing(f"reading {shown_name(file.name)[0]}", self._take(file.name, file.content))
 
-        @self._repaired.on_click
+        @self._unit.on_update
         async def _(event) -> None:
-            self._fly({"mesh_repair": True})
+            self._show_size()
 
-        @self._hull.on_click
-        async def _(event) -> None:
-            self._fly({"mesh_fallback": "hull"})
+        for button, changes in (
+            (self._as_it_is, {}),
+            (self._repaired, {"mesh_repair": True}),
+            (self._hull, {"mesh_fallback": "hull"}),
+        ):
+
+            @button.on_click
+            async def _(event, changes: dict = changes) -> None:
+                await self._fly(changes)
 
     def flies(self, mesh: str) -> None:
         """The node's parameter ``mesh`` is this now: files that it doesn't fly go."""
@@ -76,31 +87,44 @@ class UploadButton:
 
     async def _take(self, name: str, content: bytes) -> None:
         await self._page.known()
-        values = self._page.scenario.values
-        repair, fallback = values["mesh_repair"], values["mesh_fallback"]
         try:
-            upload = await asyncio.to_thread(self.uploads.take, name, content, repair=repair, fallback=fallback)
+            upload = await asyncio.to_thread(self.uploads.take, name, content)
         except InputError as error:
-            self._show([f"refused: {error}"], False)
+            self._show([f"refused: {error}"], None)
             raise
         self.present = upload
         lines = [*upload.verdict, *([f"refused: {upload.refusal}"] if upload.refusal else [])]
-        self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: nothing to say"], bool(upload.refusal))
-        if not upload.refusal:
-            self._fly({})
+        self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: no problems found"], upload)
 
-    def _show(self, lines: list[str], refused: bool) -> None:
+    def _show(self, lines: list[str], upload: Upload | None) -> None:
+        """The verdict, and what is asked before this upload flies; None: nothing is asked."""
         self._page.body_tab.show_verdict(lines)
-        self._repaired.visible = self._hull.visible = refused
+        if upload is not None:
+            self._unit.value, self._up.value = upload.likely_unit, upload.likely_up
+            self._show_size()
+        for handle in (self._unit, self._up, self._size):
+            handle.visible = upload is not None
+        self._as_it_is.visible = upload is not None and not upload.refusal
+        self._repaired.visible = self._hull.visible = upload is not None and bool(upload.refusal)
 
-    def _fly(self, changes: dict) -> None:
+    def _show_size(self) -> None:
         if self.present is not None:
-            self._repaired.visible = self._hull.visible = False
-            self._page.set({"mesh": self.present.path, **changes})
-            self._page.new_body()
+            self._size.content = f"**{self.present.size_and_mass(self._unit.value)}**"
+
+    async def _fly(self, changes: dict) -> None:
+        page, upload = self._page, self.present
+        if upload is None:
+            return
+        values = {**upload.flight(self._unit.value, self._up.value), **changes}
+        for name, value in page.scenario.values.items():
+            if name.startswith("ballast."):
+                values[name] = [0.0, *value[1:]]
+        page.new_body()
+        await page.doing(f"setting {upload.name}", page.bring_about(Situation(values)))
+        self._show([f"{upload.name}: simulated"], None)
 
     def _refuse(self, client_id: int, reason: str) -> None:
-        self._show([f"refused: {reason}"], False)
+        self._show([f"refused: {reason}"], None)
         self._page.say(reason)
 
     def close(self) -> None:

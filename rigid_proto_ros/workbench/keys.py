@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""The page's keys, by viser's commands: each has a hotkey, and Ctrl-K lists them all.
+
+Browsers send no key that is typed into an input. "?" isn't among the hotkeys that viser 1.1 names, but its pages take any key by
+the name that browsers give it; H does the same where another version doesn't. test_workbench_screen.py presses both.
+Letters W A S D Q E move viser's camera and are left to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .page import Page
+
+BACK_S = 1.0
+"""[s] That backspace goes back, each time it is pressed."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """hotkey and modifier as viser takes them; shown: as it is written on a keyboard."""
+
+    shown: str
+    hotkey: str
+    does: str
+    act: Callable[[Page], Awaitable[None]]
+    modifier: str | None = None
+
+
+async def _pause(page: Page) -> None:
+    if page.looking_at is not None:
+        page.resume_after_looking()
+    else:
+        page.pause(not page.paused)
+
+
+async def _step(page: Page) -> None:
+    if page.looking_at is not None:
+        page.look_by(-page.step_s)
+    elif page.paused:
+        page.call("step")
+    else:
+        page.pause(True)
+
+
+async def _back_a_step(page: Page) -> None:
+    page.look_by(page.step_s)
+
+
+async def _back(page: Page) -> None:
+    page.look_by(BACK_S)
+
+
+async def _go_on(page: Page) -> None:
+    await page.go_on_from_here()
+
+
+async def _reset(page: Page) -> None:
+    page.call("reset")
+
+
+async def _centre(page: Page) -> None:
+    page.centre()
+
+
+async def _list(page: Page) -> None:
+    page.say(key_list())
+
+
+KEYS = (
+    Key("Space", "space", "pause, and go on", _pause),
+    Key("→", "arrowright", "one step on; pauses first", _step),
+    Key("←", "arrowleft", "look one step back", _back_a_step),
+    Key("Backspace", "backspace", f"look {BACK_S:g} s back", _back),
+    Key("G", "G", "go on from the moment looked at", _go_on),
+    Key("R", "R", "reset", _reset),
+    Key("C", "C", "centre on the body", _centre),
+    Key("?", "?", "list the keys", _list, "shift"),
+    Key("H", "H", "list the keys too", _list),
+)
+
+
+def key_list() -> str:
+    """All keys in one line."""
+    return "; ".join(f"{key.shown}: {key.does}" for key in KEYS if key.hotkey != "H")
+
+
+def add_keys(page: Page) -> None:
+    """Give all pages the keys."""
+    for key in KEYS:
+        hotkey: Any = key.hotkey
+        modifier: Any = key.modifier
+        command = page.server.gui.add_command(
+            f"{key.does[0].upper()}{key.does[1:]}", hotkey=hotkey, modifier=modifier, description=f"Key {key.shown}"
+        )
+
+        @command.on_trigger
+        async def _(event: Any, key: Key = key) -> None:
+            await key.act(page)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""How the page is laid out on a narrow screen: the picture above, below it and not over it readouts and controls.
+
+viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a long way
+down; it has no setting for either. A style sheet can
+change it, and viser passes HTML of its server's on to the page, style sheets included. The rules recognise the elements by
+the styles that viser 1.1 gives them; test_workbench_screen.py fails where another version gives others.
+"""
+
+from __future__ import annotations
+
+import viser
+
+NARROW = "36em"
+"""Pages up to this width get viser's sheet at the bottom (its theme's breakpoint ``xs``)."""
+
+PICTURE_SHARE = 56
+"""[%] Of a narrow page's height."""
+
+_SHEET = '.mantine-Paper-root[style*="position: fixed"][style*="max-height: 60%"]'
+_READOUTS = '[aria-label$=" panel Readouts"]'
+_PICTURE = 'div[style*="flex-grow: 1"][style*="height: 100%"]:has(canvas)'
+
+STYLE = f"""<style>
+@media (max-width: {NARROW}) {{
+  {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
+  {_SHEET} [style*="width: 20em"] {{ width: 100% !important; }}
+  {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}):not([style*="display: none"]) {{
+    display: flex !important; flex-direction: column;
+  }}
+  {_SHEET} .mantine-Tabs-root:has(> {_READOUTS}) {{ order: -1; }}
+  {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
+}}
+</style>"""
+
+
+def lay_out(server: viser.ViserServer) -> None:
+    """Give all pages the style sheet."""
+    server.gui.add_html(STYLE, order=-10.0)
