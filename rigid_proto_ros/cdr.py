@@ -11,6 +11,8 @@ import functools
 import struct
 
 _HEADER = b"\x00\x01\x00\x00"
+_STAMP_AND_LENGTH = struct.Struct("<iII")
+_DOUBLES = {count: struct.Struct(f"<{count}d") for count in (3, 6, 10)}
 
 
 def _stamp_and_frame(stamp_ns: int, frame_id: str) -> bytes:
@@ -40,6 +42,17 @@ def _stamped_layout(length: int, count: int) -> struct.Struct:
 def wrench_stamped(stamp_ns: int, frame_id: str, force, torque) -> bytes:
     """A geometry_msgs/WrenchStamped."""
     return stamped_doubles(stamp_ns, frame_id, (*force, *torque))
+
+
+def read_stamped_doubles(data: bytes, count: int) -> tuple[int, int, str, tuple[float, ...]]:
+    """Seconds, nanoseconds, frame_id and doubles of a message as ``stamped_doubles`` packs it; raises ValueError for other bytes."""
+    if data[:2] == _HEADER[:2] and len(data) >= 16:
+        seconds, nanoseconds, length = _STAMP_AND_LENGTH.unpack_from(data, 4)
+        end = 16 + length
+        doubles_at = 4 + (end - 4 + 7) // 8 * 8
+        if length and doubles_at + 8 * count <= len(data):
+            return seconds, nanoseconds, data[16 : end - 1].decode(), _DOUBLES[count].unpack_from(data, doubles_at)
+    raise ValueError(f"no header and {count} doubles as little-endian CDR")
 
 
 def string(text: str) -> bytes:

@@ -35,8 +35,10 @@ class Ghost:
         """Take a command of the followed simulation; what the ghost can't carry passes it by."""
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
+        # A change before it in its list may allow what the present setup doesn't: then it is judged when it acts.
+        judged = None if listed is None else (None, self.simulation.setup)
         try:
-            self.simulation.submit(command, when_ns, listed)
+            self.simulation.submit(command, when_ns, listed, judged)
         except InputError:
             pass
 

@@ -8,13 +8,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from .bundled import scene_names, scene_path
+from .command_codec import ScriptCommand, core_command
 from .core.errors import CommandRefused, InputError
 from .core.observer import Observer
-from .core.simulation import Simulation
+from .core.simulation import Simulation, judge
 from .ghost import ghost_of
 from .nearest_name import did_you_mean
 from .parameters import is_ros_parameter, parameter_named
-from .poke_script import ScriptCommand, core_command, with_contacts
+from .poke_script import with_contacts
 from .progress import Progress
 from .scenario import Scenario, make_scenario, publication_ns
 from .scene_file import read_scene_file, scalar
@@ -96,15 +97,18 @@ class OfflineRun:
             self.simulation.announce()
         self._ghost = ghost_of(scenario, self.simulation, observer)
         script = with_contacts(script or [], scenario.setup.contacts)
-        for number, command in enumerate(script, 1):
+        planned = scenario
+        for number, command in enumerate(script):
             try:
                 core = core_command(command, command.t_ns, scenario.setup.contacts, self._apply_changes)
+                # A command is judged in the scene that the script has made by then.
                 if command.kind == "set":
-                    scenario.with_changes(command.changes)
-                self.simulation.submit(core, command.t_ns)
+                    planned = planned.with_changes(command.changes)
+                judged = (judge(core, planned.setup), planned.setup)
+                self.simulation.submit(core, command.t_ns, (b"", number), judged)
             except CommandRefused as refusal:
                 raise InputError(
-                    f"script, command {number} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
+                    f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
                 ) from None
 
     def _apply_changes(self, changes: dict):
@@ -112,7 +116,7 @@ class OfflineRun:
         if self.observer is not None:
             self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
         if self._ghost is not None:
-            self._ghost.change(self.simulation.time_ns, self.scenario)
+            self._ghost.change(self.simulation.time_ns, self.scenario, self.simulation.listed)
         return self.scenario.setup
 
     def advance(self, until_ns: int) -> bool:

@@ -6,17 +6,14 @@
 
 from __future__ import annotations
 
-import math
+import json
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
-import yaml
-
-from . import cdr
-from .core.commands import Change, ClearWrench, Command, MoveString, ReleaseString, TieString, WrenchCommand
-from .core.errors import CommandRefused, InputError
+from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
+from .core.errors import InputError
 from .core.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
 from .nearest_name import did_you_mean
 from .plain_yaml import load_plain_yaml
@@ -27,60 +24,17 @@ MAX_TIME_S = 1e9
 MAX_ENTRIES = 1_000_000
 """Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
 
-MAX_SCHEDULE_LENGTH = 10_000
-"""Characters of one entry on the schedule topic."""
+MAX_SCHEDULE_LENGTH = 1_000_000
+"""Characters of a message on the schedule topic: 5000 entries and some."""
+
+MAX_YAML_LENGTH = 10_000
+MAX_BRACKETS = 100
+"""Of a message that isn't JSON as well: the YAML reader takes seconds over thousands of brackets, and the body would wait."""
 
 _FORCES = ("force", "push", "impulse")
 _POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
 _TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}
-MESH_FRAME = "body/mesh"
-"""Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
-
 _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
-
-
-@dataclass(frozen=True)
-class ScriptCommand:
-    """One command of an expanded script. t_ns: when it acts, from the script's start. entry: which entry of the script it
-    comes from, counted from 1.
-
-    kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and point
-    (3,), or the name of a contact to attach to. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
-    """
-
-    t_ns: int
-    kind: str
-    frame_id: str = ""
-    force: tuple = (0.0, 0.0, 0.0)
-    torque: tuple = (0.0, 0.0, 0.0)
-    changes: dict | None = None
-    point: tuple = (0.0, 0.0, 0.0)
-    contact: str = ""
-    entry: int = field(default=0, compare=False)
-
-    @property
-    def topic(self) -> str:
-        """The topic that carries it, below the node's name."""
-        return {
-            "wrench": "wrench",
-            "poke": "poke",
-            "string_target": "string/target",
-            "string_attach": "string/attach",
-        }.get(self.kind, "schedule")
-
-    def message(self, stamp_ns: int) -> bytes:
-        """The message as it goes over its topic."""
-        if self.kind in ("wrench", "poke"):
-            return cdr.wrench_stamped(stamp_ns, self.frame_id, self.force, self.torque)
-        if self.kind in ("string_target", "string_attach"):
-            return cdr.stamped_doubles(stamp_ns, self.frame_id, self.point)
-        return cdr.string(self.schedule_text(stamp_ns))
-
-    def schedule_text(self, stamp_ns: int) -> str:
-        """A ``set``, ``release`` or ``clear_wrench`` entry for the schedule topic, with an absolute time."""
-        content: dict[str, dict] = {"set": {"set": self.changes}, "string_release": {"string": "release"}}
-        entry = {"t": stamp_ns / 1e9, **content.get(self.kind, {"service": self.kind})}
-        return yaml.safe_dump(entry, default_flow_style=True, width=math.inf).strip()
 
 
 def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCommand]:
@@ -108,6 +62,41 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
 def script_entries(text: str, name: str = "script"):
     """What a script's YAML says, nothing of it checked yet; raises InputError for what is no plain YAML."""
     return load_plain_yaml(text, name)
+
+
+def read_schedule(text: str):
+    """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and is read
+    faster. Raises InputError.
+    """
+    if len(text) > MAX_SCHEDULE_LENGTH:
+        raise InputError("schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
+    try:
+        entries = json.loads(text, parse_constant=_no_number)
+    except (ValueError, RecursionError):
+        if len(text) > MAX_YAML_LENGTH:
+            raise InputError(
+                "schedule", f"{len(text)} characters", f"JSON, or at most {MAX_YAML_LENGTH} characters of other YAML"
+            ) from None
+        if text.count("[") + text.count("{") > MAX_BRACKETS:
+            raise InputError("schedule", text[:80], f"at most {MAX_BRACKETS} opening brackets, or JSON") from None
+        entries = load_plain_yaml(text, "schedule")
+    if not entries or not isinstance(entries, (dict, list)):
+        raise InputError("schedule", text[:80], "an entry such as {t: 0.5, force: [0, 0, 1]}, or a list of entries")
+    return entries
+
+
+def _no_number(text: str):
+    raise ValueError(text)
+
+
+def expand_schedule(entries, wrench_timeout: float) -> list[ScriptCommand]:
+    """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
+    listed = entries if isinstance(entries, list) else [entries]
+    if any(isinstance(entry, dict) and "script" in entry for entry in listed):
+        raise InputError("schedule", "script", "entries alone, without a script around them")
+    commands = expand_script(listed, "schedule", wrench_timeout, MAX_SCHEDULED)
+    # As listed, which only matters among those that act at once because their time is past.
+    return sorted(commands, key=lambda command: command.entry)
 
 
 def expand_script(
@@ -336,40 +325,3 @@ def _vector(value, field: str) -> tuple[float, float, float]:
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         raise InputError(field, value, "three numbers [x, y, z]")
     return tuple(_number(v, field) for v in value)
-
-
-def core_command(command: ScriptCommand, stamp_ns: int, contacts, apply_changes, frames=("world", "body")) -> Command:
-    """The core's command for a script's; apply_changes(changes) gives the Setup with parameters changed."""
-    message = command.message(stamp_ns)
-    if command.kind == "set":
-        return Change(command.changes, lambda: apply_changes(command.changes), message)
-    if command.kind == "clear_wrench":
-        return ClearWrench(message)
-    if command.kind == "string_release":
-        return ReleaseString(message)
-    if command.kind == "string_target":
-        return string_target(stamp_ns, command.frame_id, command.point, frames[0])
-    if command.kind == "string_attach":
-        return string_attach(stamp_ns, command.frame_id, command.point, *frames)
-    frame = parse_frame(command.frame_id, contacts, *frames)
-    held = command.kind == "wrench"
-    return WrenchCommand(held, frame, command.force, command.torque, stamp_ns, command.frame_id, message)
-
-
-def string_target(stamp_ns: int, frame_id: str, point, world: str = "world") -> MoveString:
-    """The core's command for a message of the string's target topic; raises CommandRefused."""
-    if frame_id not in ("", "world", world):
-        raise CommandRefused("frame", "frame_id", frame_id[:80], f"{world}: the target is a point of the world")
-    message = cdr.stamped_doubles(stamp_ns, frame_id, point)
-    return MoveString(tuple(point), stamp_ns, frame_id, message)
-
-
-def string_attach(stamp_ns: int, frame_id: str, point, world: str = "world", body: str = "body") -> TieString:
-    """The core's command for a message of the string's attach topic; raises CommandRefused."""
-    axes = {"": "world", "world": "world", world: "world", "body": "body", body: "body"}
-    axes |= {MESH_FRAME: "mesh", f"{body}/mesh": "mesh"}
-    if frame_id not in axes:
-        accepted = f"{world}, {body} (metres from the COM) or {body}/mesh (mesh coordinates)"
-        raise CommandRefused("frame", "frame_id", frame_id[:80], accepted)
-    message = cdr.stamped_doubles(stamp_ns, frame_id, point)
-    return TieString(axes[frame_id], tuple(point), stamp_ns, frame_id, message)

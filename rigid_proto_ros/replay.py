@@ -8,29 +8,19 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from . import cdr
-from .core.commands import Change, ClearWrench, Command, Rank, ReleaseString, WrenchCommand
+from .command_codec import command_of_event, frame_names
+from .core.commands import Command
 from .core.errors import InputError
-from .core.frames import parse_frame
 from .core.observer import Observer
 from .core.simulation import Simulation
 from .ghost import Ghost
 from .mesh_io import Mesh, load_mesh
 from .parameters import convert_all
-from .poke_script import string_attach, string_target
 from .recorded_session import RecordedSession
 from .scenario import Scenario, check_inertia, make_scenario
 from .scene_file import read_scene_text
 from .session_mesh import find_mesh, scene_sha256
 from .session_runs import decode_event
-
-MARKS = ("reset", "pause", "step")
-"""Events that stand in the log and don't act on the body."""
-
-KINDS = (
-    *("wrench", "poke", "string_target", "string_attach", "string_release"),
-    *("inertia", "set", "clear_wrench", *MARKS),
-)
 
 
 def session_scenario(session: RecordedSession) -> Scenario:
@@ -84,12 +74,11 @@ class Resimulation:
         self._observer = observer or Observer()
         self.ghost: Ghost | None = None
         self._mesh_of = mesh_of
-        self._node_name = node_name.rpartition("/")[2] or "rigid_body"
-        waiting: list[tuple[int, str, dict, Command | None]] = []
+        self.node_name = node_name
+        waiting: list[tuple[int, str, dict, Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
             time_ns, kind, content = decode_event(line, number)
-            command = None if kind in MARKS else self._command(kind, content, number)
-            waiting.append((time_ns, kind, content, command))
+            waiting.append((time_ns, kind, content, self._command(kind, content, number), number))
         # Stable: what happened at one instant keeps its order.
         self._waiting = deque(sorted(waiting, key=lambda event: event[0]))
 
@@ -106,48 +95,28 @@ class Resimulation:
         return self.simulation.advance(until_ns).row
 
     def _submit_next(self) -> None:
-        time_ns, kind, content, command = self._waiting.popleft()
+        time_ns, kind, content, command, number = self._waiting.popleft()
         self.simulation.advance(max(time_ns, self.simulation.time_ns))
         if command is None:
             self.simulation.log(kind, content)
         else:
-            self.simulation.submit(command, time_ns)
+            # What acted at one instant acts in the order of the log, whatever rule made it; it was judged then.
+            self.simulation.submit(command, time_ns, (b"", number), (None, self.simulation.setup))
 
-    def _command(self, kind: str, content: dict, number: int) -> Command:
+    def _command(self, kind: str, content: dict, number: int) -> Command | None:
+        values = self.scenario.values
+        frames = frame_names(values, self.node_name)
         try:
-            if kind in ("wrench", "poke"):
-                stamp_ns, frame_id = content["stamp_ns"], content["frame_id"]
-                force, torque = _three(content["force"]), _three(content["torque"])
-                frame = parse_frame(frame_id, self.scenario.setup.contacts, *self._frame_names())
-                message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
-                return WrenchCommand(kind == "wrench", frame, force, torque, stamp_ns, frame_id, message)
             if kind == "set":
                 convert_all(content)
-                return Change(content, lambda: self._change(content))
-            if kind == "clear_wrench":
-                return ClearWrench()
-            if kind == "string_release":
-                return ReleaseString()
-            if kind in ("string_target", "string_attach"):
-                names = self._frame_names()
-                read = string_target if kind == "string_target" else string_attach
-                names = names[:1] if kind == "string_target" else names
-                return read(content["stamp_ns"], content["frame_id"], _three(content["point"]), *names)
-            if kind == "inertia":
-                [float(x) for x in (content["mass"], *_three(content["com"]), *content["tensor"], content["relative"])]
-                return Change(
-                    content, lambda: self._take_on(check_inertia(self.scenario, content)), b"", kind, Rank.INERTIA
-                )
+            return command_of_event(
+                kind, content, self.scenario.setup.contacts, frames, self._change, self._change_inertia
+            )
         except InputError as error:
             raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
-        except Exception:  # noqa: BLE001
-            # What stands in a damaged event may be anything, and fails anywhere.
-            raise InputError(f"event {number}", str(content)[:80], "the content of a recorded event") from None
-        raise InputError(f"event {number}, kind", kind, ", ".join(KINDS))
 
-    def _frame_names(self) -> tuple[str, str]:
-        values = self.scenario.values
-        return values["world_frame"], values["body_frame"] or self._node_name
+    def _change_inertia(self, content: dict):
+        return self._take_on(check_inertia(self.scenario, content))
 
     def _change(self, changes: dict):
         mesh = self._mesh_of(changes["mesh"]) if changes.get("mesh") else None
@@ -158,13 +127,8 @@ class Resimulation:
         self.scenario = scenario
         self._observer.scene_changed(self.simulation.time_ns, scenario.text)
         if self.ghost is not None:
-            self.ghost.change(self.simulation.time_ns, scenario)
+            self.ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
         return scenario.setup
-
-
-def _three(values) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
 
 
 def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:

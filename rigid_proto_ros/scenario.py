@@ -33,11 +33,14 @@ _MESH_PARAMETERS = ("mesh", "mesh_repair", "mesh_fallback")
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """A mesh with what is computed from it once: its moments, and its surface wound outward."""
+    """A mesh with what is computed from it once: its moments, and its surface wound outward. made_of: the values of
+    _MESH_PARAMETERS that it was loaded for.
+    """
 
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
+    made_of: tuple
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,13 @@ class Scenario:
     warnings: tuple[str, ...] = ()
     ghost: Setup | None = None
 
-    def with_changes(self, changes: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
+    def with_changes(
+        self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: BodyMesh | None = None
+    ) -> Scenario:
         """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is.
 
-        mesh: a mesh at hand, used instead of loading the one that the parameter names.
+        mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a loaded one, used where it is
+        the one that the parameters ask for.
         """
         changes = parameters.convert_all(changes)
         for name, value in changes.items():
@@ -66,8 +72,12 @@ class Scenario:
         values = {**self.values, **changes}
         if "density" in changes and "mass" not in changes:
             values["mass"] = 0.0
-        reuse = mesh is None and all(values[name] == self.values[name] for name in _MESH_PARAMETERS)
-        return build_scenario(values, self.body_mesh if reuse else load_body_mesh(values, mesh))
+        if mesh is None:
+            if all(values[name] == self.values[name] for name in _MESH_PARAMETERS):
+                return build_scenario(values, self.body_mesh)
+            if at_hand is not None and at_hand.made_of == _made_of(values):
+                return build_scenario(values, at_hand)
+        return build_scenario(values, load_body_mesh(values, mesh))
 
     def with_inertia(self, mass: float, com, tensor6, relative: bool) -> Scenario:
         """The scenario with an explicit inertia, as a message gives it; raises InputError.
@@ -120,7 +130,12 @@ def load_body_mesh(values: Mapping[str, object], mesh: Mesh | None = None) -> Bo
     if not body.verdict.usable:
         raise MeshError("mesh", values["mesh"], body.verdict.reason or "a surface with an extent")
     triangles = body.triangles[:, [0, 2, 1]] if body.verdict.inward else body.triangles
-    return BodyMesh(body.mesh, body.moments, Surface(body.vertices, np.ascontiguousarray(triangles)))
+    surface = Surface(body.vertices, np.ascontiguousarray(triangles))
+    return BodyMesh(body.mesh, body.moments, surface, _made_of(values))
+
+
+def _made_of(values: Mapping[str, object]) -> tuple:
+    return tuple(values[name] for name in _MESH_PARAMETERS)
 
 
 def build_scenario(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:

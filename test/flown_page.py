@@ -13,13 +13,14 @@ from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
 from rigid_proto_ros.cdr import wrench_stamped
+from rigid_proto_ros.command_codec import core_command, string_attach, string_target
 from rigid_proto_ros.core.commands import Change, WrenchCommand
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.frames import parse_frame
 from rigid_proto_ros.core.observer import Observer
 from rigid_proto_ros.core.rotation import rotate
 from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.poke_script import core_command, expand_script, script_entries, string_attach, string_target
+from rigid_proto_ros.poke_script import expand_script, script_entries
 from rigid_proto_ros.scenario import Scenario, make_scenario, nanoseconds
 from rigid_proto_ros.workbench.ros_link import Heard
 from rigid_proto_ros.workbench.sighting import DrawnPose

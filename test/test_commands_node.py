@@ -299,61 +299,77 @@ def test_in_flight_other_mass_properties_leave_the_mesh_where_it_is_and_another_
     assert after[:3] == pytest.approx(before[:3] + 0.01 * before[7:10], abs=1e-15)
 
 
-def test_schedule_takes_set_release_and_clear_wrench_and_refuses_all_else_by_name(rig):
+def test_schedule_takes_an_entry_of_any_kind_or_a_list_whole_and_refuses_all_else_by_name(rig):
     before = rig.counters()
-    good = [
-        "{t: 0.5, set: {linear_damping: 0.25}}",
-        "{t: 0.5, string: release}",
-        "{t: 0.5, service: clear_wrench}",
-        "t: 0.5\nset:\n  step: 0.002",
-    ]
-    bad = [
-        *(
-            "",
-            "[]",
-            "nonsense",
-            "{t: 0.5}",
-            "{set: {mass: 1.0}}",
-            "{t: -1.0, set: {mass: 1.0}}",
-            "{t: .nan, set: {mass: 1}}",
-        ),
-        *(
-            "{t: 0.5, set: {}}",
-            "{t: 0.5, set: {masss: 1.0}}",
-            "{t: 0.5, set: {mass: -1.0}}",
-            "{t: 0.5, set: {mass: .inf}}",
-        ),
-        *("{t: 0.5, service: reset}", "{t: 0.5, string: {target: [0, 0, 1]}}", "{t: 0.5, force: [0, 0, 1]}"),
-        *(
-            "- {t: 0.5, string: release}",
-            "{t: 0.5, string: release, set: {mass: 1.0}}",
-            "{t: 0.5, set: {mass: 1.0}",
-            "\t",
-        ),
-        *("{t: 0.5, set: {world_frame: map}}", "{t: 0.5, set: {contacts.tip: [0.0, 0.0, 0.0]}}", "[" * 5000),
-        *(
-            "{t: 0.5, set: {mass: 1.0}, repeat: 2, every: 0.1}",
-            "!!python/object:os.system {t: 0}",
-            "{t: 0.5, wrench: {}}",
-        ),
-    ]
+    good = {
+        "{t: 0.5, set: {linear_damping: 0.25}}": ["set"],
+        "{t: 0.5, string: release}": ["string_release"],
+        "{t: 0.5, service: clear_wrench}": ["clear_wrench"],
+        "t: 0.5\nset:\n  step: 0.002": ["set"],
+        "{t: 0.5, string: {attach: tip, target: [0, 0, 0.1]}}": ["string_attach", "string_target"],
+        "{t: 0.5, force: [0, 0, 1.0e-3]}": ["poke"],
+        "{t: 0.5, at: tip, push: 1.0e-3, duration: 0.1}": ["poke"],
+        "{t: 0.5, impulse: [0, 0, 1.0e-6], repeat: 2, every: 0.0}": ["poke", "poke"],
+        "{t: 0.5, wrench: {at: tip, torque: [0, 0, 1.0e-6]}}": ["wrench"],
+        "- {t: 0.4, string: release}\n- {t: 0.4, impulse: [0, 0, 1.0e-6]}": ["string_release", "poke"],
+        '[{"t": 0.4, "impulse": [0, 0, 1e-6]}, {"t": 0.4, "set": {"density": 7800}}, {"t": 0.4, "service": "clear_wrench"}]': [
+            *("poke", "set", "clear_wrench")
+        ],
+    }
+    bad = {
+        **dict.fromkeys(("", "[]", "nonsense", "{t: 0.5}", "{set: {mass: 1.0}}", "{t: -1.0, set: {mass: 1.0}}"), 1),
+        **dict.fromkeys(("{t: .nan, set: {mass: 1}}", "{t: 0.5, set: {}}", "{t: 0.5, set: {masss: 1.0}}"), 1),
+        **dict.fromkeys(("{t: 0.5, set: {mass: -1.0}}", "{t: 0.5, set: {mass: .inf}}", "{t: 0.5, service: reset}"), 1),
+        **dict.fromkeys(("{t: 0.5, string: release, set: {mass: 1.0}}", "{t: 0.5, set: {mass: 1.0}", "\t"), 1),
+        **dict.fromkeys(("{t: 0.5, set: {world_frame: map}}", "{t: 0.5, set: {contacts.tip: [0.0, 0.0, 0.0]}}"), 1),
+        **dict.fromkeys(("[" * 5000, "!!python/object:os.system {t: 0}", "{t: 0.5, wrench: {}}"), 1),
+        **dict.fromkeys(("{script: [{t: 0.5, service: clear_wrench}]}", '[{"t": NaN, "string": "release"}]'), 1),
+        "{t: 0.5, impulse: [0, 0, 1], repeat: 5001, every: 0.1}": 1,
+        # A list is taken or refused as a whole, and counts as many as it has entries.
+        "[{t: 0.5, string: release}, {t: 0.5, set: {masss: 1.0}}, {t: 0.5, service: clear_wrench}]": 3,
+        "[{t: 0.5, string: release}, {t: 0.5, string: {attach: nowhere}}]": 2,
+        "[{t: 0.5, string: release}, 5]": 2,
+    }
     rig.start_over(paused=True)
     rig.schedule(*good, *bad)
+    taken = len(good) + 3
+    rig.sent += taken - len(good) + sum(bad.values()) - len(bad)
     rig.until_received(rig.sent)
     rig.pause(False)
-    rig.wait_event("set", 2)
-    rig.wait_event("clear_wrench")
-    rig.wait_event("string_release")
+    kinds = [kind for kinds in good.values() for kind in kinds]
+    for kind in set(kinds):
+        rig.wait_event(kind, kinds.count(kind))
     gained = rig.gained(before, "schedule_received", "commands_received")
     assert gained == {
-        "schedule_received": len(good) + len(bad),
-        "commands_received": len(good) + len(bad),
-        "refused_total": len(bad),
-        "refused_schedule": len(bad),
+        "schedule_received": taken + sum(bad.values()),
+        "commands_received": taken + sum(bad.values()),
+        "refused_total": sum(bad.values()),
+        "refused_schedule": sum(bad.values()),
     }
-    acted = [event["time_ns"] for event in rig.events() if event["kind"] != "pause"]
-    assert acted == [SECOND // 2] * len(good)
+    acted = [(event["time_ns"], event["kind"]) for event in rig.events() if event["kind"] != "pause"]
+    # Lists by their bytes, of which the length comes first; then by kind.
+    lists = [kinds for text, kinds in good.items() if text[0] in "-["]
+    assert [kind for time_ns, kind in acted if time_ns == 2 * SECOND // 5] == [k for kinds in lists for k in kinds]
+    ranks = {"string_attach": 2, "string_target": 2, "wrench": 3, "poke": 4}
+    single = [ranks.get(kind, 0) for time_ns, kind in acted if time_ns == SECOND // 2]
+    assert single == sorted(single) and len(acted) == len(kinds)
     assert rig.get("linear_damping", "step") == {"linear_damping": 0.25, "step": 0.002}
+
+
+def test_a_list_is_judged_in_the_scene_that_it_makes_and_one_refused_in_any_entry_leaves_no_trace(rig):
+    rig.set(integrator="free_body")
+    before = rig.counters()
+    poke = '{"t": 0.2, "at": "tip", "force": [0, 0, 0.001]}'
+    rig.start_over(paused=True)
+    rig.schedule(f'[{{"t": 0.1, "set": {{"linear_damping": 0.5}}}}, {poke}, {{"t": 5000, "string": "release"}}]')
+    rig.schedule(f"[{poke}]", f'[{{"t": 0.2, "set": {{"integrator": "auto"}}}}, {poke}]')
+    rig.sent += 3
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    rig.wait_event("poke")
+    assert [event["kind"] for event in rig.events() if event["kind"] != "pause"] == ["set", "poke"]
+    gained = rig.gained(before)
+    assert gained == {"refused_total": 4, "refused_integrator": 4}
 
 
 def test_a_scheduled_change_that_fits_no_more_when_its_time_comes_is_refused_then(rig):

@@ -185,7 +185,7 @@ def test_after_one_refusal_of_each_kind_the_flight_is_that_without_any_command_t
     rig.start_over(paused=True)
     for commands in (*REFUSED.values(), stamps_out_of_reach(3600)):
         rig.publish(*commands[0])
-    rig.schedule("{t: 1", "5", "{t: 1, set: {masse: 1}}", "{t: 1, set: {mass: -1}}", "{t: 1, force: [0, 0, 1]}")
+    rig.schedule("{t: 1", "5", "{t: 1, set: {masse: 1}}", "{t: 1, set: {mass: -1}}", "{t: 1, push: 1}")
     rig.until_received(rig.sent)
     rig.pause(False)
     simulation = Simulation(make_scenario(rig.scene).setup)

@@ -35,7 +35,7 @@ class Rig:
         self.flight = Flight(scenario, Observer(), lambda s: self.published.append(s.time_ns), self.take, print)
         self.flight.start()
 
-    def take(self, wall_ns: int) -> bool:
+    def take(self, wall_ns: int, whole: bool) -> bool:
         if self.commands:
             self.flight.catch_up()
         while self.commands:
@@ -138,7 +138,7 @@ def test_while_commands_come_they_are_taken_once_more_shortly_before_each_public
     monkeypatch.setattr("rigid_proto_ros.ros.flight.time.monotonic_ns", lambda: now[0])
     rig = Rig({"publish_rate": 1000.0})
     rig.lively = True
-    rig.flight._take_commands = lambda wall_ns: rig.lively
+    rig.flight._take_commands = lambda wall_ns, whole: rig.lively
     wakes = []
     for _ in range(6):
         rig.flight.tick()

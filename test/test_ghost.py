@@ -49,7 +49,7 @@ def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
 
     watcher = Watcher()
     flight = Flight(
-        make_scenario(MOVING), watcher, lambda s: None, lambda wall_ns: False, print, is_viewed=lambda: True
+        make_scenario(MOVING), watcher, lambda s: None, lambda wall_ns, whole: False, print, is_viewed=lambda: True
     )
     flight.start()
     while flight.simulation.time_ns < SECOND:

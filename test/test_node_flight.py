@@ -10,10 +10,11 @@ from conftest import needs_rerun
 from ros_process import READY_S, RosProcess, dds_client, run, running_node
 
 from rigid_proto_ros.bundled import example_path, scene_path
+from rigid_proto_ros.command_codec import string_attach, string_target
 from rigid_proto_ros.core.commands import WrenchCommand
 from rigid_proto_ros.core.frames import parse_frame
 from rigid_proto_ros.offline import OfflineRun, read_scene
-from rigid_proto_ros.poke_script import read_script, string_attach, string_target
+from rigid_proto_ros.poke_script import read_script
 from rigid_proto_ros.rerun_view.reader import read_session
 
 SECOND = 10**9

@@ -232,9 +232,9 @@ def test_message_to_publish_is_accepted_and_moves_the_t_handle(command: str, top
 
 
 def _submit(run: OfflineRun, topic: str, message) -> None:
+    from rigid_proto_ros.command_codec import string_target
     from rigid_proto_ros.core.commands import WrenchCommand
     from rigid_proto_ros.core.frames import parse_frame
-    from rigid_proto_ros.poke_script import string_target
 
     simulation, frame_id = run.simulation, message.header.frame_id
     if topic == "string/target":

@@ -37,7 +37,9 @@ class Node:
         from rigid_proto_ros.scenario import make_scenario
 
         scenario = make_scenario({"initial.angular_velocity": [0.1, 3.0, 0.1], "start_paused": True})
-        self.flight = Flight(scenario, Observer(), lambda state: None, lambda wall_ns: False, lambda message: None)
+        self.flight = Flight(
+            scenario, Observer(), lambda state: None, lambda wall_ns, whole: False, lambda message: None
+        )
         self.thread = PhysicsThread([self.flight])
         self.thread.start()
 

@@ -8,10 +8,10 @@ import pytest
 import trimesh
 from flights import SECOND
 
+from rigid_proto_ros.command_codec import string_attach, string_target
 from rigid_proto_ros.core.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
 from rigid_proto_ros.core.errors import CommandRefused
 from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.poke_script import string_attach, string_target
 from rigid_proto_ros.scenario import make_scenario
 
 SCENE = {

@@ -99,20 +99,21 @@ class Simulation(Readings):
 
     # The way of a command
 
-    def submit(self, command: Command, at_ns: int | None = None, listed: Listed | None = None) -> int:
+    def submit(
+        self,
+        command: Command,
+        at_ns: int | None = None,
+        listed: Listed | None = None,
+        judged: tuple[Load | None, Setup] | None = None,
+    ) -> int:
         """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
 
-        listed: its place, when it is an entry of a list; a change before it there may allow what the present setup doesn't,
-        so whoever submits a list judges its entries (``judge``). Raises CommandRefused for what can be judged now; what can't
-        (a ray) is judged when it acts, and counted.
+        listed: its place, when it is an entry of a list. judged: what ``judge`` gave, and the setup that it was given, where
+        that isn't the present one: a change before it in its list may allow what the present setup doesn't. Raises
+        CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
         """
         when_ns = self.time_ns if at_ns is None else max(at_ns, self.time_ns)
-        setup, load = self.setup, None
-        try:
-            load = judge(command, setup)
-        except CommandRefused:
-            if listed is None:
-                raise
+        load, setup = (judge(command, self.setup), self.setup) if judged is None else judged
         self._arrivals += 1
         pending = Pending(when_ns, command)
         if load is not None and command.frame.point[0] != "ray":
@@ -123,9 +124,9 @@ class Simulation(Readings):
             self.follower.submit(command, when_ns, listed)
         return when_ns
 
-    def refuse(self, error: CommandRefused) -> None:
-        """Count a refusal and tell the observer."""
-        self.refused[error.reason] += 1
+    def refuse(self, error: CommandRefused, count: int = 1) -> None:
+        """Count a refusal, of so many commands at once, and tell the observer."""
+        self.refused[error.reason] += count
         self.observer.refused(self.time_ns, error.reason, str(error))
 
     def check_change(self, new: Setup) -> None:

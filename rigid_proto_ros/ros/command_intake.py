@@ -16,22 +16,14 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from .. import cdr
-from ..core.commands import Change, Rank, WrenchCommand
-from ..core.errors import CommandRefused, InputError
+from ..command_codec import core_command
+from ..core.commands import WrenchCommand
+from ..core.errors import CommandRefused
 from ..core.frames import Frame, parse_frame
-from ..plain_yaml import load_plain_yaml
-from ..poke_script import (
-    MAX_SCHEDULE_LENGTH,
-    MESH_FRAME,
-    ScriptCommand,
-    core_command,
-    expand_script,
-    string_attach,
-    string_target,
-)
 from ..scenario import check_inertia, nanoseconds
 from . import qos
-from .message_bytes import read_message, read_wrench_stamped, whole_stamp
+from .message_bytes import read_command, read_message, read_wrench_stamped
+from .scheduling import LONG_TEXT, Beside, Scheduled
 from .sequence_gaps import SequenceGaps
 from .stamps import effective_time
 from .taken_by_hand import TakenByHand
@@ -51,12 +43,9 @@ MOST_FRAMES = 1000
 LIVELY_NS = 5_000_000_000
 """A topic is looked at in every tick for this long after a message [ns of wall time]."""
 
-MAX_BRACKETS = 100
-"""Lists and mappings opened in one: the YAML reader takes seconds over thousands, and the body would wait for it."""
-
 
 class CommandIntake:
-    """apply_changes(changes) gives the Setup with parameters changed, as scheduled ``set`` entries need it.
+    """apply_changes(changes, mesh at hand) gives the Setup with parameters changed, as scheduled ``set`` entries need it.
 
     received counts every message taken by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now;
     refusals are the simulation's.
@@ -80,6 +69,7 @@ class CommandIntake:
         self._next_quiet_look_ns = 0
         self._next_publishers_look_ns = 0
         self._read_frames: dict[str, Frame] = {}
+        self._beside = Beside()
         self._logger = node.get_logger()
         group = TakenByHand()
 
@@ -106,14 +96,19 @@ class CommandIntake:
         self._depths = [subscription.qos_profile.depth for _, subscription, _, _ in self._sources]
         self._gaps = [SequenceGaps(subscription) for _, subscription, _, _ in self._sources]
 
-    def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None]) -> bool:
+    def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None], whole: bool = False) -> bool:
         """Submit everything that has arrived; what is refused is counted and the observer told, and the rest goes on. Returns whether
         something has arrived within the last LIVELY_NS.
 
-        catch_up() is called before the first message of a tick, so that now is the tick's own time. Topics that carried something lately are looked at in every tick, quiet ones every QUIET_NS.
+        catch_up() is called before the first message of a tick, so that now is the tick's own time. Topics that carried something lately are looked at in every tick, quiet ones every QUIET_NS, or now if ``whole``.
         """
         caught_up = False
-        look_at_quiet = wall_ns >= self._next_quiet_look_ns
+        for message in self._beside.finished():
+            if not caught_up:
+                caught_up = True
+                catch_up()
+            self.received["schedule"] += self._take_scheduled(message, simulation, scenario)
+        look_at_quiet = whole or wall_ns >= self._next_quiet_look_ns
         if look_at_quiet:
             self._next_quiet_look_ns = wall_ns + QUIET_NS
         look_at_publishers = look_at_quiet and wall_ns >= self._next_publishers_look_ns
@@ -138,12 +133,14 @@ class CommandIntake:
                         catch_up()
                     self._lively_until_ns[source] = wall_ns + LIVELY_NS
                     self.sequence_gaps += gaps.before(taken[1].get("publication_sequence_number"))
+                    counted = 1
                     try:
-                        read(taken[0], simulation, scenario)
+                        entries = read(taken[0], simulation, scenario)
+                        counted = 1 if entries is None else entries
                     except CommandRefused as refusal:
                         simulation.refuse(refusal)
                     # Last: a message that counts as received counts as late or refused too, if it is.
-                    self.received[topic] += 1
+                    self.received[topic] += counted
         return wall_ns < max(self._lively_until_ns)
 
     def _wrench(self, data, simulation, scenario) -> None:
@@ -166,78 +163,72 @@ class CommandIntake:
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
     def _string_target(self, data: bytes, simulation, scenario) -> None:
-        stamp_ns, frame_id, point = _read_point_stamped(data)
-        command = string_target(stamp_ns, frame_id, point, self._frames[0])
-        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+        self._string("string/target", data, simulation, scenario)
 
     def _string_attach(self, data: bytes, simulation, scenario) -> None:
-        stamp_ns, frame_id, point = _read_point_stamped(data)
-        command = string_attach(stamp_ns, frame_id, point, *self._frames)
-        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+        self._string("string/attach", data, simulation, scenario)
+
+    def _string(self, topic: str, data: bytes, simulation, scenario) -> None:
+        sent = read_command(topic, data, PointStamped)
+        command = core_command(sent, sent.t_ns, (), None, self._frames)
+        simulation.submit(command, self._when(sent.t_ns, simulation, scenario))
 
     def _inertia(self, data: bytes, simulation, scenario) -> None:
-        message = read_message(data, InertiaStamped)
-        stamp, given = message.header.stamp, message.inertia
-        stamp_ns, frame_id = whole_stamp(stamp.sec, stamp.nanosec), message.header.frame_id
-        body = self._frames[1]
-        if frame_id not in ("", "body", body, MESH_FRAME, f"{body}/mesh"):
-            raise CommandRefused("frame", "frame_id", frame_id[:80], f"{body}/mesh, or {body} (from the present COM)")
-        content = {
-            "stamp_ns": stamp_ns,
-            "frame_id": frame_id,
-            "relative": frame_id in ("body", body),
-            "mass": given.m,
-            "com": [given.com.x, given.com.y, given.com.z],
-            "tensor": [given.ixx, given.ixy, given.ixz, given.iyy, given.iyz, given.izz],
-        }
-        check_inertia(scenario, content)
-        command = Change(content, lambda: self._apply_inertia(content), bytes(data), "inertia", Rank.INERTIA)
+        sent = read_command("inertia/set", data, InertiaStamped)
+        command = core_command(sent, sent.t_ns, (), None, self._frames, self._apply_inertia, bytes(data))
+        check_inertia(scenario, command.content)
+        stamp_ns = sent.t_ns
         simulation.submit(command, self._when(stamp_ns, simulation, scenario))
 
-    def _schedule(self, data, simulation, scenario) -> None:
-        text = read_message(data, String).data
-        if len(text) > MAX_SCHEDULE_LENGTH:
-            raise CommandRefused("schedule", "schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
-        if text.count("[") + text.count("{") > MAX_BRACKETS:
-            raise CommandRefused("schedule", "schedule", text[:80], f"at most {MAX_BRACKETS} opening brackets")
+    def _schedule(self, data, simulation, scenario) -> int:
+        message = Scheduled(bytes(data), read_message(data, String).data)
+        quick = self._beside.is_empty and len(message.text) <= LONG_TEXT
+        if quick:
+            message.read(scenario)
+            quick = not message.is_slow
+        if quick:
+            message.judge(scenario, self._apply_changes)
+            return self._take_scheduled(message, simulation, scenario)
+
+        def work() -> None:
+            if not message.commands:
+                message.read(scenario)
+            message.judge(scenario, self._apply_changes)
+
+        self._beside.give(message, work)
+        return 0
+
+    def _take_scheduled(self, message: Scheduled, simulation, scenario) -> int:
+        """Submit all of a message's entries, or refuse them all; returns how many there are."""
         try:
-            command = _scheduled(text)
-            if command.kind == "set":
-                scenario.with_changes(command.changes)
-        except CommandRefused:
-            raise
-        except InputError as error:
-            raise CommandRefused("schedule", error.field, error.received, error.accepted) from None
-        stamp_ns = command.t_ns
-        core = core_command(command, stamp_ns, simulation.setup.contacts, self._apply_changes)
-        simulation.submit(core, self._when(stamp_ns, simulation, scenario))
+            if message.refusal is not None:
+                raise message.refusal
+            times = [self._effective(entry.t_ns, simulation, scenario) for entry in message.entries]
+        except CommandRefused as refusal:
+            simulation.refuse(refusal, message.count)
+            return message.count
+        for counter in ("late", "wall_stamp"):
+            entries = {e.number for e, (_, counted) in zip(message.entries, times, strict=True) if counted == counter}
+            self._count_stamps(counter, len(entries))
+        for entry, (when_ns, _) in zip(message.entries, times, strict=True):
+            simulation.submit(entry.command, when_ns, entry.listed, entry.judged)
+        return message.count
 
     def _when(self, stamp_ns: int, simulation, scenario) -> int:
+        when_ns, counter = self._effective(stamp_ns, simulation, scenario)
+        self._count_stamps(counter, 1)
+        return when_ns
+
+    def _effective(self, stamp_ns: int, simulation, scenario) -> tuple[int, str]:
         horizon_ns = nanoseconds(scenario.values["schedule_horizon"])
-        when_ns, counter = effective_time(stamp_ns, simulation.time_ns, time.time_ns(), horizon_ns)
+        return effective_time(stamp_ns, simulation.time_ns, time.time_ns(), horizon_ns)
+
+    def _count_stamps(self, counter: str, count: int) -> None:
         if counter == "late":
-            self.late += 1
-        elif counter == "wall_stamp":
-            self.wall_stamp += 1
-            if self.wall_stamp == 1:
+            self.late += count
+        elif counter == "wall_stamp" and count:
+            first, self.wall_stamp = self.wall_stamp == 0, self.wall_stamp + count
+            if first:
                 self._logger.warning(
                     "a command is stamped by the system's clock: it acts now, as others like it will; stamps are simulated time"
                 )
-        return when_ns
-
-
-def _scheduled(text: str) -> ScriptCommand:
-    """The one command of an entry on the schedule topic; raises InputError."""
-    entry = load_plain_yaml(text, "schedule")
-    # At most one, so that a repeat or a long wrench isn't written out first: the body waits for this.
-    commands = expand_script([entry], "schedule", max_commands=1) if isinstance(entry, dict) else []
-    if len(commands) != 1 or commands[0].topic != "schedule":
-        accepted = "one entry {t, set}, {t, string: release} or {t, service: clear_wrench}"
-        raise InputError("schedule", text[:80], accepted)
-    return commands[0]
-
-
-def _read_point_stamped(data: bytes) -> tuple[int, str, tuple[float, float, float]]:
-    message = read_message(data, PointStamped)
-    stamp, point = message.header.stamp, message.point
-    return whole_stamp(stamp.sec, stamp.nanosec), message.header.frame_id, (point.x, point.y, point.z)

@@ -50,8 +50,8 @@ class Timekeeping:
 
 
 class Flight:
-    """publish(state) is called for every publication; take_commands(wall_ns) at every tick, to
-    submit what has arrived; it says whether commands come in these seconds.
+    """publish(state) is called for every publication; take_commands(wall_ns, whole) at every tick, to
+    submit what has arrived, on all topics if ``whole``; it says whether commands come in these seconds.
 
     anybody_listens() says whether publications reach a subscriber, is_viewed() whether a recording or viewer takes the states.
     For these alone states are made in bundles, at the looks at the commands; for nobody none is made, and the body crosses
@@ -65,7 +65,7 @@ class Flight:
         scenario: Scenario,
         observer: Observer,
         publish: Callable[[State], None],
-        take_commands: Callable[[int], bool],
+        take_commands: Callable[[int, bool], bool],
         on_failure: Callable[[str], None],
         followed_clock: Callable[[], int] | None = None,
         anybody_listens: Callable[[], bool] = lambda: True,
@@ -99,7 +99,7 @@ class Flight:
         self.scenario = scenario
         # One that isn't there would have missed what was commanded so far: it begins at the next reset.
         if self._ghost is not None:
-            self._ghost.change(self.simulation.time_ns, scenario)
+            self._ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
         if rate_changed:
             self._find_next_publication()
         if pace_changed:
@@ -113,8 +113,10 @@ class Flight:
             self._ghost.watch(observer)
 
     def pause(self, paused: bool) -> None:
-        """Stop or resume simulated time."""
+        """Stop or resume simulated time; what was sent while it stood is taken before it goes on."""
         if paused != self.timekeeping.paused:
+            if not paused:
+                self._take_commands(time.monotonic_ns(), True)
             self.timekeeping.paused = paused
             self._stepping = False
             self.simulation.log("pause", {"data": paused})
@@ -131,6 +133,7 @@ class Flight:
 
     def step(self) -> bool:
         """While paused, begin to advance to the next publication; whether it is made already, else ``stepping`` says."""
+        self._take_commands(time.monotonic_ns(), True)
         self.simulation.log("step", {})
         self._find_next_publication()
         self._stepping = True
@@ -202,7 +205,7 @@ class Flight:
                 self.timekeeping.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
-        self._lively = self._take_commands(wall_ns)
+        self._lively = self._take_commands(wall_ns, False)
         if not self._listeners or self._followed_clock or not self._caught_up:
             self.catch_up()
 
@@ -228,7 +231,7 @@ class Flight:
             self._step_on()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
-        self._take_commands(now_ns)
+        self._take_commands(now_ns, False)
         if now_ns >= self._paused_publication_ns and not self._stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._look_for_listeners()

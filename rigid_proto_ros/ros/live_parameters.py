@@ -85,7 +85,7 @@ class LiveParameters:
             changes = {name: value for name, value in changes.items() if name != "record"}
 
         def check() -> Scenario:
-            scenario = flight.scenario.with_changes(changes)
+            scenario = flight.scenario.with_changes(changes, at_hand=planned.body_mesh)
             try:
                 node.check_change(scenario)
             except CommandRefused as refusal:

@@ -3,16 +3,12 @@
 
 from __future__ import annotations
 
-import struct
-
 from geometry_msgs.msg import WrenchStamped
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
+from .. import cdr
+from ..command_codec import ScriptCommand, of_message, whole_stamp
 from ..core.errors import CommandRefused
-
-_STAMP_AND_LENGTH = struct.Struct("<iII")
-_SIX_DOUBLES = struct.Struct("<6d")
-_LITTLE_ENDIAN_CDR = b"\x00\x01"
 
 
 def read_wrench_stamped(data: bytes) -> tuple[int, str, tuple, tuple]:
@@ -20,25 +16,26 @@ def read_wrench_stamped(data: bytes) -> tuple[int, str, tuple, tuple]:
 
     Raises CommandRefused for bytes that are no such message, or whose frame_id isn't UTF-8.
     """
-    if data[:2] == _LITTLE_ENDIAN_CDR and len(data) >= 16:
-        seconds, nanoseconds, length = _STAMP_AND_LENGTH.unpack_from(data, 4)
-        end = 16 + length
-        doubles_at = 4 + (end - 4 + 7) // 8 * 8
-        if length and doubles_at + 48 <= len(data):
-            values = _SIX_DOUBLES.unpack_from(data, doubles_at)
-            try:
-                frame_id = data[16 : end - 1].decode()
-            except UnicodeDecodeError:
-                raise CommandRefused("frame", "frame_id", "bytes that aren't UTF-8", "text") from None
-            return whole_stamp(seconds, nanoseconds), frame_id, values[:3], values[3:]
-    message = read_message(data, WrenchStamped)
-    stamp, wrench = message.header.stamp, message.wrench
-    return (
-        whole_stamp(stamp.sec, stamp.nanosec),
-        message.header.frame_id,
-        (wrench.force.x, wrench.force.y, wrench.force.z),
-        (wrench.torque.x, wrench.torque.y, wrench.torque.z),
-    )
+    try:
+        seconds, nanoseconds, frame_id, values = cdr.read_stamped_doubles(data, 6)
+    except ValueError:
+        seconds, nanoseconds, frame_id, values = cdr.read_stamped_doubles(_little_endian(data, WrenchStamped), 6)
+    return whole_stamp(seconds, nanoseconds), frame_id, values[:3], values[3:]
+
+
+def read_command(topic: str, data: bytes, message_type) -> ScriptCommand:
+    """The command of a message on a topic other than ``schedule``; raises CommandRefused for bytes that are none of its type."""
+    try:
+        return of_message(topic, data)
+    except CommandRefused:
+        raise
+    except ValueError:
+        return of_message(topic, _little_endian(data, message_type))
+
+
+def _little_endian(data: bytes, message_type) -> bytes:
+    """A message's bytes as little-endian CDR, however its sender has packed them."""
+    return serialize_message(read_message(data, message_type))
 
 
 def read_message(data: bytes, message_type):
@@ -48,10 +45,3 @@ def read_message(data: bytes, message_type):
     except Exception:  # rclpy's own error types differ between versions and middlewares
         accepted = f"a serialized {message_type.__name__}"
         raise CommandRefused("frame", "message", f"{len(data)} bytes that are none", accepted) from None
-
-
-def whole_stamp(seconds: int, nanoseconds: int) -> int:
-    """A stamp [ns]; raises CommandRefused (``stamp``) unless the nanoseconds are less than a second."""
-    if nanoseconds >= 1_000_000_000:
-        raise CommandRefused("stamp", "header.stamp", f"{nanoseconds} nanosec", "nanosec below 1000000000")
-    return seconds * 1_000_000_000 + nanoseconds

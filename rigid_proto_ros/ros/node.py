@@ -19,7 +19,7 @@ from ..core.commands import ClearWrench, ReleaseString
 from ..core.errors import InputError
 from ..core.observer import Observer, Observers
 from ..offline import tell_start
-from ..scenario import Scenario, check_inertia, make_scenario
+from ..scenario import BodyMesh, Scenario, check_inertia, make_scenario
 from .command_intake import TOPICS, CommandIntake
 from .diagnostics import REFUSAL_REASONS, Diagnostics
 from .event_publisher import EventPublisher
@@ -141,8 +141,9 @@ class RigidBodyNode(Node):
     def _anybody_listens(self) -> bool:
         return self.states.look_for_subscribers()
 
-    def _take_commands(self, wall_ns: int) -> bool:
-        return self.intake.take(self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up)
+    def _take_commands(self, wall_ns: int, whole: bool) -> bool:
+        flight = self.flight
+        return self.intake.take(flight.simulation, flight.scenario, wall_ns, flight.catch_up, whole)
 
     def _motion_failed(self, message: str) -> None:
         self.get_logger().error(f"paused in the last good state: {message}")
@@ -154,9 +155,9 @@ class RigidBodyNode(Node):
         point = body.point(simulation.setup.contacts[contact]) if contact else np.zeros(3)
         return simulation.specific_force(point)
 
-    def _apply_scheduled(self, changes: dict):
+    def _apply_scheduled(self, changes: dict, at_hand: BodyMesh | None):
         """A scheduled ``set`` takes effect: the ROS parameters follow on the executor's thread."""
-        return self._take_on(self.flight.scenario.with_changes(changes))
+        return self._take_on(self.flight.scenario.with_changes(changes, at_hand=at_hand))
 
     def _apply_inertia(self, content: dict):
         """An inertia message takes effect."""

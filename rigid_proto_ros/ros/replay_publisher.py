@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import rclpy
@@ -16,11 +16,12 @@ from nav_msgs.msg import Odometry
 from rclpy.signals import SignalHandlerOptions
 
 from .. import cdr
+from ..command_codec import MARKS, ScriptCommand, frame_names, in_words, of_event
 from ..core.errors import InputError
-from ..poke_script import ScriptCommand
+from ..parameters import defaults
 from ..recorded_session import RecordedSession
 from ..scene_file import read_scene_text
-from ..session_messages import PROJECTIONS, StampedRows, inertia_bytes
+from ..session_messages import PROJECTIONS, StampedRows
 from ..session_playback import sorted_states
 from ..session_runs import decode_event
 from . import qos
@@ -31,22 +32,6 @@ WAIT_FOR_SUBSCRIBERS_S = 3.0
 
 NOT_SENT = ("record", "viewer")
 """Parameters of the recording node's own surroundings: sent to another, they would overwrite its recordings."""
-
-
-@dataclass(frozen=True)
-class InertiaCommand(ScriptCommand):
-    """An inertia message: mass, then com (3,) and tensor (6,) as ``numbers``."""
-
-    numbers: tuple = ()
-
-    @property
-    def topic(self) -> str:
-        """Below the node's name."""
-        return "inertia/set"
-
-    def message(self, stamp_ns: int) -> bytes:
-        """The message as it goes over the topic."""
-        return inertia_bytes(stamp_ns, self.frame_id, self.numbers[0], self.numbers[1:4], self.numbers[4:])
 
 
 class CommandSender(ScriptSender):
@@ -76,32 +61,27 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
 
 
 def session_commands(session: RecordedSession) -> list[ScriptCommand]:
-    """What moved the body, at the times at which it acted; pauses and steps are of the clock alone."""
+    """What moved the body, at the times at which it acted and in frames that a node of any name reads; pauses and steps are of
+    the clock alone.
+    """
+    values = {**defaults(), **(read_scene_text(session.scene, "the recorded scene").values if session.scene else {})}
+    contacts = {name.removeprefix("contacts.") for name in values if name.startswith("contacts.")}
+    frames = frame_names(values, session.node_name)
     commands = []
     for number, line in enumerate(session.lines, 1):
         time_ns, kind, content = decode_event(line, number)
+        if kind in MARKS:
+            continue
         try:
-            commands += _command(time_ns, kind, content)
-        except (KeyError, TypeError, ValueError):
-            raise InputError(f"event {number}", str(content)[:80], "the content of a recorded event") from None
+            command = in_words(of_event(time_ns, kind, content), contacts, frames)
+        except InputError as error:
+            raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+        if kind == "set":
+            changes = {name: value for name, value in content.items() if name not in NOT_SENT}
+            command = replace(command, changes=changes)
+        if kind != "set" or command.changes:
+            commands.append(command)
     return commands
-
-
-def _command(time_ns: int, kind: str, content: dict) -> Iterator[ScriptCommand]:
-    if kind in ("wrench", "poke"):
-        force, torque = tuple(map(float, content["force"])), tuple(map(float, content["torque"]))
-        yield ScriptCommand(time_ns, kind, content["frame_id"], force, torque)
-    elif kind in ("string_target", "string_attach"):
-        yield ScriptCommand(time_ns, kind, content["frame_id"], point=tuple(map(float, content["point"])))
-    elif kind == "set":
-        changes = {name: value for name, value in content.items() if name not in NOT_SENT}
-        if changes:
-            yield ScriptCommand(time_ns, kind, changes=changes)
-    elif kind == "inertia":
-        numbers = tuple(map(float, (content["mass"], *content["com"], *content["tensor"])))
-        yield InertiaCommand(time_ns, kind, content["frame_id"], numbers=numbers)
-    elif kind in ("clear_wrench", "string_release"):
-        yield ScriptCommand(time_ns, kind)
 
 
 def publish_states(session: RecordedSession, speed: float) -> int:

@@ -18,9 +18,10 @@ from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
+from ..command_codec import ScriptCommand, outgoing
 from ..core.errors import InputError
 from ..parameters import PARAMETERS
-from ..poke_script import ScriptCommand, with_contacts
+from ..poke_script import with_contacts
 from ..scenario import nanoseconds
 from . import qos
 
@@ -112,16 +113,18 @@ class ScriptSender(Node):
         horizon_s = self.parameter("schedule_horizon")
         horizon_ns = nanoseconds(PARAMETERS["schedule_horizon"].default if horizon_s is None else float(horizon_s))
         paused = reset
-        for number, command in enumerate(script):
-            stamp_ns = start_ns + command.t_ns
-            if paused and stamp_ns > horizon_ns:
+        number = 0
+        for message in outgoing(script, start_ns):
+            if paused and message.time_ns > horizon_ns:
                 self._confirm(number)
                 self._call(self._pause_client, SetBool.Request(data=False))
                 paused = False
-            self._hold_back(number, stamp_ns, horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS))
-            self._topics[command.topic].publish(command.message(stamp_ns))
-            sent[command.topic] += 1
-            self._show(f"sent {number + 1} of {len(script)}")
+            self._hold_back(number, message.time_ns, horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS))
+            self._topics[message.topic].publish(message.data)
+            number += len(message.commands)
+            for command in message.commands:
+                sent[command.topic] += 1
+            self._show(f"sent {number} of {len(script)}")
         self._confirm(len(script))
         if paused:
             self._call(self._pause_client, SetBool.Request(data=False))

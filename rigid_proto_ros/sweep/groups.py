@@ -84,11 +84,8 @@ class Group:
         settings, times, ballast = self._numbers(columns, count, good)
         if self.overlay is not None:
             targets = [(v.target, c) for v, c in zip(self.study.vary, columns, strict=True) if v.target.entry]
-            if targets:
-                commands, loads, in_order = self.overlay.rows(targets, count)
-                good &= in_order
-            else:
-                commands, loads = self.overlay.base.commands[None], self.overlay.base.loads[None]
+            commands, loads, within = self.overlay.rows(targets, count if targets else 1)
+            good &= within
         else:
             commands, loads = self._expanded(columns, count, good)
         return Variants(settings, times, ballast, self.constants, self.integrator, commands, loads), good

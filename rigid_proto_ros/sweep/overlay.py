@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..command_codec import ScriptCommand
 from ..core import batch_flight as bf
-from ..poke_script import MAX_TIME_S, ScriptCommand, expand_script
+from ..poke_script import MAX_TIME_S, expand_script
 from .study import Study
 from .targets import Target
-from .templates import Script, Settler, acting_order, script_of
+from .templates import Script, Settler, script_of
 
 _VECTORS = {"force": bf.FORCE, "impulse": bf.FORCE, "torque": bf.TORQUE, "angular_impulse": bf.TORQUE}
 _TIMING = {"repeat", "every", "jitter", "seed"}
@@ -42,16 +43,13 @@ def _fits(target: Target, entry: dict, whole_timing: bool) -> bool:
 
 @dataclass(frozen=True)
 class Overlay:
-    """A script whose numbers vary. base: with the study's own numbers, in the order of ``commands``; ``clash`` (n, n): pairs
-    whose order at equal times hangs on the varied numbers.
-    """
+    """A script whose numbers vary. base: with the study's own numbers, in the order in which the script lists ``commands``."""
 
     base: Script
     commands: list[ScriptCommand]
-    clash: np.ndarray
 
     def rows(self, targets: list[tuple[Target, np.ndarray]], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Commands (n, c, 3) and loads (n, c, LOAD) of ``count`` rows, and which of them are in order (n,)."""
+        """Commands (n, c, 3) and loads (n, c, LOAD) of ``count`` rows in order of time, and which rows have good values (n,)."""
         size = len(self.commands)
         commands = np.broadcast_to(self.base.commands, (count, size, 3)).copy()
         loads = np.broadcast_to(self.base.loads, (count, size, bf.LOAD)).copy()
@@ -59,12 +57,8 @@ class Overlay:
         for target, values in targets:
             own = [k for k, command in enumerate(self.commands) if command.entry == target.entry]
             good &= _lay(target, values, own, commands, loads)
-        # Equal times act by rank and by the bytes of the message, in which ``commands`` are.
+        # Stable: equal times act in the order of the script.
         order = np.argsort(commands[:, :, bf.AT_NS], axis=1, kind="stable")
-        if size > 1:
-            sorted_ns = np.take_along_axis(commands[:, :, bf.AT_NS], order, axis=1)
-            clashes = self.clash[order[:, :-1], order[:, 1:]] & (sorted_ns[:, :-1] == sorted_ns[:, 1:])
-            good &= ~clashes.any(axis=1)
         commands = np.take_along_axis(commands, order[:, :, None], axis=1)
         return commands, np.take_along_axis(loads, order[:, :, None], axis=1), good
 
@@ -92,31 +86,6 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
 def make_overlay(study: Study, settler: Settler, wrench_timeout: float) -> tuple[Overlay, list]:
     """The script ready for varied numbers, and the loads that the integrator has to carry; raises NotCarried, InputError."""
     commands = expand_script(study.script, "script", wrench_timeout)
-    at_once = [ScriptCommand(0, *_without_time(command)) for command in commands]
-    order = acting_order(at_once)
-    commands = [commands[k] for k in order]
-    script, loads = script_of([at_once[k] for k in order], settler)
-    script.commands[:, bf.AT_NS] = [command.t_ns for command in commands]
-    keys: dict[int, set] = {}
-    for vary in study.vary:
-        if vary.target.entry:
-            keys.setdefault(vary.target.entry, set()).add(vary.target.path[0])
-    clash = np.zeros((len(commands), len(commands)), bool)
-    for i, a in enumerate(commands):
-        if a.entry in keys:
-            for j, b in enumerate(commands):
-                clash[i, j] = clash[j, i] = a.kind == b.kind and _hangs_on_numbers(a, b, keys)
-    return Overlay(script, commands, clash), loads
-
-
-def _without_time(command: ScriptCommand) -> tuple:
-    fields = (command.kind, command.frame_id, command.force, command.torque, command.changes, command.point)
-    return (*fields, command.contact, command.entry)
-
-
-def _hangs_on_numbers(a: ScriptCommand, b: ScriptCommand, varied: dict[int, set]) -> bool:
-    """Whether the order of two messages of equal time can change with what varies."""
-    keys = varied.get(a.entry, set()) | varied.get(b.entry, set())
-    if "duration" in keys:
-        return True  # it stands in the frame's text
-    return bool(keys - {"t"}) and a.frame_id == b.frame_id
+    commands.sort(key=lambda command: command.entry)
+    script, loads = script_of(commands, settler)
+    return Overlay(script, commands), loads

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..command_codec import ScriptCommand
 from ..core import batch_body as bb
 from ..core import batch_flight as bf
 from ..core.commands import WrenchCommand
@@ -17,7 +18,6 @@ from ..core.integrators import check_carried, integrator_named
 from ..core.integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, Integrator, needs_of_load
 from ..core.integrators.taylor_adaptive import degree_for
 from ..core.loads import Load, settle
-from ..poke_script import ScriptCommand
 from ..scenario import BodyMesh, nanoseconds
 
 FAST = {
@@ -53,7 +53,7 @@ class NotCarried(Exception):
 
 @dataclass(frozen=True)
 class Script:
-    """Commands in the order in which equal times act: numbers (n, 3) and loads (n, LOAD) of core/batch_flight.py."""
+    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of core/batch_flight.py."""
 
     commands: np.ndarray
     loads: np.ndarray
@@ -183,20 +183,11 @@ class Settler:
         return [command.t_ns, duration_ns, kind], row, None if frame.impulse else load
 
 
-_RANKS = {"clear_wrench": 0, "wrench": 3, "poke": 4}
-
-
-def acting_order(commands: list[ScriptCommand]) -> list[int]:
-    """Indices of commands in the order in which the simulation lets them act."""
-    keys = [(c.t_ns, _RANKS.get(c.kind, 0), c.message(c.t_ns)) for c in commands]
-    return sorted(range(len(commands)), key=keys.__getitem__)
-
-
 def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
-    """Commands as arrays, and the loads that the integrator has to carry; raises NotCarried, InputError."""
+    """Commands, in order of time, as arrays, and the loads that the integrator has to carry; raises NotCarried, InputError."""
     if len(commands) > MAX_COMMANDS:
         raise NotCarried
-    ordered = [settler.numbers(commands[k]) for k in acting_order(commands)]
+    ordered = [settler.numbers(command) for command in commands]
     integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, 3)
     loads = np.array([row for _, row, _ in ordered]).reshape(-1, bf.LOAD)
     return Script(integers, loads), [load for _, _, load in ordered if load is not None]

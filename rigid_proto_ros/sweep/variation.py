@@ -11,7 +11,8 @@ from functools import lru_cache
 import numpy as np
 import yaml
 
-from ..poke_script import ScriptCommand, expand_script
+from ..command_codec import ScriptCommand
+from ..poke_script import expand_script
 from ..scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
 from .forms import VERTEX, Draw
 from .study import Study, script_entries

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..command_codec import MARKS
 from ..core.errors import InputError
 from ..recorded_session import RecordedSession
-from ..replay import MARKS
 from ..session_mesh import scene_sha256
 from ..session_runs import decode_event
 from .rewind import Rewind, core_row, make_rewind

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..command_codec import command_of_event, frame_names
 from ..core.errors import InputError
 from ..core.state import State
 from ..scenario import Scenario
 from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
-from .heard_command import heard_command
 from .history import SCENE_GRACE_S, History
 from .keys import add_keys
 from .panel import Panel
@@ -423,7 +423,8 @@ class Page:
     def _act(self, kind: str, content: dict, time_ns: int) -> None:
         """What acted on the body acts on what is drawn beside it; what can't be followed is said."""
         try:
-            command = heard_command(kind, content, self.scenario, self.link.target.rpartition("/")[2])
+            frames = frame_names(self.scenario.values, self.link.target)
+            command = command_of_event(kind, content, self.scenario.setup.contacts, frames)
             if command is not None:
                 self.acting.event(command, time_ns, self.scenario, self.state)
         except InputError as error:

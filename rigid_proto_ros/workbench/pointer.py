@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..poke_script import MESH_FRAME
+from ..command_codec import MESH_FRAME
 from ..scenario import Scenario
 from .ros_link import RosLink
 from .sighting import DrawnPose, Sightings

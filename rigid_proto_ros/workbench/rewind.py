@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..command_codec import ScriptCommand
 from ..core.errors import InputError, MeshError
 from ..core.rotation import rotate_inverse
 from ..parameters import READ_ONLY, parameter_named
-from ..poke_script import ScriptCommand, expand_script
+from ..poke_script import expand_script
 from ..recorded_session import RecordedSession
 from ..scenario import scene_text
 from ..scene_file import read_scene_text

@@ -28,7 +28,6 @@ from std_srvs.srv import SetBool, Trigger
 from .. import cdr
 from ..core.errors import InputError
 from ..parameters import parameter_named
-from ..poke_script import ScriptCommand
 from ..ros import qos
 from ..ros.parameter_server import ros_parameter
 from ..ros.taken_by_hand import TakenByHand
@@ -194,9 +193,9 @@ class RosLink:
         """Publish one entry of a script."""
         self._publishers["schedule"].publish(cdr.string(entry))
 
-    def command(self, command: ScriptCommand) -> None:
-        """Publish a script's command, stamped with its own time."""
-        self._publishers[command.topic].publish(command.message(command.t_ns))
+    def send(self, topic: str, data: bytes) -> None:
+        """Publish a message as its bytes."""
+        self._publishers[topic].publish(data)
 
     def call(self, service: str, data: bool | None = None, done: Callable[[bool, str], None] | None = None) -> None:
         """Call one of the node's services; done(success, message) comes on the page's thread."""

@@ -13,9 +13,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from .. import parameters
+from ..command_codec import ScriptCommand, outgoing
 from ..core.errors import InputError
 from ..core.frames import parse_frame
-from ..poke_script import ScriptCommand, parse_script, with_contacts
+from ..poke_script import parse_script, with_contacts
 from ..scene_file import read_scene_text
 from .rewind import changes_to
 from .ros_link import RosLink
@@ -90,10 +91,12 @@ async def bring_about(
 
 
 async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Callable[[], int]) -> None:
-    first = received()
-    for number, command in enumerate(commands, 1):
-        link.command(command)
-        if number % MAX_UNCONFIRMED == 0 or number == len(commands):
+    first, number, confirmed = received(), 0, 0
+    for message in outgoing(commands):
+        link.send(message.topic, message.data)
+        number += len(message.commands)
+        if number - confirmed >= MAX_UNCONFIRMED or number == len(commands):
+            confirmed = number
             deadline = time.monotonic() + STALLED_S
             while received() - first < number:
                 if time.monotonic() > deadline:

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""Messages of the schedule topic: read, and judged as a whole before any of their entries is taken.
+
+What takes long (a mesh to load, kernels to compile, a long text) is done beside the physics thread, and the message counts as
+taken when that is done: the motion never waits for it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from queue import SimpleQueue
+from typing import Any
+
+from ..command_codec import ScriptCommand, core_command
+from ..core.commands import Command, Listed
+from ..core.errors import CommandRefused, InputError
+from ..core.loads import Load
+from ..core.setup import Setup
+from ..core.simulation import judge
+from ..poke_script import expand_schedule, read_schedule, with_contacts
+from ..scenario import BodyMesh, Scenario
+from .warm_up import warm_up
+
+LONG_TEXT = 20_000
+"""Characters of a message that is read beside the physics thread: some milliseconds."""
+
+SLOW = frozenset(
+    {"mesh", "mesh_repair", "mesh_fallback", "inertia_model", "integrator", "ghost.inertia_model", "ghost.integrator"}
+)
+"""Parameters whose change may have to load a mesh, go over all of its triangles, or compile."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A command ready to be submitted: its own time, its place in its list, and what Simulation.submit takes as judged."""
+
+    command: Command
+    t_ns: int
+    number: int
+    listed: Listed | None
+    judged: tuple[Load | None, Setup]
+
+
+@dataclass
+class Scheduled:
+    """One message. count: its entries, as messages are counted. commands: once read. entries: once judged. refusal: why none of
+    it is taken.
+    """
+
+    data: bytes
+    text: str
+    count: int = 1
+    is_list: bool = False
+    commands: list[ScriptCommand] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+    refusal: CommandRefused | None = None
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether the physics thread shouldn't judge it."""
+        return any(command.changes and SLOW & command.changes.keys() for command in self.commands)
+
+    def read(self, scenario: Scenario) -> None:
+        """Fill ``commands``."""
+        with_refusal(self, self._read, scenario)
+
+    def judge(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
+        """Fill ``entries``, each judged in the scene that those before it have made of this one; change(changes, mesh at hand)
+        is called when a ``set`` acts.
+        """
+        with_refusal(self, self._judge, scenario, change)
+
+    def _read(self, scenario: Scenario) -> None:
+        listed = read_schedule(self.text)
+        self.is_list = isinstance(listed, list)
+        self.count = len(listed) if self.is_list else 1
+        commands = expand_schedule(listed, float(scenario.values["wrench_timeout"]))
+        self.commands = with_contacts(commands, scenario.setup.contacts)
+
+    def _judge(self, scenario: Scenario, change: Callable) -> None:
+        # In order of time; those of one time in the order of the list.
+        order = sorted(range(len(self.commands)), key=lambda k: self.commands[k].t_ns)
+        for k in order:
+            command = self.commands[k]
+            at_hand = None
+            if command.kind == "set":
+                before, scenario = scenario, scenario.with_changes(command.changes)
+                at_hand = scenario.body_mesh
+                _compile(before, scenario)
+            own = core_command(
+                command,
+                command.t_ns,
+                scenario.setup.contacts,
+                partial(_with_mesh, change, at_hand),
+                message=b"" if self.is_list else self.data,
+            )
+            judged = (judge(own, scenario.setup), scenario.setup)
+            listed = (self.data, k) if self.is_list else None
+            self.entries.append(Entry(own, command.t_ns, command.entry, listed, judged))
+
+
+def _with_mesh(change: Callable, at_hand: BodyMesh | None, changes: dict):
+    return change(changes, at_hand)
+
+
+def _compile(before: Scenario, after: Scenario) -> None:
+    for old, new in ((before.setup, after.setup), (before.ghost, after.ghost)):
+        if new is not None and (old is None or new.integrator is not old.integrator):
+            try:
+                warm_up(new)
+            except CommandRefused:
+                pass  # what acts when its time comes decides whether it is refused, and that is counted
+
+
+def with_refusal(message: Scheduled, work: Callable[..., None], *arguments: Any) -> None:
+    """Do a message's work; what it raises becomes its refusal."""
+    if message.refusal is None:
+        try:
+            work(*arguments)
+        except CommandRefused as refusal:
+            message.refusal = refusal
+        except InputError as error:
+            message.refusal = CommandRefused("schedule", error.field, error.received, error.accepted)
+
+
+class Beside:
+    """One thread that does what takes long; what it has done comes out in the order in which it was given."""
+
+    def __init__(self) -> None:
+        self._work: SimpleQueue = SimpleQueue()
+        self._given: deque[tuple[Scheduled, threading.Event]] = deque()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Nothing waits to be done or fetched."""
+        return not self._given
+
+    def give(self, message: Scheduled, work: Callable[[], None]) -> None:
+        """Do this work for a message."""
+        if self._thread is None:
+            # A daemon: the end of the process doesn't wait for a mesh.
+            self._thread = threading.Thread(target=self._run, name="schedule", daemon=True)
+            self._thread.start()
+        done = threading.Event()
+        self._given.append((message, done))
+        self._work.put((work, message, done))
+
+    def finished(self) -> Iterator[Scheduled]:
+        """Messages whose work is done, up to the first whose isn't."""
+        while self._given and self._given[0][1].is_set():
+            yield self._given.popleft()[0]
+
+    def _run(self) -> None:
+        while True:
+            work, message, done = self._work.get()
+            try:
+                work()
+            except Exception as error:  # noqa: BLE001 (a thread that ended would leave all later messages waiting)
+                message.refusal = CommandRefused(
+                    "schedule", "schedule", repr(error)[:200], "a message that can be read"
+                )
+            done.set()
