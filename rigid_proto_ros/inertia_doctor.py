@@ -345,7 +345,7 @@ def compare_robot(
         if len(fitting) != 1:
             names = ", ".join(link.link for link in links) or "none"
             raise InputError(
-                "compare", f"{len(fitting)} links for {body.mesh.name}", f"one link that shows it, of: {names}"
+                "compare", f"{body.mesh.name} fits {len(fitting)} links; one link has to show it, of: {names}"
             )
         link = fitting[0]
         use = next((use for use in link.meshes if Path(use.file).stem == body.mesh.name), None)

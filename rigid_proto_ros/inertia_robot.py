@@ -80,7 +80,9 @@ def read_robot(path: Path) -> list[LinkInertial]:
         raise InputError("compare", path.name, f"well-formed XML ({error})") from None
     readers = {"robot": _urdf, "sdf": _sdf, "mujoco": _mjcf}
     if root.tag not in readers:
-        raise InputError("compare", f"{path.name}: <{root.tag}>", "URDF <robot>, SDF <sdf> or MJCF <mujoco>")
+        raise InputError(
+            "compare", f"{path.name} begins with <{root.tag}>, not with URDF's <robot>, SDF's <sdf> or MJCF's <mujoco>"
+        )
     try:
         return readers[root.tag](root)
     except (ValueError, TypeError, KeyError) as error:

@@ -70,7 +70,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> 
     if fallback and verdict.usable and not verdict.closed:
         stand_in = _stand_in(vertices, triangles, fallback)
         shape = "convex hull" if fallback == "hull" else "bounding box"
-        message = f"its {shape} stands in for the solid"
+        message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))
     moments = MeshMoments(
         vertices,

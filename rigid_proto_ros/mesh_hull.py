@@ -31,13 +31,13 @@ def _round_shape(points: np.ndarray) -> np.ndarray:
     points = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
     extent = float(np.max(np.abs(points)))
     if not extent > 0.0:
-        raise MeshError("mesh_fallback", "hull of one point", "points that span a volume")
+        raise MeshError("mesh_fallback", "the points coincide and have no hull")
     points = points / extent
     axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
     points = points @ (axes if np.linalg.det(axes) > 0.0 else -axes)  # a mirrored shape's hull would face inward
     half = 0.5 * np.ptp(points, axis=0)
     if half.min() < FLAT:
-        raise MeshError("mesh_fallback", "hull of points in one plane", "points that span a volume; box may do")
+        raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; box may do")
     return points / half
 
 
@@ -49,9 +49,9 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
     try:
         from scipy.spatial import ConvexHull, QhullError
     except ImportError:
-        raise MeshError("mesh_fallback", "hull", "scipy installed: pip install scipy; box needs nothing") from None
+        raise MeshError("mesh_fallback", "hull needs scipy: pip install scipy; box needs nothing") from None
     if len(points) < 4:
-        raise MeshError("mesh_fallback", f"hull of {len(points)} points", "points that span a volume; box may do")
+        raise MeshError("mesh_fallback", f"{len(points)} points have no hull with a volume; box may do")
     shape = _round_shape(points)
     try:
         # Points that lie in one plane but for rounding can leave cracks between Qhull's triangles; moved by 1e-11 of the
@@ -66,7 +66,7 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
                 return triangles
     except QhullError:
         pass
-    raise MeshError("mesh_fallback", "hull of points in one plane", "points that span a volume; box may do")
+    raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; box may do")
 
 
 def _is_closed(triangles: np.ndarray) -> bool:

@@ -59,7 +59,7 @@ def inspect_mesh(
     s = scale_vector(scale)
     findings = list(body.verdict.findings)
     if not body.verdict.usable:
-        refusal = InputError(body.mesh.name, body.verdict.reason, "finite vertices that span a body")
+        refusal = InputError(body.mesh.name, body.verdict.reason)
         return Inspection(body, s, model, {}, findings, refusal, None, None, None, None, None)
     moments = body.moments
     points = referenced_vertices(body.vertices, body.moments.triangles) * s

@@ -94,14 +94,14 @@ def _found_mesh(name: str) -> Path:
         package, _, inside = name[len("package://") :].partition("/")
         folder = _package_folder(package)
         if folder is None:
-            raise MeshError("mesh", name, f"package:// of an installed package; {package!r} was not found")
+            raise MeshError("mesh", f"the package {package!r} of {name!r} was not found")
         candidates = [folder / inside]
         if package == "rigid_proto_ros":
             candidates.append(Path(__file__).parent / inside)
         for path in candidates:
             if path.is_file():
                 return path.resolve()
-        raise MeshError("mesh", name, f"a file in the package; there is no {candidates[0]}")
+        raise MeshError("mesh", f"there is no file {str(candidates[0])!r} in the package")
     name = name.removeprefix("file://")
     path = Path(name).expanduser()
     if path.is_file():
@@ -110,15 +110,12 @@ def _found_mesh(name: str) -> Path:
     if name and "/" not in name and bundled.is_file():
         return bundled.resolve()
     if path.is_dir():
-        raise MeshError("mesh", name, "a mesh file; this is a folder")
+        raise MeshError("mesh", f"{name!r} is a folder, not a mesh file")
     names = bundled_names()
     siblings = [p.name for p in path.parent.iterdir() if p.is_file()] if path.parent.is_dir() and "/" in name else []
     hint = did_you_mean(path.name, [*names, *siblings])
-    raise MeshError(
-        "mesh",
-        name,
-        f"an existing file, package://<package>/<path>, or a bundled name ({', '.join(names)}){hint and '; ' + hint}",
-    )
+    known = f"the bundled meshes are {', '.join(names)}"
+    raise MeshError("mesh", f"there is no file and no bundled mesh {name!r}; {' '.join(filter(None, [hint, known]))}")
 
 
 @njit(cache=True, nogil=True)
@@ -172,12 +169,12 @@ def _read(data: bytes, path: Path, max_triangles: int) -> tuple[np.ndarray, np.n
     """Vertices, triangles and polygon starts of a file's bytes, by its extension."""
     suffix = path.suffix.lower().lstrip(".")
     if suffix not in FORMATS:
-        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}")
+        raise MeshError("mesh", f"{path.name!r} has none of the endings .{', .'.join(FORMATS)}")
     if not data.strip():
-        raise MeshError("mesh", path.name, "a mesh; the file is empty")
+        raise MeshError(path.name, "the file is empty")
     found = _sniff(data)
     if found and found != suffix and suffix in OWN_FORMATS:
-        raise MeshError("mesh", path.name, f"a .{suffix} file; its content looks like .{found}, so rename it")
+        raise MeshError(path.name, f"the content looks like .{found}, not .{suffix}; rename the file")
     if suffix == "stl":
         vertices, triangles = read_stl(data, path.name, max_triangles)
         return vertices, triangles, None
@@ -187,7 +184,7 @@ def _read(data: bytes, path: Path, max_triangles: int) -> tuple[np.ndarray, np.n
     vertices, corners, starts = reader(data, path.name, max_triangles)
     if len(corners) - 2 * (len(starts) - 1) > max_triangles:
         count = len(corners) - 2 * (len(starts) - 1)
-        raise MeshError(path.name, f"{count} triangles", f"at most {max_triangles}; --max-triangles raises the limit")
+        raise MeshError(path.name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
     return vertices, *fan_polygons(corners, starts)
 
 
@@ -203,10 +200,10 @@ def _read_with_trimesh(path: Path, max_triangles: int) -> tuple[np.ndarray, np.n
         triangles = np.array(mesh.faces, dtype=np.int64)
     except Exception as error:  # noqa: BLE001 - a foreign reader fails in as many ways as files are broken
         reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise MeshError("mesh", path.name, f"a file that trimesh {trimesh.__version__} reads ({reason})") from None
+        raise MeshError(path.name, f"trimesh {trimesh.__version__} can't read the file ({reason})") from None
     if len(triangles) > max_triangles:
         raise MeshError(
-            path.name, f"{len(triangles)} triangles", f"at most {max_triangles}; --max-triangles raises the limit"
+            path.name, f"{len(triangles)} triangles are more than {max_triangles}; --max-triangles raises the limit"
         )
     return vertices, triangles
 
@@ -221,11 +218,11 @@ def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES) -> Mesh:
     try:
         size = path.stat().st_size
         if size > BYTES_PER_TRIANGLE * max_triangles:
-            limit = f"at most {BYTES_PER_TRIANGLE * max_triangles}, enough for {max_triangles} triangles"
-            raise MeshError("mesh", f"{path.name}: {size} bytes", f"{limit}; --max-triangles raises the limit")
+            limit = f"{BYTES_PER_TRIANGLE * max_triangles}, enough for {max_triangles} triangles"
+            raise MeshError(path.name, f"{size} bytes are more than {limit}; --max-triangles raises the limit")
         data = path.read_bytes()
     except OSError as error:
-        raise MeshError("mesh", str(path), f"a readable file ({error.strerror})") from None
+        raise MeshError("mesh", f"{str(path)!r} can't be read ({error.strerror})") from None
     sha256 = hashlib.sha256(data).hexdigest()
     key = f"{sha256}-{path.suffix.lower().lstrip('.')}"
     cached = len(data) >= CACHED_SIZE and not mesh_cache.is_passing(path)
@@ -238,5 +235,5 @@ def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES) -> Mesh:
             polygons = {} if polygon_starts is None else {"polygon_starts": polygon_starts}
             mesh_cache.store_arrays(key, vertices=vertices, triangles=triangles, **polygons)
     if len(triangles) == 0:
-        raise MeshError(path.name, "no faces", "a surface: at least one face")
+        raise MeshError(path.name, "the file has no faces")
     return Mesh(path.stem, str(path), vertices, triangles, polygon_starts, sha256)

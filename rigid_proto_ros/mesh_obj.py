@@ -119,7 +119,7 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     """
     data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data[:4096]:
-        raise MeshError(name, "binary content", "an .obj file, which is text")
+        raise MeshError(name, "the content is binary; an .obj file is text")
     if b"\\\n" in data or b"\\\r\n" in data:
         data = data.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
     if b"\n" not in data and b"\r" in data:
@@ -127,7 +127,7 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     buffer = np.frombuffer(data, dtype=np.uint8)
     n, p, c = _count(buffer)
     if c - 2 * p > max_triangles:
-        raise MeshError(name, f"{c - 2 * p} triangles", f"at most {max_triangles}; --max-triangles raises the limit")
+        raise MeshError(name, f"{c - 2 * p} triangles are more than {max_triangles}; --max-triangles raises the limit")
     vertices = np.empty((n, 3))
     corners = np.empty(c, np.int64)
     starts = np.empty(p + 1, np.int64)
@@ -152,5 +152,5 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     if corners.size and int(corners.max()) >= n:
         where = int(np.argmax(corners >= n))
         face = int(np.searchsorted(starts, where, side="right"))
-        raise MeshError(name, f"face {face} uses vertex {int(corners[where]) + 1}", f"the file has {n} vertices")
+        raise MeshError(name, f"face {face} uses vertex {int(corners[where]) + 1}, but the file has only {n}")
     return vertices[:n], corners, starts[: p + 1]

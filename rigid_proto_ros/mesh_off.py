@@ -104,9 +104,12 @@ def read_off(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     start = header.end() + counts.end()
     # A vertex takes six bytes or more ("0 0 0\n"), a triangle eight.
     if 6 * n + 8 * p > len(data) - start + 8:
-        raise MeshError(name, f"{len(data)} bytes", f"{n} vertices and {p} faces as announced; cut short?")
+        raise MeshError(
+            name,
+            f"{len(data)} bytes can't hold the {n} vertices and {p} faces that the header announces; the file may be truncated",
+        )
     if p > max_triangles:
-        raise MeshError(name, f"{p} faces", f"at most {max_triangles} triangles; --max-triangles raises the limit")
+        raise MeshError(name, f"{p} faces are more than {max_triangles}; --max-triangles raises the limit")
     buffer = np.frombuffer(data, np.uint8)
     vertices, starts = np.empty((n, 3)), np.empty(p + 1, np.int64)
     corners = np.empty((len(data) - start) // 2 + 1, np.int64)

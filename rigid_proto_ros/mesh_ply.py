@@ -53,7 +53,7 @@ def _header(data: bytes, name: str) -> tuple[str, list[_Element], int]:
         raise MeshError(name, excerpt(data, 0), "a .ply file: ply, a header, end_header")
     body = data.find(b"\n", end) + 1
     if body == 0:
-        raise MeshError(name, "a header alone", "a .ply file with a body")
+        raise MeshError(name, "the file ends after its header")
     layout, elements = "", []
     for line in data[:end].decode("ascii", "replace").splitlines()[1:]:
         words = line.split()
@@ -142,7 +142,10 @@ def _gather(buffer, offsets, counts, item_size, out):
 
 
 def _short(name: str, element: _Element, rows: int) -> MeshError:
-    return MeshError(name, f"{rows} whole {element.name} rows", f"the {element.count} announced; cut short or damaged?")
+    return MeshError(
+        name,
+        f"{rows} complete rows of {element.name}, but the header announces {element.count}; the file may be truncated or damaged",
+    )
 
 
 def _minimum_row(element: _Element, text: bool) -> int:
@@ -175,7 +178,10 @@ def read_ply(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     text = layout == "ascii"
     for element in elements:
         if element.count * _minimum_row(element, text) > len(data) - position + 2:
-            raise MeshError(name, f"{len(data)} bytes", f"{element.count} {element.name} rows as announced; cut short?")
+            raise MeshError(
+                name,
+                f"{len(data)} bytes can't hold the {element.count} rows of {element.name} that the header announces; the file may be truncated",
+            )
         if element.name in ("face", "tristrips") and element.count > max_triangles:
             limit = f"at most {max_triangles} triangles; --max-triangles raises the limit"
             raise MeshError(name, f"{element.count} faces", limit)
@@ -197,10 +203,10 @@ def read_ply(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
         starts = np.concatenate([starts, starts[-1] + strip_starts[1:]])
     sizes = np.diff(starts)
     if sizes.size and sizes.min() < 3:
-        raise MeshError(name, f"face {int(np.argmin(sizes))} with {int(sizes.min())} corners", "three or more corners")
+        raise MeshError(name, f"face {int(np.argmin(sizes))} has {int(sizes.min())} corners; a face has three or more")
     if items.size and (items.min() < 0 or items.max() >= len(vertices)):
         wrong = int(items[(items < 0) | (items >= len(vertices))][0])
-        raise MeshError(name, f"a face that uses vertex {wrong}", f"vertex numbers from 0 to {len(vertices) - 1}")
+        raise MeshError(name, f"a face uses vertex {wrong}, but the vertices are numbered 0 to {len(vertices) - 1}")
     return vertices, items, starts
 
 

@@ -34,16 +34,22 @@ def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     if is_ascii_stl(data):
         return _merge(_ascii_points(data.removeprefix(codecs.BOM_UTF8), name))
     if len(data) < 84:
-        raise MeshError(name, f"{len(data)} bytes", "an STL file: ASCII, or a binary header of 84 bytes and facets")
+        raise MeshError(
+            name, f"{len(data)} bytes are no STL file: neither ASCII, nor a binary header of 84 bytes and facets"
+        )
     (count,) = struct.unpack_from("<I", data, 80)
     held = (len(data) - 84) // 50
     if count > held:
-        raise MeshError(name, f"room for {held} facets", f"the {count} facets that its header announces; cut short?")
+        raise MeshError(
+            name, f"the file has room for {held} facets, but its header announces {count}; the file may be truncated"
+        )
     if len(data) != 84 + 50 * count:
         extra = len(data) - 84 - 50 * count
-        raise MeshError(name, f"{extra} bytes beyond the {count} facets its header announces", "a whole STL file")
+        raise MeshError(
+            name, f"{extra} bytes follow the {count} facets that the header announces; the file may be damaged"
+        )
     if count > max_triangles:
-        raise MeshError(name, f"{count} triangles", f"at most {max_triangles}; --max-triangles raises the limit")
+        raise MeshError(name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
     facets = np.frombuffer(data, _FACET, count=count, offset=84)
     return _merge(facets["corners"].reshape(-1, 3).astype(np.float64))
 

@@ -45,12 +45,12 @@ def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCom
     path = Path(path)
     try:
         if path.stat().st_size > MAX_BYTES:
-            raise InputError(str(path), f"{path.stat().st_size} bytes", f"a script of at most {MAX_BYTES} bytes")
+            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a script has at most {MAX_BYTES}")
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(str(path), error.strerror, "a readable poke script") from None
     except UnicodeDecodeError:
-        raise InputError(str(path), "bytes that aren't UTF-8", "a YAML file") from None
+        raise InputError(str(path), "the file isn't UTF-8 text") from None
     return parse_script(text, str(path), wrench_timeout)
 
 
@@ -122,7 +122,7 @@ def expand_script(
                 expanded = _expand(entry, at_ns, where, wrench_timeout, max_commands)
                 commands += [replace(command, entry=number) for command in expanded]
             if len(commands) > max_commands:
-                raise InputError(where, f"over {max_commands} commands", f"at most {max_commands}")
+                raise InputError(where, f"more than {max_commands} commands")
     return sorted(commands, key=lambda command: command.t_ns)
 
 

@@ -26,7 +26,7 @@ from .session_runs import decode_event
 def session_scenario(session: RecordedSession) -> Scenario:
     """The scenario that the session began with; the mesh by name if its content is the same, else the recorded one."""
     if not session.scene:
-        raise InputError("session", "no scene", "a recording that holds its scene, or --scene FILE")
+        raise InputError("session", "the recording has no scene; give one with --scene FILE")
     values = read_scene_text(session.scene, "the recorded scene").values
     if not session.mesh_sha256:
         return make_scenario(values)

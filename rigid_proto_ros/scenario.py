@@ -124,11 +124,11 @@ def load_body_mesh(values: Mapping[str, object], mesh: Mesh | None = None) -> Bo
     """The mesh that checked values name (or the one at hand), with its moments; None without one. Raises MeshError."""
     if values["mesh"] == "":
         if values["inertia_model"] != "explicit":
-            raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
+            raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
         return None
     body = mesh_body(mesh or values["mesh"], repair=values["mesh_repair"], fallback=values["mesh_fallback"])
     if not body.verdict.usable:
-        raise MeshError("mesh", values["mesh"], body.verdict.reason or "a surface with an extent")
+        raise MeshError(f"mesh {values['mesh']}", body.verdict.reason or "the surface has no extent")
     triangles = body.triangles[:, [0, 2, 1]] if body.verdict.inward else body.triangles
     surface = Surface(body.vertices, np.ascontiguousarray(triangles))
     return BodyMesh(body.mesh, body.moments, surface, _made_of(values))
@@ -204,7 +204,7 @@ def _mass_properties(values, body_mesh, scale):
         given = (values[f"explicit_inertia.{part}"] for part in ("mass", "center_of_mass", "tensor"))
         return explicit_mass_properties(*given, ballast=ballast, scale=scale)
     if body_mesh is None:
-        raise InputError("mesh", "", "a mesh, unless inertia_model is explicit")
+        raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
     return body_mesh.moments.mass_properties(
         values["inertia_model"],
         scale=scale,

@@ -114,12 +114,12 @@ def compose_yaml(path: Path) -> yaml.Node | None:
     """The YAML tree of a file, with lines; raises InputError when it can't be read."""
     try:
         if path.stat().st_size > MAX_BYTES:
-            raise InputError(str(path), f"{path.stat().st_size} bytes", f"a YAML file of at most {MAX_BYTES} bytes")
+            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a scene has at most {MAX_BYTES}")
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(str(path), error.strerror, "a readable YAML file") from None
     except UnicodeDecodeError:
-        raise InputError(str(path), "bytes that aren't UTF-8", "a YAML file") from None
+        raise InputError(str(path), "the file isn't UTF-8 text") from None
     return compose_text(text, str(path))
 
 

@@ -73,7 +73,7 @@ def _listed(metadata: Path) -> list[str]:
         storage, names, compression = bag["storage_identifier"], bag["relative_file_paths"], bag["compression_format"]
         names = [str(name) for name in names]
     except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, RecursionError):
-        raise InputError(str(metadata), "text that can't be read as a bag's", "metadata that rosbag2 wrote") from None
+        raise InputError(str(metadata), "not readable as the metadata that rosbag2 writes") from None
     if storage != "mcap":
         raise InputError("storage", storage, "mcap; ros2 bag convert makes one of another storage")
     if compression not in ("", "zstd", None):
@@ -88,4 +88,4 @@ def _plain(data: bytes, topic: str) -> bytes:
     try:
         return decompressed(data)
     except ValueError as error:
-        raise InputError(topic, f"a message that zstd can't decompress ({error})", "an undamaged bag") from None
+        raise InputError(topic, f"a message can't be decompressed by zstd ({error}); the bag is damaged") from None

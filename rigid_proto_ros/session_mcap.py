@@ -247,7 +247,7 @@ def read_mcap(data: bytes, name: str, wanted: Any = lambda topic: True) -> McapC
         elif isinstance(record, records.Message):
             channel = channels.get(record.channel_id)
             if channel is None:
-                raise InputError(name, f"a message of an unknown channel at byte {end}", "an undamaged MCAP file")
+                raise InputError(name, f"the message at byte {end} is of an unknown channel; the file is damaged")
             if wanted(channel.topic):
                 content.messages.setdefault(channel.topic, []).append((record.log_time, record.data))
         elif isinstance(record, records.Attachment):

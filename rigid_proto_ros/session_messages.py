@@ -139,7 +139,7 @@ def read_state(name: str, data: bytes, topic: str) -> tuple[int, list[float]]:
 
 
 def _undecodable(topic: str, message_type: str) -> InputError:
-    return InputError(topic, "a message that can't be decoded", f"{message_type} as little-endian CDR")
+    return InputError(topic, f"a message can't be decoded as {message_type} in little-endian CDR")
 
 
 def inertia_bytes(time_ns: int, frame_id: str, mass: float, com, tensor6) -> bytes:

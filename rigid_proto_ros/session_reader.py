@@ -46,7 +46,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
     bags = _bag_reader(path)
     files = bags.bag_files(path)
     if len(files) > 1:
-        raise InputError("--repair", f"a bag of {len(files)} files", "one of its files")
+        raise InputError("--repair", f"the bag has {len(files)} files; name one of them")
     bags.repair_mcap(bags.bag_bytes(files[0]), repaired, str(files[0]))
 
 

@@ -102,9 +102,9 @@ def _prefix(content: McapContent, path: str, node: str) -> str:
             raise InputError("--node", node, f"one of the bag's: {', '.join(sorted(kinds)) or 'it has none'}")
     if not flown:
         topics = ", ".join(sorted(content.types)[:5]) or "no topics"
-        raise InputError("session", f"{path} with {topics}", "a recording of a node's pose, twist or odom topic")
+        raise InputError("session", f"{path} has {topics}, and no pose, twist or odom topic of a node")
     if len(flown) > 1:
-        raise InputError("session", f"{path} with {', '.join(flown)}", "--node NAME, to say which of them")
+        raise InputError("session", f"{path} has several bodies, {', '.join(flown)}; say which with --node NAME")
     return flown[0]
 
 

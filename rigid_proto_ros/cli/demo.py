@@ -82,7 +82,7 @@ def _show_flight(duration_s: float, node) -> None:
     start = time.monotonic()
     while (elapsed := time.monotonic() - start) < duration_s:
         if node.poll() is not None:
-            raise InputError("rigid_body_node", f"ended early with status {node.returncode}", "a flight to the end")
+            raise InputError("rigid_body_node", f"ended early with status {node.returncode}")
         if sys.stdout.isatty():
             filled = int(40 * elapsed / duration_s)
             print(f"\r   [{'#' * filled}{' ' * (40 - filled)}] {elapsed:4.1f} s", end="", flush=True)

@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     if args.compare is not None:
         return _compare(args, mesh_name, scale)
     if mesh_name is None:
-        raise InputError("MESH", None, "a mesh (path, package:// URI or bundled name), or --compare ROBOT")
+        raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     path = resolve_mesh(mesh_name)
     with Progress(f"reading {mesh_name}", path.stat().st_size > LARGE_FILE):
         mesh = load_mesh(mesh_name, max_triangles=args.max_triangles)
@@ -166,7 +166,7 @@ def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> 
 
     for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
         if getattr(args, flag):
-            raise InputError(f"--{flag}", "given with --compare", "--compare alone or with --json")
+            raise InputError(f"--{flag}", "can't be used with --compare, which takes --json alone")
     # Solids of one density are what a robot's inertials are compared with.
     if args.model != "solid" or args.ballast:
         flag, received = ("ballast", args.ballast) if args.ballast else ("model", args.model)

@@ -134,7 +134,9 @@ def _branch(session, args: argparse.Namespace) -> None:
 
     given, time_ns = given_scene(args.scene), nanoseconds(args.at)
     if given is None and session.missing:
-        raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", "--scene FILE with it")
+        raise InputError(
+            "--as-scene", f"the recording has no {', '.join(session.missing)}; give its scene with --scene FILE"
+        )
     branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)
     scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Start what is needed and stay."""
     for package, remedy in (("viser", "pip install 'viser>=1.1,<1.2'"), ("rclpy", "a ROS 2 installation")):
         if importlib.util.find_spec(package) is None:
-            raise InputError("workbench", f"no package {package}", f"{remedy} (extras [workbench] and [ros])")
+            raise InputError("workbench", f"the package {package} is missing: {remedy} (extras [workbench] and [ros])")
     if args.node and (args.scene or args.mesh):
         raise InputError("--node", args.node, "a running node, or a scene to start one with, not both")
     if args.link is not None:

@@ -151,7 +151,7 @@ class MeshMoments:
         polygon_starts: np.ndarray | None = None,
         *,
         closed: bool = True,
-        closed_reason: str = "an open surface",
+        closed_reason: str = "the surface is open",
         remedy: str = "--repair (mesh_repair), --fallback hull|box (mesh_fallback)",
         name: str = "mesh",
         stand_in: tuple[np.ndarray, np.ndarray] | None = None,
@@ -179,8 +179,7 @@ class MeshMoments:
         if self.stand_in is not None:
             return self._get(("stand-in",), lambda: solid_moments(*self.stand_in))
         if not self.closed:
-            accepted = f"a closed, consistently wound surface; {self.remedy}, or another model with --mass (mass)"
-            raise MeshError(self.name, self.closed_reason, accepted)
+            raise MeshError(self.name, f"{self.closed_reason}; use {self.remedy}, or another model with --mass (mass)")
         return self._get("solid", lambda: solid_moments(self.vertices, self.triangles))
 
     def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:

@@ -62,10 +62,12 @@ class Verdict:
 def unit_suspicion(longest_side: float) -> Finding | None:
     """A remark when a body of ``longest_side`` [m] looks as if its file weren't in metres."""
     if longest_side > LARGE_M:
-        message = f"{longest_side:.4g} m across: a file in millimetres? --scale 0.001 (scale) reads it so"
+        message = f"the body is {longest_side:.4g} m across; if the file is in millimetres, use --scale 0.001 (scale)"
         return Finding("unit_suspicion", WARNING, message)
     if longest_side < SMALL_M:
-        message = f"{longest_side:.4g} m across: a file in kilometres or inches? --scale (scale) sets the unit"
+        message = (
+            f"the body is {longest_side:.4g} m across; if the file isn't in metres, set the unit with --scale (scale)"
+        )
         return Finding("unit_suspicion", WARNING, message)
     return None
 
@@ -139,15 +141,13 @@ def _judge_edges(verdict: Verdict, topology: Topology, vertices, triangles, half
         verdict.add(
             "duplicate_faces",
             ERROR,
-            f"{_count(copies, 'face')} twice in the file, counted twice in every sum",
-            "--repair (mesh_repair) drops them",
+            f"{_count(copies, 'duplicate face')}, which would count twice",
+            "--repair (mesh_repair) removes the copies",
         )
     if topology.unbalanced:
         volume, area, _, _ = component_volumes(vertices, triangles, np.zeros(len(triangles), np.int64), 1)
         swing = float(np.sum(np.abs(area[0]) * half)) / 3.0
-        spread = (
-            f"over origins within its box the volume would run from {volume[0] - swing:.3g} to {volume[0] + swing:.3g}"
-        )
+        ambiguous = f"volume ambiguous: {volume[0] - swing:.3g} to {volume[0] + swing:.3g}, depending on how"
         if not topology.watertight:
             uses = topology.edges[:, 2] + topology.edges[:, 3]
             odd = int(np.count_nonzero(uses % 2))
@@ -155,25 +155,34 @@ def _judge_edges(verdict: Verdict, topology: Topology, vertices, triangles, half
             if odd > len(topology.boundary):
                 edges += f" and {_count(odd - len(topology.boundary), 'edge')} of 3 or more faces"
             verdict.add(
-                "open", ERROR, f"open surface: {edges}; {spread}", "--repair (mesh_repair) welds and caps holes"
+                "open",
+                ERROR,
+                f"open surface with {edges}; {ambiguous} holes are closed",
+                "--repair (mesh_repair) welds edges and caps holes",
             )
         if topology.flipped:
             verdict.add(
                 "inconsistent_winding",
                 ERROR,
-                f"inconsistent winding: {_count(topology.flipped, 'edge')} run twice the same way; {spread}",
+                f"inconsistent winding: {_count(topology.flipped, 'edge')} used twice in the same direction; {ambiguous} faces are turned",
                 "--repair (mesh_repair) turns faces",
             )
     if topology.nonmanifold and not topology.unbalanced and not copies:
         verdict.add(
-            "non_manifold", INFO, f"{_count(topology.nonmanifold, 'edge')} shared by more than two faces, balanced"
+            "non_manifold",
+            INFO,
+            f"{_count(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently",
         )
     if topology.opposites:
         verdict.add(
-            "opposite_faces", WARNING, f"{_count(topology.opposites, 'face')} lie on another one wound the other way"
+            "opposite_faces",
+            WARNING,
+            f"{_count(topology.opposites, 'face')} coinciding with another one that is wound the other way",
         )
     if topology.degenerate:
-        verdict.add("degenerate_faces", INFO, f"{_count(topology.degenerate, 'triangle')} without area, of no effect")
+        verdict.add(
+            "degenerate_faces", INFO, f"{_count(topology.degenerate, 'triangle')} without area, which have no effect"
+        )
 
 
 def _judge_components(verdict: Verdict, topology: Topology, vertices, triangles) -> None:
@@ -185,7 +194,9 @@ def _judge_components(verdict: Verdict, topology: Topology, vertices, triangles)
     elif count > MAX_NESTED_COMPONENTS:
         verdict.inward = bool(np.sum(volume) < 0.0)
         verdict.add(
-            "components_unchecked", WARNING, f"{count} components: whether some overlap or lie inside others is unknown"
+            "components_unchecked",
+            WARNING,
+            f"{count} components are too many to check whether some overlap or lie inside others",
         )
         inward = int(np.count_nonzero(volume < 0.0))
         if 0 < inward < count:
@@ -205,31 +216,31 @@ def _judge_components(verdict: Verdict, topology: Topology, vertices, triangles)
                 verdict.add(
                     "component_inward",
                     ERROR,
-                    f"inconsistent winding: {disjoint} of {count} components wound inward, so that they subtract",
+                    f"inconsistent winding: {disjoint} of {count} components wound inward, so that they would subtract",
                     "--repair (mesh_repair) turns them",
                 )
             if nested:
                 verdict.add(
                     "nested_components",
                     WARNING,
-                    f"{_count(nested, 'component')} inside another, wound outward: counted twice there; --repair "
-                    "(mesh_repair) makes cavities of them",
+                    f"{_count(nested, 'component')} inside another and wound outward, so that their volume counts twice; "
+                    "--repair (mesh_repair) makes cavities of them",
                 )
         cavities = int(np.count_nonzero((expected < 0.0) & ~wrong)) if not verdict.inward else 0
         if verdict.inward:
             cavities = int(np.count_nonzero(expected < 0.0))
         if cavities:
-            verdict.add("cavities", INFO, f"{cavities} closed inside, wound inward: kept as empty")
+            verdict.add("cavities", INFO, f"{_count(cavities, 'closed inner surface')} wound inward, taken as cavities")
         if nesting.crossing:
             verdict.add(
                 "overlapping_components",
                 WARNING,
-                f"{_count(len(nesting.crossing), 'pair')} of components cross each other: what they share counts twice",
+                f"{_count(len(nesting.crossing), 'pair')} of components overlap; the volume that they share counts twice",
             )
         if not nesting.complete:
-            verdict.add("components_unchecked", WARNING, "too many faces to say whether all components are apart")
+            verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
     if verdict.inward:
-        verdict.add("inward", WARNING, "wound inward throughout: turned outward")
+        verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 
 
 def judge_surface(
@@ -245,11 +256,13 @@ def judge_surface(
         rows = int(np.count_nonzero(bad.any(axis=1)))
         where = int(np.argmax(bad.any(axis=1)))
         verdict.usable = verdict.watertight = verdict.winding_consistent = False
-        verdict.add("nonfinite", ERROR, f"{rows} of {len(vertices)} vertices not finite, the first is number {where}")
+        verdict.add(
+            "nonfinite", ERROR, f"{rows} of {len(vertices)} vertices are not finite; the first is vertex {where}"
+        )
         return verdict, None
     if len(triangles) == 0:
         verdict.usable = verdict.watertight = verdict.winding_consistent = False
-        verdict.add("no_faces", ERROR, "no faces")
+        verdict.add("no_faces", ERROR, "the mesh has no faces")
         return verdict, None
     topology = mesh_topology(vertices, triangles)
     verdict.components = topology.components
@@ -264,7 +277,7 @@ def judge_surface(
         verdict.add("unreferenced_vertices", INFO, f"{spare} vertices belong to no face; they carry no mass")
     if diagonal == 0.0:
         verdict.usable = False
-        verdict.add("zero_volume", ERROR, "all vertices in one point")
+        verdict.add("zero_volume", ERROR, "all vertices lie in one point")
         return verdict, topology
     _judge_edges(verdict, topology, vertices, triangles, half)
     if topology.unbalanced == 0:
@@ -273,17 +286,17 @@ def judge_surface(
         if topology.components > 1 or not empty:
             _judge_components(verdict, topology, vertices, triangles)
         if empty and verdict.closed:
-            verdict.add("zero_volume", ERROR, "encloses no volume: flat, or folded onto itself")
+            verdict.add("zero_volume", ERROR, "the surface encloses no volume: it is flat, or folded onto itself")
         elif not empty and abs(volume) < THIN * diagonal**3:
-            verdict.add("thin", INFO, f"thin: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
+            verdict.add("thin", INFO, f"thin body: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
     if polygon_starts is not None:
         deviation, spread = _polygon_planarity(vertices, triangles, polygon_starts, 0.5 * lower + 0.5 * upper)
         if deviation > NONPLANAR * diagonal:
             verdict.add(
                 "nonplanar_polygons",
                 INFO,
-                f"non-planar polygons, fanned from their first corner: corners up to {deviation:.2g} off plane; other "
-                f"diagonals would move the volume within {spread:.2g}",
+                f"non-planar polygons, triangulated from their first corner: corners lie up to {deviation:.2g} off the plane; "
+                f"other triangulations would change the volume by up to {spread:.2g}",
             )
     return verdict, topology
 

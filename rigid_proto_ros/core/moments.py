@@ -102,14 +102,14 @@ def as_arrays(vertices, triangles, *, check: bool = True) -> tuple[np.ndarray, n
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
-        raise MeshError("mesh", "no faces", "a surface of at least one triangle")
+        raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
     if check and (int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]):
         raise _out_of_range(vertices)
     return vertices, triangles
 
 
 def _out_of_range(vertices: np.ndarray) -> MeshError:
-    return MeshError("mesh", "a face's vertex number out of range", f"0 to {vertices.shape[0] - 1}")
+    return MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
 
 
 @njit(cache=True, nogil=True)
@@ -139,10 +139,10 @@ def exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
     """
     lower, upper, finite = _bounds(vertices)
     if not finite:
-        raise MeshError("mesh", "a vertex that is not finite", "finite coordinates")
+        raise MeshError("mesh", "a vertex coordinate is not finite")
     reference, factor, size = _reference(lower, upper)
     if size == 0.0:
-        raise MeshError("mesh", "all vertices in one point", "a body with an extent")
+        raise MeshError("mesh", "all vertices lie in one point")
     return reference, factor, size
 
 
@@ -184,7 +184,7 @@ def central_moments(sums, low, reference, factor, divisors: tuple[float, float, 
 
 def _moments(out: np.ndarray, reference: np.ndarray, path: str) -> Moments:
     if out[0] == 0.0:
-        raise MeshError("mesh", "a surface that encloses no volume", "a closed surface with a volume")
+        raise MeshError("mesh", "the surface encloses no volume")
     return Moments(float(out[0]), reference, out[1:4], out[4:7], out[7:], path)
 
 
@@ -269,9 +269,9 @@ def solid_moments(vertices, triangles, *, path: str = "auto") -> Moments:
     else:
         status, compensated, reference, numbers = _solid(vertices, triangles, try_blocked, path == "blocked")
     if status == _NOT_FINITE:
-        raise MeshError("mesh", "a vertex that is not finite", "finite coordinates")
+        raise MeshError("mesh", "a vertex coordinate is not finite")
     if status == _ONE_POINT:
-        raise MeshError("mesh", "all vertices in one point", "a body with an extent")
+        raise MeshError("mesh", "all vertices lie in one point")
     if status == _NO_SUCH_VERTEX:
         raise _out_of_range(vertices)
     return _moments(numbers, reference, "compensated" if compensated else "blocked")
@@ -326,7 +326,7 @@ def box_moments(vertices, triangles) -> Moments:
     vertices, triangles = as_arrays(vertices, triangles)
     lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))
     if not finite:
-        raise MeshError("mesh", "a vertex that is not finite", "finite coordinates")
+        raise MeshError("mesh", "a vertex coordinate is not finite")
     side = upper - lower
     volume = float(side[0] * side[1] * side[2])
     middle = 0.5 * lower + 0.5 * upper

@@ -95,7 +95,7 @@ def check_picture(picture: str | Path) -> None:
 def check_time(session: RecordedSession, at_s: float) -> None:
     """Raise InputError unless the session has states around ``at_s``."""
     if not len(session.times):
-        raise InputError("session", "no states", "a recording that holds states")
+        raise InputError("session", "the recording has no states")
     begin, end = 1e-9 * int(session.times[0]), 1e-9 * session.end_ns
     if not (np.isfinite(at_s) and begin <= at_s <= end):
         raise InputError("--at", at_s, f"a time within the recording, {begin:g} to {end:g} s")
@@ -131,7 +131,7 @@ def _connected(address: str, process: ViewerProcess, log: Any) -> Any:
     log.seek(0)
     words = log.read().decode(errors="replace")
     if "graphics adapter" in words or "adapter" in words.lower():
-        raise InputError("snapshot", "no graphics adapter", DRIVERS)
+        raise InputError("snapshot", f"there is no graphics adapter; install {DRIVERS}")
     last = (words.strip().splitlines() or ["no message"])[-1]
     raise InputError("snapshot", last, f"a viewer that starts; if it is the drivers: {DRIVERS}")
 

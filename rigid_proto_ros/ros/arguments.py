@@ -141,7 +141,7 @@ def _ros_options(argv: list[str]) -> list[tuple[str, str]]:
         elif inside and argument in ("-p", "--param", "--params-file"):
             value = next(arguments, None)
             if value is None:
-                raise InputError(argument, "nothing", "a value behind it")
+                raise InputError(argument, "a value is missing behind it")
             found.append(("--params-file" if argument == "--params-file" else "-p", value))
     return found
 

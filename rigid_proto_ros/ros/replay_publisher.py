@@ -87,7 +87,7 @@ def session_commands(session: RecordedSession) -> list[ScriptCommand]:
 def publish_states(session: RecordedSession, speed: float) -> int:
     """Publish the recorded states on the topics that they came from, with their stamps; returns the exit status."""
     if not len(session.times):
-        raise InputError("session", "no states", "a session with states to publish")
+        raise InputError("session", "the session has no states to publish")
     with _context():
         node = rclpy.create_node("replay", start_parameter_services=False, enable_rosout=False)
         try:

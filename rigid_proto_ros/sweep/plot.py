@@ -67,7 +67,7 @@ def _figure():
         from matplotlib import rcParams
         from matplotlib.figure import Figure
     except ImportError:
-        raise InputError("--plot", "no matplotlib", "matplotlib installed: pip install matplotlib") from None
+        raise InputError("--plot", "matplotlib is missing: pip install matplotlib") from None
     # The same table gives the same file.
     rcParams["svg.hashsalt"] = "rigid_proto_ros"
     return Figure(figsize=(7.2, 4.8), layout="constrained")

@@ -42,7 +42,7 @@ class _Sobol:
         try:
             from scipy.stats import qmc
         except ImportError:
-            raise InputError("sampler", "sobol", "scipy installed (pip install scipy), or another sampler") from None
+            raise InputError("sampler", "sobol needs scipy (pip install scipy)") from None
         self._engine = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(np.random.SeedSequence(seed)))
         self._lock = threading.Lock()
 

@@ -136,12 +136,12 @@ def study_file(name: str) -> Path:
 def _yaml(path: Path) -> object:
     try:
         if path.stat().st_size > MAX_BYTES:
-            raise InputError(str(path), f"{path.stat().st_size} bytes", f"a file of at most {MAX_BYTES} bytes")
+            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a study has at most {MAX_BYTES}")
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(str(path), error.strerror, "a readable file") from None
     except UnicodeDecodeError:
-        raise InputError(str(path), "bytes that aren't UTF-8", "a YAML file") from None
+        raise InputError(str(path), "the file isn't UTF-8 text") from None
     return load_plain_yaml(text, str(path))
 
 

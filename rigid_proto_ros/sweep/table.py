@@ -37,7 +37,7 @@ def arrow():
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise InputError("sweep", "no pyarrow", "pyarrow installed: pip install 'rigid_proto_ros[sweep]'") from None
+        raise InputError("sweep", "pyarrow is missing: pip install 'rigid_proto_ros[sweep]'") from None
     return pyarrow, pyarrow.parquet
 
 

@@ -54,7 +54,7 @@ def encode(scene: str, script: str = "") -> str:
     _check(values, entries)
     text = json.dumps({"scene": values, "script": entries or []}, separators=(",", ":"), allow_nan=False).encode()
     if len(text) > MAX_DECODED:
-        raise InputError("link", f"{len(text)} bytes", f"a scene and a script of at most {MAX_DECODED} bytes in all")
+        raise InputError("link", f"scene and script have {len(text)} bytes; a link holds at most {MAX_DECODED}")
     packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     packed = packer.compress(text) + packer.flush()
     link = f"{VERSION}.{base64.urlsafe_b64encode(packed).decode().rstrip('=')}"
@@ -71,7 +71,7 @@ def decode(link: str) -> tuple[str, str]:
     """Scene and script of a link, or of the address that it stands in, as texts; raises InputError."""
     link = link.rpartition("?")[2].strip()
     if len(link) > MAX_LINK:
-        raise InputError("link", f"{len(link)} characters", f"at most {MAX_LINK}")
+        raise InputError("link", f"the link has {len(link)} characters; at most {MAX_LINK} are accepted")
     version, dot, payload = link.partition(".")
     if not dot or version != VERSION:
         raise InputError("link", link[:40], f"a link made here, beginning with {VERSION}.")
@@ -103,7 +103,7 @@ def _unpacked(payload: str) -> Any:
     except zlib.error:
         raise _damaged("its compression") from None
     if unpacker.unconsumed_tail:
-        raise InputError("link", f"over {MAX_DECODED} bytes inside", f"at most {MAX_DECODED}")
+        raise InputError("link", f"the link holds more than {MAX_DECODED} bytes")
     if not unpacker.eof or unpacker.unused_data:
         raise _damaged("its end")
     try:
@@ -113,7 +113,7 @@ def _unpacked(payload: str) -> Any:
 
 
 def _damaged(what: str) -> InputError:
-    return InputError("link", f"a link damaged in {what}", "a link as it was made, whole")
+    return InputError("link", f"the link is damaged ({what})")
 
 
 def _check(values: Mapping[str, object], entries) -> None:

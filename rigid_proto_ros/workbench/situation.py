@@ -52,7 +52,9 @@ def situation_of(scene: str, script: str, present: Mapping[str, object]) -> Situ
     commands = with_contacts(parse_script(script, wrench_timeout=timeout_s) if script.strip() else [], contacts)
     commands = [_at_its_point(command, contacts) for command in commands]
     if len(commands) > MAX_COMMANDS:
-        raise InputError("script", f"{len(commands)} commands", f"at most {MAX_COMMANDS}; send it with poke_client")
+        raise InputError(
+            "script", f"{len(commands)} commands are more than {MAX_COMMANDS}; send the script with poke_client"
+        )
     return Situation(changes_to(values, present), commands)
 
 
@@ -100,9 +102,7 @@ async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Call
             deadline = time.monotonic() + STALLED_S
             while received() - first < number:
                 if time.monotonic() > deadline:
-                    raise InputError(
-                        "node", f"{received() - first} commands confirmed", f"{number}, all that were sent"
-                    )
+                    raise InputError("node", f"the node confirmed {received() - first} of {number} commands")
                 await asyncio.sleep(0.02)
 
 
@@ -135,4 +135,4 @@ async def _within(answer: asyncio.Future, what: str):
     try:
         return await asyncio.wait_for(answer, STALLED_S)
     except TimeoutError:
-        raise InputError(what, f"no answer within {STALLED_S:g} s", "an answer of the node") from None
+        raise InputError(what, f"the node gave no answer within {STALLED_S:g} s") from None

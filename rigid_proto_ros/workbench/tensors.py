@@ -28,7 +28,7 @@ def model_properties(scenario: Scenario, model: str, com: str = "") -> MassPrope
         mass, com, tensor = (values[f"explicit_inertia.{name}"] for name in ("mass", "center_of_mass", "tensor"))
         return explicit_mass_properties(mass, com, tensor, ballast, values["scale"])
     if scenario.body_mesh is None:
-        raise InputError("mesh", "", "a mesh")
+        raise InputError("mesh", "a mesh is needed")
     return scenario.body_mesh.moments.mass_properties(
         model,
         scale=values["scale"],

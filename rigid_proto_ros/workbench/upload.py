@@ -131,7 +131,8 @@ class Uploads:
             raise MeshError("upload", name, f"a file named .{', .'.join(ACCEPTED)}")
         if len(data) > self._limit:
             raise MeshError(
-                "upload", f"{name}: {len(data)} bytes", f"at most {self._limit}; name a larger file by path"
+                "upload",
+                f"{name} has {len(data)} bytes; at most {self._limit} are accepted, so name a larger file by its path",
             )
         self._remove_all_but(self._flown)
         self._count += 1
