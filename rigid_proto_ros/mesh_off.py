@@ -117,7 +117,9 @@ def read_off(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     status, position, slow_count, used = _read(buffer, start, vertices, starts, corners, slow)
     if status == _ENDED:
         received = f"{min(position, n)} vertices and {max(0, position - n)} faces"
-        raise MeshError(name, received, f"the {n} vertices and {p} faces its header announces; cut short?")
+        raise MeshError(
+            name, f"{received}, but the header announces {n} vertices and {p} faces; the file may be truncated"
+        )
     if status != _OK:
         expected = {
             _BAD_VERTEX: "a vertex: three numbers",

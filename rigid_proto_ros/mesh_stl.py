@@ -136,5 +136,5 @@ def _ascii_points(data: bytes, name: str) -> np.ndarray:
         raise MeshError(f"{name} line {line_of(data, position)}", excerpt(data, position), "vertex with three numbers")
     if status == _NOT_THREE or count != 3 * facets:
         received = f"{count} vertices in {facets} whole facets"
-        raise MeshError(name, received, "three vertices a facet; the file may be cut short")
+        raise MeshError(name, f"{received}, which is not three a facet; the file may be truncated")
     return points[:count]

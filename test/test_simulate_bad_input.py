@@ -77,7 +77,7 @@ SCENES = {
         scene_text('mesh: ""\ninertia_model: explicit\nexplicit_inertia.tensor: [1.0, 0.0, 0.0, 1.0, 0.0, 3.0]'),
         *("", "", ""),
     ),
-    "no_mesh": (scene_text('mesh: ""'), "mesh", "''", "explicit"),
+    "no_mesh": (scene_text('mesh: ""'), "mesh", "explicit"),
 }
 
 SCRIPTS = {
