@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Pictures of the interactive page in headless Chromium: ``python test/workbench_pictures.py PICTURE.png`` draws the README's,
-``--lessons FOLDER`` one of each lesson.
+``--lessons FOLDER`` one of each lesson, ``--compare PICTURE.png`` body and ghost a click after the page was opened.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import tempfile
 import time
 from pathlib import Path
@@ -17,6 +18,7 @@ from workbench_page import CHROMIUM, FLAGS, Bench, Page
 
 from rigid_proto_ros.lessons import lessons
 from rigid_proto_ros.rerun_view.ports import any_free_port
+from rigid_proto_ros.workbench.side_by_side import START
 
 SIZE = (1400, 800)
 
@@ -24,6 +26,7 @@ SIZE = (1400, 800)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("picture", nargs="?", type=Path)
+    parser.add_argument("--compare", type=Path, metavar="PICTURE.png")
     parser.add_argument("--lessons", type=Path, metavar="FOLDER")
     args = parser.parse_args()
     with held_domain() as domain, tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
@@ -34,6 +37,8 @@ def main() -> None:
             page = Page(browser, bench.address, SIZE)
             if args.picture:
                 draw_pull(page, args.picture)
+            if args.compare:
+                draw_comparison(page, args.compare)
             if args.lessons:
                 args.lessons.mkdir(parents=True, exist_ok=True)
                 for lesson in lessons():
@@ -43,6 +48,21 @@ def main() -> None:
             browser.close()
         finally:
             bench.process.end()
+
+
+def draw_comparison(page: Page, picture: Path) -> None:
+    """True tensor against box: what a user sees by three actions (start the workbench, open the page, click), counted here."""
+    began = time.monotonic()
+    actions = ["rigid_proto workbench", "open the page"]
+    page.button(START)
+    actions.append(f"click {START!r}")
+    found = page.until(lambda: re.search(r"(\d+)° apart", page.text), "the angle between body and ghost")
+    print(
+        f"{len(actions)} actions ({', '.join(actions)}), seen {time.monotonic() - began:.1f} s after the click: {found[0]}"
+    )
+    assert len(actions) <= 5
+    page.until(lambda: 2.0 <= page.readout[0] <= 2.6, "two seconds of flight")
+    page.page.screenshot(path=picture)
 
 
 def draw_pull(page: Page, picture: Path) -> None:
