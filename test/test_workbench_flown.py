@@ -77,13 +77,13 @@ def test_the_ghost_of_a_lesson_is_there_from_its_start_and_gone_in_the_next_one(
 
 
 def test_a_command_that_the_ghosts_integrator_cannot_carry_is_said(flown: FlownPage) -> None:
-    flown.set("Its integrator", "taylor")
+    flown.set("Its integrator", "free_body")
     flown.reset()
     flown.fly(0.1)
     place = flown.grab([0.0, 0.0, 0.07])
     flown.pull(place + [0.0, 0.1, 0.0])
     flown.fly(0.1)
-    assert any("ghost doesn't take part" in text and "taylor" in text for text in flown.said)
+    assert any("ghost doesn't take part" in text and "free_body" in text for text in flown.said)
 
 
 def slider_below(flown: FlownPage, label: str):

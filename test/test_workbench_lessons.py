@@ -256,7 +256,7 @@ def bracket_wobbles(user: User) -> None:
 
 def bracket_axes(user: User) -> None:
     user.set("Principal axes", True)
-    (arrows,) = user.page.view._handles["Principal axes"]
+    arrows, *_ = user.page.view._handles["Principal axes"]
     w, x, y, z = arrows.wxyz
     drawn = matrix_from_quaternion(np.array([x, y, z, w]))
     assert arrows.visible and np.abs(drawn).max() < np.cos(np.radians(1.0))

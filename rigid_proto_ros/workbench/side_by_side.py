@@ -63,7 +63,8 @@ class SideBySide:
             return
         self._due_s = now_s + SHOWN_S
         body_name, ghost_name, what = names(scenario, left)
-        self._legend.content = f"{_mark(BODY_COLOUR)} {body_name} &emsp; {_mark(GHOST_COLOUR)} {ghost_name}"
+        legend = f"{_mark(BODY_COLOUR)} {body_name} &emsp; {_mark(GHOST_COLOUR)} {ghost_name}"
+        self._legend.content = f'<div style="padding:0.3em 0.9em 0;font-size:0.9em">{legend}</div>'
         now, most = math.degrees(self.angle), math.degrees(self._most)
         self._sentence.content = (
             f"{what} After {state.time_ns * 1e-9:.1f} s: **{now:.0f}° apart**, at most {most:.0f}° so far."
