@@ -20,11 +20,10 @@ from . import problem as pr
 from .acting import NEVER
 from .compilation import njit
 from .integrators import control as ctl
+from .integrators import motion_series, taylor
 from .integrators.auto import ANY_LOADS, FREE, STEADY, TURNING_LOADS, kind_of_segment
 from .integrators.integrator import MAX_SPEED
-from .integrators.motion_series import COLUMNS
 from .integrators.series_steps import rows
-from .integrators.taylor import ROWS
 from .loads import FORCE_BODY, FORCE_WORLD, LOADS_SIZE, MAX_ACCELERATION, MOMENT, TORQUE_BODY, TORQUE_WORLD
 from .motion import STORED, to_good_row, to_variables
 from .quantities import STATE, begin, which_is_met
@@ -266,7 +265,7 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
     p, y, trial = np.zeros(pr.SIZE), np.zeros(STORED), np.zeros(STORED)
     control, following = np.zeros(ctl.SIZE), np.zeros(STORED)
     degree = times[b.DEGREE]
-    room = (np.zeros((ROWS, degree + 1)), np.zeros((rows(degree), COLUMNS)))
+    room = (np.zeros((degree + 1, taylor.COLUMNS)), np.zeros((rows(degree), motion_series.COLUMNS)))
     common = np.zeros(pr.SIZE)
     _problem_of_body(body, settings, gyroscopic, common)
     pulses, ends_ns = np.zeros(count, np.int64), np.zeros(count, np.int64)

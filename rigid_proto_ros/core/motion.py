@@ -42,6 +42,8 @@ STORED = 22
 @njit(cache=True, error_model="numpy")
 def damping_functions(z):
     """φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 + e⁻ᶻ)/z², z ≥ 0, to rounding."""
+    if z == 0.0:
+        return 1.0, 0.5
     if z < 0.5:
         # φ₂ = Σ (−z)ᵏ/(k + 2)!; 14 terms leave 0.5¹⁴/16! = 3e-18.
         phi2 = 0.0

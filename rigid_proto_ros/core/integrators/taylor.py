@@ -22,92 +22,170 @@ from ..problem import (
     TORQUE_BODY,
     TRANSLATES,
 )
-from ..rotation import normalize
+from ..simd import arranged, component, filled, joined, load, root, store, width
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 from .runge_kutta import is_good
 from .stepping import FixedSteps
 
 DEGREE = 18
 
-# Rows of the coefficient array; column k holds the k-th coefficients.
-_Q, _W, _D, _U, _G = 0, 4, 7, 10, 13
-ROWS = 17
+# Where the parts of a coefficient stand in its row, four components each, of which the fourth counts for q alone: ω, then q
+# times the unit vectors and q itself, so that one vector holds what a product takes of a row.
+_YZX, _QX, _Q = 0, 4, 16
+_W, _D, _U = 20, 24, 28
+# The other factors: ω in another order and each of its components four times, and those of g_b ⊗ q* with the real part negated.
+_ZXY, _G = 32, 48
+COLUMNS = 64
+
+
+@njit(cache=True, error_model="numpy")
+def _four(x):
+    return joined(x, x, x, x)
+
+
+@njit(cache=True, error_model="numpy")
+def _triple(array, at, last):
+    """Three numbers of an array and ``last``; where flights go side by side each number has one for every flight."""
+    n = width(last)
+    return joined(load(array, at * n, last), load(array, (at + 1) * n, last), load(array, (at + 2) * n, last), last)
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(v):
+    return _four(component(v, 0)), _four(component(v, 1)), _four(component(v, 2))
+
+
+@njit(cache=True, error_model="numpy")
+def _axes(q):
+    """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighed by the components of v is q ⊗ v."""
+    return arranged(q, (3, 2, 5, 4)), arranged(q, (6, 3, 0, 5)), arranged(q, (1, 4, 3, 6))
+
+
+@njit(cache=True, error_model="numpy")
+def series_beside(y, p, degree, c, translates, zero):
+    """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u. zero: one number, or one for every flight that goes
+    beside others; then y (≥ 13, n), p (SIZE, n) and c (degree + 1, COLUMNS n) hold the flights' numbers next to each other.
+    """
+    n, zeros = width(zero), _four(zero)
+    one, many = zero + 1.0, _four(_four(zero))
+    moments = _triple(p, MOMENTS, one)
+    gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) / moments
+    gyroscopic = _four(load(p, GYROSCOPIC * n, zero)) * gyroscopic
+    cw, cv = _four(load(p, DAMPING_ANGULAR * n, zero)) / moments, _four(load(p, DAMPING_LINEAR * n, zero))
+    b = ACCELERATION_BODY * n
+    bx, by, bz = _four(load(p, b, zero)), _four(load(p, b + n, zero)), _four(load(p, b + 2 * n, zero))
+    q, w = load(y, 0, zeros), _triple(y, 4, zero)
+    d, u = _triple(y, 7, zero), _triple(y, 10, zero)
+    length = COLUMNS * n
+    # Products with the first and the latest coefficient come last in every sum: what is older need not wait for them.
+    q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
+    yzx0, zxy0 = arranged(w, (1, 2, 0, 3)), arranged(w, (2, 0, 1, 3))
+    for k in range(degree + 1):
+        row = k * length
+        store(c, row + _Q * n, q)
+        store(c, row + _W * n, w)
+        store(c, row + _D * n, d)
+        store(c, row + _U * n, u)
+        if k == degree:
+            break
+        qx, qy, qz = _axes(q)
+        wx, wy, wz = _spread(w)
+        yzx, zxy = arranged(w, (1, 2, 0, 3)), arranged(w, (2, 0, 1, 3))
+        g = bx * qx + by * qy + bz * qz
+        gx, gy, gz = _spread(g)
+        gw = _four(component(g, 3))
+        store(c, row + _YZX * n, joined(yzx, qx, qy, qz))
+        store(c, row + _ZXY * n, joined(zxy, wx, wy, wz))
+        store(c, row + _G * n, joined(gx, gy, gz, gw))
+        turn, push = many, many
+        # Rows i and j = k − i, by their first numbers: both of a pair at once, and the middle one where there is one.
+        i, j = length, row - length
+        for _ in range((k - 1) // 2):
+            one_way = load(c, i + _YZX * n, many) * load(c, j + _ZXY * n, many)
+            turn = turn + (one_way + load(c, j + _YZX * n, many) * load(c, i + _ZXY * n, many))
+            if translates:
+                push = push + load(c, i + _QX * n, many) * load(c, j + _G * n, many)
+            i += length
+            j -= length
+        # The vector part of a ⊗ (g ⊗ b*) is that of b ⊗ (g ⊗ a*): half of the sum counts twice, its middle once.
+        push = push + push
+        if k % 2 == 0 and k > 0:
+            turn = turn + load(c, i + _YZX * n, many) * load(c, i + _ZXY * n, many)
+            if translates:
+                push = push + load(c, i + _QX * n, many) * load(c, i + _G * n, many)
+        spin, turned = component(turn, 0), component(turn, 1) + component(turn, 2) + component(turn, 3)
+        spin, turned = spin + yzx * zxy0, turned + (wx0 * qx + wy0 * qy + wz0 * qz)
+        if k > 0:
+            spin, turned = spin + yzx0 * zxy, turned + (wx * qx0 + wy * qy0 + wz * qz0)
+        f = 1.0 / (k + 1.0)
+        if translates:
+            force = (component(push, 0) + component(push, 1)) + (component(push, 2) - component(push, 3))
+            ends = (gx * qx0 + gy * qy0) + (gz * qz0 - gw * q0)
+            force = force + (ends + ends if k > 0 else ends + _triple(p, ACCELERATION_ADDED, zero))
+            d = u * f
+            u = (force - cv * u) * f
+        rate = gyroscopic * spin - cw * w
+        if k == 0:
+            rate = rate + _triple(p, TORQUE_BODY, zero) / moments
+        w = rate * f
+        q = turned * (0.5 * f)
 
 
 @njit(cache=True, error_model="numpy")
 def series(y, p, degree, c):
-    """Coefficients c (17, degree + 1) of the motion from y: q, ω, d, u, and g_b ⊗ q* as a means."""
-    A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
-    tx, ty, tz = p[TORQUE_BODY], p[TORQUE_BODY + 1], p[TORQUE_BODY + 2]
-    g, cw, cv = p[GYROSCOPIC], p[DAMPING_ANGULAR], p[DAMPING_LINEAR]
-    bx, by, bz = p[ACCELERATION_BODY], p[ACCELERATION_BODY + 1], p[ACCELERATION_BODY + 2]
-    translates = p[TRANSLATES] != 0.0
-    for j in range(13):
-        c[j, 0] = y[j]
-    for k in range(degree):
-        s1, s2, s3 = 0.0, 0.0, 0.0
-        x, yy, z, w = 0.0, 0.0, 0.0, 0.0
-        for i in range(k + 1):
-            wx, wy, wz = c[_W, k - i], c[_W + 1, k - i], c[_W + 2, k - i]
-            s1 += c[_W + 1, i] * wz
-            s2 += c[_W + 2, i] * wx
-            s3 += c[_W, i] * wy
-            qx, qy, qz, qw = c[_Q, i], c[_Q + 1, i], c[_Q + 2, i], c[_Q + 3, i]
-            x += qw * wx + qy * wz - qz * wy
-            yy += qw * wy - qx * wz + qz * wx
-            z += qw * wz + qx * wy - qy * wx
-            w -= qx * wx + qy * wy + qz * wz
-        f = 1.0 / (k + 1.0)
-        e1, e2, e3 = (
-            g * (B - C) * s1 - cw * c[_W, k],
-            g * (C - A) * s2 - cw * c[_W + 1, k],
-            g * (A - B) * s3 - cw * c[_W + 2, k],
-        )
-        if k == 0:
-            e1, e2, e3 = e1 + tx, e2 + ty, e3 + tz
-        c[_W, k + 1], c[_W + 1, k + 1], c[_W + 2, k + 1] = f * e1 / A, f * e2 / B, f * e3 / C
-        h = 0.5 * f
-        c[_Q, k + 1], c[_Q + 1, k + 1], c[_Q + 2, k + 1], c[_Q + 3, k + 1] = h * x, h * yy, h * z, h * w
-        if translates:
-            # R g_b = q ⊗ (g_b ⊗ q*).
-            qx, qy, qz, qw = -c[_Q, k], -c[_Q + 1, k], -c[_Q + 2, k], c[_Q + 3, k]
-            c[_G, k] = bx * qw + by * qz - bz * qy
-            c[_G + 1, k] = by * qw + bz * qx - bx * qz
-            c[_G + 2, k] = bz * qw + bx * qy - by * qx
-            c[_G + 3, k] = -(bx * qx + by * qy + bz * qz)
-            a1, a2, a3 = 0.0, 0.0, 0.0
-            # The vector part of a ⊗ (g ⊗ b*) is that of b ⊗ (g ⊗ a*): half of the sum, taken twice, and its middle.
-            for i in range(k // 2 + 1):
-                weight = 1.0 if 2 * i == k else 2.0
-                qx, qy, qz, qw = c[_Q, i], c[_Q + 1, i], c[_Q + 2, i], c[_Q + 3, i]
-                x, yy, z, w = c[_G, k - i], c[_G + 1, k - i], c[_G + 2, k - i], c[_G + 3, k - i]
-                a1 += weight * (qw * x + qx * w + qy * z - qz * yy)
-                a2 += weight * (qw * yy - qx * z + qy * w + qz * x)
-                a3 += weight * (qw * z + qx * yy - qy * x + qz * w)
-            if k == 0:
-                a1, a2, a3 = a1 + p[ACCELERATION_ADDED], a2 + p[ACCELERATION_ADDED + 1], a3 + p[ACCELERATION_ADDED + 2]
-            c[_U, k + 1] = f * (a1 - cv * c[_U, k])
-            c[_U + 1, k + 1] = f * (a2 - cv * c[_U + 1, k])
-            c[_U + 2, k + 1] = f * (a3 - cv * c[_U + 2, k])
-            c[_D, k + 1], c[_D + 1, k + 1], c[_D + 2, k + 1] = f * c[_U, k], f * c[_U + 1, k], f * c[_U + 2, k]
+    """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u."""
+    series_beside(y, p, degree, c, p[TRANSLATES] != 0.0, filled(0.0, 1))
+
+
+@njit(cache=True, error_model="numpy")
+def _sum(c, at, degree, length, h, zeros):
+    """Of the part that begins at the number ``at`` of each row, h seconds on: even and odd powers by themselves, each from the
+    smallest term (Horner), so that neither waits for the other.
+    """
+    square = h * h
+    even, odd = at + (degree - degree % 2) * length, at + (degree - 1 + degree % 2) * length
+    evens, odds = load(c, even, zeros), load(c, odd, zeros)
+    for _ in range((degree - 1) // 2):
+        even -= 2 * length
+        odd -= 2 * length
+        evens = evens * square + load(c, even, zeros)
+        odds = odds * square + load(c, odd, zeros)
+    if degree % 2 == 0:
+        evens = evens * square + load(c, at, zeros)
+    return evens + odds * h
+
+
+@njit(cache=True, error_model="numpy")
+def _put_triple(array, at, vector, n):
+    store(array, at * n, component(vector, 0))
+    store(array, (at + 1) * n, component(vector, 1))
+    store(array, (at + 2) * n, component(vector, 2))
+
+
+@njit(cache=True, error_model="numpy")
+def sum_beside(c, translates, degree, h, out, zero):
+    """The variables out (≥ 13, n), h seconds on, with unit quaternions; h as ``zero`` one number or one for every flight."""
+    n, zeros, hs = width(zero), _four(zero), _four(h)
+    length = COLUMNS * n
+    q = _sum(c, _Q * n, degree, length, hs, zeros)
+    x, y, z, w = component(q, 0), component(q, 1), component(q, 2), component(q, 3)
+    store(out, 0, q * _four((zero + 1.0) / root(x * x + y * y + z * z + w * w)))
+    _put_triple(out, 4, _sum(c, _W * n, degree, length, hs, zeros), n)
+    if translates:
+        _put_triple(out, 7, _sum(c, _D * n, degree, length, hs, zeros), n)
+        _put_triple(out, 10, _sum(c, _U * n, degree, length, hs, zeros), n)
 
 
 @njit(cache=True, error_model="numpy")
 def sum_series(c, p, degree, h, out):
-    """The variables h seconds on, summed from the smallest term (Horner), with a unit quaternion."""
-    rows = 13 if p[TRANSLATES] != 0.0 else 7
-    for j in range(rows):
-        total = c[j, degree]
-        for k in range(degree - 1, 0, -1):
-            total = total * h + c[j, k]
-        out[j] = c[j, 0] + h * total
-    out[0], out[1], out[2], out[3] = normalize(out[0], out[1], out[2], out[3])
+    """The variables h seconds on, with a unit quaternion."""
+    sum_beside(c, p[TRANSLATES] != 0.0, degree, filled(h, 1), out, filled(0.0, 1))
 
 
 @njit(cache=True, error_model="numpy")
 def taylor_steps_of_degree(y, p, h, n, degree):
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
-    c, new = np.zeros((ROWS, degree + 1)), y.copy()
+    c, new = np.zeros((degree + 1, COLUMNS)), y.copy()
     for done in range(n):
         series(y, p, degree, c)
         sum_series(c, p, degree, h, new)
