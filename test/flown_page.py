@@ -13,15 +13,16 @@ from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
 from rigid_proto_ros.cdr import wrench_stamped
-from rigid_proto_ros.command_codec import core_command, string_attach, string_target
+from rigid_proto_ros.command_codec import core_command, of_message, string_attach, string_target
 from rigid_proto_ros.core.commands import Change, WrenchCommand
 from rigid_proto_ros.core.errors import InputError
 from rigid_proto_ros.core.frames import parse_frame
 from rigid_proto_ros.core.observer import Observer
 from rigid_proto_ros.core.rotation import rotate
 from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.poke_script import expand_script, script_entries
+from rigid_proto_ros.poke_script import expand_schedule, expand_script, read_schedule, script_entries
 from rigid_proto_ros.scenario import Scenario, make_scenario, nanoseconds
+from rigid_proto_ros.session_messages import read_text
 from rigid_proto_ros.workbench.ros_link import Heard
 from rigid_proto_ros.workbench.sighting import DrawnPose
 
@@ -84,9 +85,17 @@ class FlownLink:
         for command in expand_script([script_entries(entry)]):
             self.command(command)
 
-    def command(self, command) -> None:
+    def send(self, topic: str, data: bytes) -> None:
+        if topic != "schedule":
+            self.command(of_message(topic, data))
+            return
+        entries = read_schedule(read_text(data, topic))
+        for number, command in enumerate(expand_schedule(entries, 1.5)):
+            self.command(command, (data, number) if isinstance(entries, list) else None)
+
+    def command(self, command, listed=None) -> None:
         own = core_command(command, command.t_ns, self.scenario.setup.contacts, self._change, ("world", "rigid_body"))
-        self._submit(own, command.t_ns)
+        self._submit(own, command.t_ns, listed)
 
     def call(self, service, data=None, done=None) -> None:
         if service == "reset":
@@ -140,9 +149,9 @@ class FlownLink:
         self._told = len(self._log.lines)
         self._heard.states.append(self.rows[-1])
 
-    def _submit(self, command, at_ns=None) -> None:
+    def _submit(self, command, at_ns=None, listed=None) -> None:
         self.received += 1
-        self.simulation.submit(command, at_ns)
+        self.simulation.submit(command, at_ns, listed)
         self.report()
 
     def _change(self, changes):

@@ -24,6 +24,7 @@ from ..scenario import Scenario
 from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter
+from .hand_commands import HandCommands
 from .history import SCENE_GRACE_S, History
 from .keys import add_keys
 from .panel import Panel
@@ -85,7 +86,8 @@ class Page:
         self.sightings = Sightings()
         self.acting = Acting()
         self.shadow = Shadow(self._ghost_refuses)
-        self.pointer = Pointer(self.link, self, self.sightings, self.tools)
+        self.hand = HandCommands(self.link, lambda: self.paused)
+        self.pointer = Pointer(self.hand, self, self.sightings, self.tools)
         self._setter = ParameterSetter(self.link.set_parameters, self._refused)
         self._controls = Controls(server.gui, self._setter.set, lambda text: self.say(text))
         self._readouts = ReadoutPanel(server)
@@ -189,7 +191,15 @@ class Page:
 
     def call(self, service: str, data: bool | None = None) -> None:
         """Call a service; a failure is said on the page."""
+        if service == "step" or (service == "pause" and not data):
+            self.hand.go_on()
         self.link.call(service, data, lambda successful, message: None if successful else self.say(message))
+
+    def _set_paused(self, paused: bool) -> None:
+        self.paused = paused
+        self._panel.show_state(paused)
+        if not paused:
+            self.hand.go_on()
 
     def pause(self, paused: bool) -> None:
         """Stop or resume simulated time."""
@@ -329,8 +339,7 @@ class Page:
     def _on_diagnostics(self, values: dict[str, str]) -> None:
         self.diagnostics = values
         self._status_of.report(values, time.monotonic())
-        self.paused = values.get("state") == "paused"
-        self._panel.show_state(self.paused)
+        self._set_paused(values.get("state") == "paused")
 
     def _refused(self, reason: str) -> None:
         self.say(f"Refused: {reason}")
@@ -404,14 +413,14 @@ class Page:
     def _hear(self, event: dict) -> None:
         kind = event["kind"]
         if kind == "reset":
+            self.hand.forget()
             self.state = State(0, self.scenario.setup.initial)
             self._begin(self.state)
             self.view.trails.forget()
             if self.looking_at is None:
                 self.view.origin = np.zeros(3)
         elif kind == "pause":
-            self.paused = bool(event["content"].get("data"))
-            self._panel.show_state(self.paused)
+            self._set_paused(bool(event["content"].get("data")))
         elif kind == "string_attach":
             self.pointer.knot_moved()
         if self.state is not None:

@@ -10,21 +10,21 @@ from typing import Protocol
 
 import numpy as np
 
-from ..command_codec import MESH_FRAME
+from ..command_codec import MESH_FRAME, ScriptCommand
 from ..scenario import Scenario
-from .ros_link import RosLink
+from .hand_commands import HandCommands
 from .sighting import DrawnPose, Sightings
 
 KNOT_LEAD_S = 0.01
-"""The first target follows the knot by this much: the node ties the string where the knot was when the target came."""
+"""The first target follows the knot by this much: what pulls is settled by then, here as in the node."""
 
 HOLD_S = 0.2
 """A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that is
 short."""
 
 SAME_TICK_S = 0.03
-"""Commands this far apart aren't taken in the same tick, where they act by kind and bytes: a release would act before a
-target, and the target would tie the string again."""
+"""Messages this far apart aren't taken in the same tick, where single ones act by kind: a release would act before the target
+sent last, and that would tie the string again. While time stands still they go as one list."""
 
 POKE_TRAVEL = 0.3
 """Body sizes a second: what the suggested poke gives the body."""
@@ -50,7 +50,6 @@ class Flown(Protocol):
     """What the pointer needs to know of the body in flight."""
 
     scenario: Scenario | None
-    row: np.ndarray | None
 
 
 @dataclass
@@ -65,8 +64,8 @@ class _Drag:
 class Pointer:
     """Turns pointer events of any page into commands. One string, so one drag at a time: the first page has it."""
 
-    def __init__(self, link: RosLink, flown: Flown, sightings: Sightings, tools: Tools) -> None:
-        self._link = link
+    def __init__(self, hand: HandCommands, flown: Flown, sightings: Sightings, tools: Tools) -> None:
+        self._hand = hand
         self._flown = flown
         self._sightings = sightings
         self._tools = tools
@@ -113,7 +112,7 @@ class Pointer:
         direction = np.asarray(ray_direction, dtype=float)
         direction = direction / np.linalg.norm(direction)
         if surface is None:
-            self._link.wrench("poke", "world@com", tuple(self._tools.force * direction))
+            self._poke("world@com", self._tools.force * direction)
             return True
         origin = body.mesh_point(seen.body_point(ray_origin))
         hit = surface.ray_hit(origin, seen.body_direction(direction) / body.scale)
@@ -121,15 +120,18 @@ class Pointer:
             return False
         point = "point/" + ",".join(repr(float(x)) for x in hit[0])
         if push:
-            self._link.wrench("poke", f"normal@{point}", (self._tools.force, 0.0, 0.0))
+            self._poke(f"normal@{point}", (self._tools.force, 0.0, 0.0))
         else:
-            self._link.wrench("poke", f"world@{point}", tuple(self._tools.force * direction))
+            self._poke(f"world@{point}", self._tools.force * direction)
         return True
 
     def click_com(self, ray_direction) -> None:
         """Poke at the centre of mass, along the view."""
         direction = np.asarray(ray_direction, dtype=float)
-        self._link.wrench("poke", "world@com", tuple(self._tools.force * direction / np.linalg.norm(direction)))
+        self._poke("world@com", self._tools.force * direction / np.linalg.norm(direction))
+
+    def _poke(self, frame_id: str, force) -> None:
+        self._hand.do(ScriptCommand(0, "poke", frame_id, tuple(float(f) for f in force)))
 
     # Drag
 
@@ -143,7 +145,7 @@ class Pointer:
                 self.let_go()
 
     def grab(self, client_id: int, start, end) -> None:
-        """Tie the string where the body was grabbed; the first target follows."""
+        """Tie the string where the body was grabbed, and take its free end to the pointer."""
         scenario = self._flown.scenario
         if scenario is None or self.dragging:
             return
@@ -152,35 +154,31 @@ class Pointer:
         seen = self._sightings.of_point(start, now, surface, body)
         if seen is None:
             return
+        commands = []
         frequency = self._tools.frequency
         if frequency > 0.0 and scenario.values["string.frequency"] != frequency:
-            self._link.schedule(f"{{t: 0, set: {{string.frequency: {frequency!r}}}}}")
-        wait_s = KNOT_LEAD_S
+            commands.append(_set("string.frequency", frequency))
         if self._tools.at_com or surface is None:
             aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
-            wait_s += self._tie_to(body.mesh_point(np.zeros(3)), aside)
+            commands += self._tie_to(body.mesh_point(np.zeros(3)), aside)
         else:
             point = body.mesh_point(seen.body_point(start))
-            self._link.point("string/attach", MESH_FRAME, point)
+            commands.append(ScriptCommand(0, "string_attach", MESH_FRAME, point=_three(point)))
             self._knot_by_message = True
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
-        asyncio.get_running_loop().call_later(wait_s, self._send_target)
+        if self._hand.paused:
+            self._hand.do(*commands, self._target())
+        else:
+            self._hand.do(*commands)
+            asyncio.get_running_loop().call_later(KNOT_LEAD_S, self._send_target)
 
-    def _tie_to(self, point, aside) -> float:
-        """The knot at a point that isn't on the surface: only the parameter can say so. Returns after how long [s] it is there."""
+    def _tie_to(self, point, aside) -> list[ScriptCommand]:
+        """The knot at a point that isn't on the surface: only the parameter can say so."""
         if not self._knot_by_message:
-            self._set_knot(point)
-            return 0.0
-        # A parameter that keeps its value changes nothing, so it takes a step aside first; in an earlier tick, for the order
-        # of two changes in one isn't that of their arrival.
+            return [_set("string.attach", list(_three(point)))]
+        # A parameter that keeps its value changes nothing, so it takes a step aside first.
         self._knot_by_message = False
-        self._set_knot(point + aside)
-        asyncio.get_running_loop().call_later(SAME_TICK_S, self._set_knot, point)
-        return SAME_TICK_S
-
-    def _set_knot(self, point) -> None:
-        numbers = ", ".join(repr(float(x)) for x in point)
-        self._link.schedule(f"{{t: 0, set: {{string.attach: [{numbers}]}}}}")
+        return [_set("string.attach", list(_three(knot))) for knot in (point + aside, point)]
 
     def pull(self, end) -> None:
         """Move the string's free end."""
@@ -190,7 +188,7 @@ class Pointer:
 
     def hold(self) -> None:
         """To be called often: a hand that doesn't move goes on holding."""
-        if self.dragging:
+        if self.dragging and not self._hand.paused:
             timeout_s = self._flown.scenario.values["string.timeout"]
             hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
             if time.monotonic() >= self._drag.last_target_s + hold_s:
@@ -198,21 +196,36 @@ class Pointer:
 
     def _send_target(self) -> None:
         if self.dragging:
-            self._drag.last_target_s = time.monotonic()
-            self._link.point("string/target", "world", self._drag.target)
+            self._hand.do(self._target())
+
+    def _target(self) -> ScriptCommand:
+        self._drag.last_target_s = time.monotonic()
+        return ScriptCommand(0, "string_target", "world", point=_three(self._drag.target))
 
     def let_go(self) -> None:
         """Release the string, once the last target is taken."""
         if self.dragging:
             drag = self._drag
             drag.ended = True
+            if self._hand.paused:
+                self._release(drag)
+                return
             wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
             asyncio.get_running_loop().call_later(wait_s, self._release, drag)
 
     def _release(self, drag: _Drag) -> None:
-        self._link.call("string/release")
+        self._hand.do(ScriptCommand(0, "string_release"))
         if self._drag is drag:
             self._drag = None
+
+
+def _set(name: str, value: object) -> ScriptCommand:
+    return ScriptCommand(0, "set", changes={name: value})
+
+
+def _three(point) -> tuple[float, float, float]:
+    x, y, z = (float(coordinate) for coordinate in point)
+    return x, y, z
 
 
 def suggested_force(scenario: Scenario, size: float) -> float:
