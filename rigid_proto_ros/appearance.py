@@ -19,8 +19,10 @@ FORCE_COLOUR = (205, 25, 25)
 TRAIL_COLOUR, POINT_TRAIL_COLOUR = (230, 160, 30), (225, 80, 160)
 """Paths of the centre of mass and of one point of the body."""
 
-ENERGY_SERIES = (("translational", BLUE), ("rotational", ORANGE), ("potential", GREEN), ("total", GREY))
+ENERGY_SERIES = (("translational", BLUE), ("rotational", ORANGE), ("gravity", GREEN))
+STRING_ENERGY_SERIES, TOTAL_ENERGY_SERIES = (("string", YELLOW),), (("total", GREY),)
 """Energies by name and colour, in the order in which they are plotted."""
+MOMENTUM_SERIES = (("Lx", RED), ("Ly", GREEN), ("Lz", BLUE), ("|L|", GREY))
 OMEGA_SERIES = (("ω₁", RED), ("ω₂", GREEN), ("ω₃", BLUE))
 MOMENTUM_ANGLE_SERIES = (("angle of L", VIOLET),)
 

@@ -177,7 +177,7 @@ def test_the_ghost_is_compared_with_the_body_at_equal_times_and_per_run(tmp_path
         times, angles = cells(file, e.GHOST_ANGLE, "Scalars:scalars")
         part = slice(30 * run, 30 * run + 30)
         assert times == [k * flight.PERIOD_NS for k in range(30)]
-        assert np.allclose(np.ravel(angles), attitude_angle(body[part, 3:7], ghost[part, 3:7]), rtol=1e-14)
+        assert np.allclose(np.radians(np.ravel(angles)), attitude_angle(body[part, 3:7], ghost[part, 3:7]), rtol=1e-14)
         _, places = cells(file, e.GHOST, "Transform3D:translation")
         assert np.array_equal(np.array(places)[:, 0], ghost[part, 0:3].astype(np.float32))
 

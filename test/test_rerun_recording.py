@@ -102,7 +102,7 @@ def test_plotted_energies_and_momentum_are_those_of_the_states(recording, states
     times, energies = column(recording, e.ENERGY, "Scalars:scalars")
     _, momenta = column(recording, e.ANGULAR_MOMENTUM, "Scalars:scalars")
     _, angles = column(recording, e.ANGULAR_MOMENTUM_ANGLE, "Scalars:scalars")
-    _, rates = column(recording, e.ANGULAR_VELOCITY_BODY, "Scalars:scalars")
+    _, rates = column(recording, e.ANGULAR_VELOCITY_PRINCIPAL, "Scalars:scalars")
     assert np.array_equal(times, flight.PERIOD_NS * np.arange(COUNT))
     start = None
     for k, row in enumerate(states):
@@ -115,8 +115,11 @@ def test_plotted_energies_and_momentum_are_those_of_the_states(recording, states
         assert np.allclose(energies[k], expected, rtol=1e-13, atol=1e-13)
         assert np.allclose(momenta[k], [*L, np.linalg.norm(L)], rtol=1e-13, atol=1e-15)
         cosine = np.clip(L @ start / np.linalg.norm(L) / np.linalg.norm(start), -1.0, 1.0)
-        assert np.isclose(angles[k][0], np.arccos(cosine), atol=1e-7)
-        assert rates[k] == row[10:13].tolist()
+        assert np.isclose(np.radians(angles[k][0]), np.arccos(cosine), atol=1e-7)
+        # In principal axes the energy is a sum of squares, and the largest moment has the last component.
+        moments = np.linalg.eigvalsh(flight.INERTIA)
+        assert np.isclose(0.5 * moments @ np.square(rates[k]), rotational, rtol=1e-12)
+        assert np.isclose(np.linalg.norm(np.multiply(moments, rates[k])), np.linalg.norm(L), rtol=1e-12)
 
 
 def test_arrows_stand_at_their_points_and_only_while_the_load_acts(recording, states):

@@ -6,6 +6,23 @@ Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` 
 
 from __future__ import annotations
 
+from ..appearance import (
+    BLUE,
+    ENERGY_SERIES,
+    FORCE_COLOUR,
+    GHOST_COLOUR,
+    GREEN,
+    GREY,
+    MOMENTUM_ANGLE_SERIES,
+    MOMENTUM_SERIES,
+    OMEGA_SERIES,
+    ORANGE,
+    RED,
+    STRING_ENERGY_SERIES,
+    VIOLET,
+    YELLOW,
+)
+
 SIM_TIME = "sim_time"
 ROS_TIME = "ros_time"
 
@@ -18,9 +35,14 @@ CENTRE = "world/centre"
 
 LOADS = "world/loads"
 TRAIL = "world/trail"
+"""The path of the vertex farthest from the COM, and that of the COM."""
+COM_TRAIL = "world/com_trail"
 
 STRING = "world/string"
 HAND = "world/string/hand"
+STRING_LINE = "world/string/line"
+"""The line of a string that pulls, on through the body."""
+STRING_LINE_DISTANCE = "plots/string_line_distance"
 STRING_TENSION = "plots/string_tension"
 STRING_ENERGY = "plots/energy/string"
 
@@ -51,7 +73,8 @@ STATE = "state"
 ENERGY = "plots/energy"
 ANGULAR_MOMENTUM = "plots/angular_momentum"
 ANGULAR_MOMENTUM_ANGLE = "plots/angular_momentum_angle"
-ANGULAR_VELOCITY_BODY = "plots/angular_velocity_body"
+ANGULAR_VELOCITY_PRINCIPAL = "plots/angular_velocity_principal"
+POSITION = "plots/position"
 DRIFT = "plots/drift"
 EFFORT = "plots/effort"
 GHOST_ANGLE = "plots/ghost_angle"
@@ -69,28 +92,23 @@ EVENTS = "events"
 COMMAND_LOG = "log/commands"
 REFUSAL_LOG = "log/refusals"
 
-RED, GREEN, BLUE = (235, 85, 85), (90, 200, 110), (85, 150, 250)
-GREY, YELLOW, VIOLET, ORANGE = (190, 190, 190), (240, 200, 70), (190, 120, 245), (250, 150, 60)
-MESH_COLOUR = (214, 205, 190)
-TRAIL_COLOUR = (250, 205, 95)
-STRING_COLOUR, SLACK_COLOUR = (250, 240, 210), (150, 150, 150)
-OMEGA_COLOUR = (90, 230, 230)
-MOMENTUM_COLOUR = (190, 120, 245)
-GHOST_COLOUR = (120, 180, 255)
+SLACK_COLOUR = (150, 150, 150)
 GHOST_ALPHA = 110
 
-LOAD_COLOURS = {"wrench": ORANGE, "poke": (255, 80, 80), "impulse": (255, 70, 200)}
+LOAD_COLOURS = {"wrench": ORANGE, "poke": FORCE_COLOUR, "impulse": (255, 70, 200)}
 TORQUE_COLOUR = (255, 210, 120)
 
 SERIES = {
-    ENERGY: (("translational", BLUE), ("rotational", ORANGE), ("gravity", GREEN), ("sum of these", GREY)),
-    ANGULAR_MOMENTUM: (("Lx", RED), ("Ly", GREEN), ("Lz", BLUE), ("|L|", GREY)),
-    ANGULAR_MOMENTUM_ANGLE: (("angle of L to its start", VIOLET),),
+    ENERGY: (*ENERGY_SERIES, ("total without string", GREY)),
+    ANGULAR_MOMENTUM: MOMENTUM_SERIES,
+    ANGULAR_MOMENTUM_ANGLE: MOMENTUM_ANGLE_SERIES,
     DRIFT: (("energy, relative", ORANGE), ("L as a vector, relative", VIOLET)),
     EFFORT: (("steps", BLUE), ("force evaluations", ORANGE)),
-    STRING_ENERGY: (("string, elastic", YELLOW),),
+    STRING_ENERGY: STRING_ENERGY_SERIES,
     STRING_TENSION: (("string", ORANGE),),
+    STRING_LINE_DISTANCE: (("COM to the string's line", YELLOW),),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
-    ANGULAR_VELOCITY_BODY: (("ω1", RED), ("ω2", GREEN), ("ω3", BLUE)),
+    ANGULAR_VELOCITY_PRINCIPAL: OMEGA_SERIES,
+    POSITION: (("x", RED), ("y", GREEN), ("z", BLUE)),
 }
 """Per plotted entity the names and colours of its scalars, in the order in which they are logged."""

@@ -186,6 +186,9 @@ class Flusher:
         if moved:
             self._run += 1
         self.run_id = uuid.uuid4().hex
+        for stream in streams:
+            if isinstance(stream, FileStream):
+                writer.fit_axes(stream)
         writer.streams.clear()
         writer.restart()
         for stream in streams:
@@ -215,6 +218,8 @@ class Flusher:
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
             self._writer.streams.remove(stream)
             try:
+                self._writer.send_pictures()
+                self._writer.fit_axes(stream)
                 stream.close()
             except OSError as error:
                 self._lost(str(error))

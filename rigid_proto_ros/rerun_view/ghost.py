@@ -11,6 +11,7 @@ from ..mailbox import Block
 from . import entities as e
 from .columns import Send, one_time, scalar_columns, time_columns
 from .inertia_shapes import PrincipalFrame
+from .plots import Ranges
 
 
 def attitude_angle(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -24,7 +25,8 @@ def attitude_angle(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 class Ghost:
     """Follows the ghost of one run. Its states are compared with the body's at equal times."""
 
-    def __init__(self) -> None:
+    def __init__(self, ranges: Ranges) -> None:
+        self._ranges = ranges
         self._body_times = np.empty(0, np.int64)
         self._body_attitudes = np.empty((0, 4))
 
@@ -62,7 +64,8 @@ class Ghost:
             at = np.minimum(np.searchsorted(self._body_times, times_ns), len(self._body_times) - 1)
             same = np.flatnonzero(self._body_times[at] == times_ns)
             if len(same):
-                angle = attitude_angle(self._body_attitudes[at[same]], rows[same, 3:7])
+                angle = np.degrees(attitude_angle(self._body_attitudes[at[same]], rows[same, 3:7]))
+                self._ranges.note(e.GHOST_ANGLE, angle)
                 send(e.GHOST_ANGLE, time_columns(times_ns[same], walls[same]), scalar_columns(angle[:, np.newaxis]))
         keep = self._body_times > times_ns[-1]
         self._body_times, self._body_attitudes = self._body_times[keep], self._body_attitudes[keep]

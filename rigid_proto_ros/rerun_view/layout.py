@@ -8,6 +8,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
+from .. import appearance
 from . import entities as e
 
 TRAIL_SECONDS = 3.0
@@ -18,22 +19,79 @@ HERPOLHODE_SECONDS = 20.0
 BACKGROUND = (24, 27, 34)
 
 
+FAR_SECONDS = 3600.0
+"""[simulated s] Of the path of a COM that falls: all of it."""
+
+PATH_SIZES = 4.5
+"""How much farther off the camera stands where the path is what matters."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a flight is about, so what is shown of it first. ghost: another body beside it. falls: under gravity, on no string.
+    tied: to a string from the start. dropped_term: its motion lacks ω × Iω."""
+
+    ghost: bool = False
+    falls: bool = False
+    tied: bool = False
+    dropped_term: bool = False
+
+
 @dataclass(frozen=True)
 class Layout:
-    """A blueprint, and those of its views whose camera stands as far away as the body is large."""
+    """A blueprint; those of its views whose camera stands as far away as the body is large; and its plots by entity."""
 
     blueprint: Any
     flights: tuple[Any, ...]
+    plots: dict[str, list[Any]]
 
 
-def layout(size: float, initial_view: str, ghost: bool) -> Layout:
-    """For a body of this size [m]: three tabs, ``initial_view`` in front; ``ghost`` if there is one."""
+class PlotViews:
+    """Makes plots, and remembers which."""
+
+    def __init__(self) -> None:
+        self.made: dict[str, list[Any]] = {}
+
+    def plot(self, entity: str) -> Any:
+        """Scalars of one entity over time."""
+        legend = rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=len(e.SERIES[entity]) > 1 or entity == e.ENERGY)
+        view = rrb.TimeSeriesView(origin="/" + entity, name=TITLES[entity], plot_legend=legend)
+        self.made.setdefault(entity, []).append(view)
+        return view
+
+
+def _title(name: str, unit: str) -> str:
+    return f"{name} [{unit}]"
+
+
+TITLES = {
+    e.ENERGY: _title(appearance.ENERGY_TITLE, appearance.ENERGY_UNIT),
+    e.ANGULAR_VELOCITY_PRINCIPAL: _title(appearance.OMEGA_TITLE, appearance.OMEGA_UNIT),
+    e.ANGULAR_MOMENTUM: _title(appearance.MOMENTUM_TITLE, appearance.MOMENTUM_UNIT),
+    e.ANGULAR_MOMENTUM_ANGLE: _title(appearance.MOMENTUM_ANGLE_TITLE, appearance.ANGLE_UNIT),
+    e.GHOST_ANGLE: _title(appearance.GHOST_ANGLE_TITLE, appearance.ANGLE_UNIT),
+    e.POSITION: "Position of the COM [m]",
+    e.STRING_TENSION: "Tension of the string [N]",
+    e.STRING_LINE_DISTANCE: "Distance of the COM from the string's line [m]",
+    e.DRIFT: "Drift since the last command",
+    e.EFFORT: "Effort per simulated second",
+}
+
+
+def layout(size: float, initial_view: str, subject: Subject) -> Layout:
+    """For a body of this size [m]: three tabs, ``initial_view`` in front."""
+    plots = PlotViews()
+    lesson_hides = tuple(entity for entity in LESSON if not (subject.ghost and entity == e.BOUNDING_BOX))
     flights = (
-        flight_view(size, "Flight", LESSON),
-        flight_view(size, "All shapes", DEBUGGING),
-        flight_view(size, "Plain", PLAIN),
+        flight_view(size, "Flight", lesson_hides, subject),
+        flight_view(size, "All shapes", DEBUGGING, subject),
+        flight_view(size, "Plain", PLAIN, subject),
     )
-    tabs = {"lesson": lesson(flights[0], ghost), "debugging": debugging(flights[1]), "plain": flights[2]}
+    tabs = {
+        "lesson": lesson(flights[0], subject, plots),
+        "debugging": debugging(flights[1], plots),
+        "plain": flights[2],
+    }
     blueprint = rrb.Blueprint(
         rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
         rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
@@ -41,38 +99,44 @@ def layout(size: float, initial_view: str, ghost: bool) -> Layout:
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
     )
-    return Layout(blueprint, flights)
+    return Layout(blueprint, flights, plots.made)
 
 
-def camera(size: float) -> Any:
-    """Looks at the body, of this size [m], from where it can be seen whole."""
+def camera(size: float, subject: Subject) -> Any:
+    """Looks at the body, of this size [m], from where it can be seen whole, or its path where that is what matters."""
+    away = size * (PATH_SIZES if subject.falls else 1.0)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=[0.95 * size, -0.75 * size, 0.5 * size],
+        position=[0.3 * away, -1.2 * away, 0.4 * away] if subject.falls else [0.95 * away, -0.75 * away, 0.5 * away],
         look_target=[0.0, 0.0, 0.0],
         eye_up=[0.0, 0.0, 1.0],
     )
 
 
-def lesson(flight: Any, ghost: bool) -> Any:
-    """How the tensor governs the motion: the flight, Poinsot's construction, what is conserved and what isn't."""
+def lesson(flight: Any, subject: Subject, plots: PlotViews) -> Any:
+    """How the tensor governs the motion: the flight, and beside it what tells most of a flight of its kind."""
+    if subject.ghost:
+        # How far the two have come apart matters more than the energy, which both keep.
+        beside = [poinsot_view(), e.GHOST_ANGLE, e.ANGULAR_VELOCITY_PRINCIPAL, e.ANGULAR_MOMENTUM]
+    elif subject.dropped_term:
+        beside = [e.ANGULAR_MOMENTUM_ANGLE, e.ANGULAR_MOMENTUM, e.ENERGY]
+    elif subject.tied:
+        beside = [e.STRING_LINE_DISTANCE, e.STRING_TENSION, e.ENERGY]
+    elif subject.falls:
+        beside = [e.POSITION, e.ANGULAR_VELOCITY_PRINCIPAL, e.ENERGY]
+    else:
+        beside = [poinsot_view(), e.ANGULAR_VELOCITY_PRINCIPAL, e.ANGULAR_MOMENTUM, e.ENERGY]
+    views = [plots.plot(view) if isinstance(view, str) else view for view in beside]
+    shares = [2] * len(views) if isinstance(beside[0], str) else [3, *[2] * (len(views) - 1)]
     return rrb.Horizontal(
-        rrb.Vertical(flight, command_view(), row_shares=[5, 1]),
-        rrb.Vertical(
-            poinsot_view(),
-            # Beside a ghost, how far the two have come apart matters more than the energy, which both keep.
-            *([plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]")] if ghost else []),
-            plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
-            plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
-            *([] if ghost else [plot(e.ENERGY, "Energy [J]")]),
-            row_shares=[3, 2, 2, 2],
-        ),
+        rrb.Vertical(flight, command_view(), row_shares=[6, 1]),
+        rrb.Vertical(*views, row_shares=shares),
         column_shares=[3, 2],
         name="Lesson",
     )
 
 
-def debugging(flight: Any) -> Any:
+def debugging(flight: Any, plots: PlotViews) -> Any:
     """Everything that is logged: every plot, the state line, the event lines as they are."""
     return rrb.Horizontal(
         rrb.Vertical(
@@ -85,17 +149,7 @@ def debugging(flight: Any) -> Any:
             ),
             row_shares=[9, 9, 4],
         ),
-        rrb.Grid(
-            plot(e.ENERGY, "Energy [J]"),
-            plot(e.ANGULAR_VELOCITY_BODY, "Angular velocity, body [rad/s]"),
-            plot(e.ANGULAR_MOMENTUM, "Angular momentum, world [kg m²/s]"),
-            plot(e.ANGULAR_MOMENTUM_ANGLE, "Angle of L to its start [rad]"),
-            plot(e.DRIFT, "Drift since the last command"),
-            plot(e.GHOST_ANGLE, "Angle of the ghost to the body [rad]"),
-            plot(e.STRING_TENSION, "Tension of the string [N]"),
-            plot(e.EFFORT, "Effort per simulated second"),
-            grid_columns=2,
-        ),
+        rrb.Grid(*(plots.plot(entity) for entity in TITLES), grid_columns=2),
         name="Debugging",
     )
 
@@ -103,10 +157,10 @@ def debugging(flight: Any) -> Any:
 # What the flight views leave out; everything else below ``world`` is shown.
 LESSON = (e.BOUNDING_BOX, e.INERTIA_BOX, e.INERTIA_ELLIPSOID)
 DEBUGGING: tuple[str, ...] = ()
-PLAIN = (*LESSON, e.BODY_AXES, e.ANGULAR_VELOCITY, e.MOMENTUM, e.TRAIL)
+PLAIN = (*LESSON, e.BODY_AXES, e.ANGULAR_VELOCITY, e.MOMENTUM, e.TRAIL, e.COM_TRAIL, e.STRING_LINE)
 
 
-def flight_view(size: float, name: str, hidden: tuple[str, ...]) -> Any:
+def flight_view(size: float, name: str, hidden: tuple[str, ...], subject: Subject) -> Any:
     """The body in the world, followed by the camera, with its trail."""
     return rrb.Spatial3DView(
         origin="/" + e.CENTRE,
@@ -114,8 +168,14 @@ def flight_view(size: float, name: str, hidden: tuple[str, ...]) -> Any:
         name=name,
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=camera(size),
-        overrides={"/" + e.TRAIL: [] if e.TRAIL in hidden else [_last_seconds(TRAIL_SECONDS)]},
+        eye_controls=camera(size, subject),
+        overrides={
+            "/" + trail: [] if trail in hidden else [_last_seconds(seconds)]
+            for trail, seconds in (
+                (e.TRAIL, TRAIL_SECONDS),
+                (e.COM_TRAIL, FAR_SECONDS if subject.falls else TRAIL_SECONDS),
+            )
+        },
     )
 
 
@@ -155,9 +215,3 @@ def command_view() -> Any:
         name="Commands",
         columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["loglevel", "body"]),
     )
-
-
-def plot(entity: str, name: str) -> Any:
-    """Scalars of one entity over time."""
-    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(e.SERIES[entity]) > 1)
-    return rrb.TimeSeriesView(origin="/" + entity, name=name, plot_legend=legend)

@@ -7,16 +7,46 @@ from typing import Any
 
 import numpy as np
 
+from ..core.inertia_tensor import principal_axes
 from ..core.observer import BodySnapshot
+from ..plot_range import plot_range
 from . import entities as e
 from .columns import Send, scalar_columns, time_columns
 from .derived import angle_to, derive
 
 
+class Ranges:
+    """The least and the largest value of each plotted entity in one run: what its axis must show."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[float, float]] = {}
+
+    def note(self, entity: str, values: np.ndarray) -> None:
+        """Values that are plotted."""
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            low, high = self._found.get(entity, (np.inf, -np.inf))
+            self._found[entity] = (min(low, float(finite.min())), max(high, float(finite.max())))
+
+    def axes(self) -> dict[str, tuple[float, float]]:
+        """Ends of the axis by entity, so that no curve lies on the frame's edge and rounding doesn't fill the plot."""
+        return {
+            entity: plot_range(np.array(found), LEAST_ANGLE if entity in ANGLES else 0.0).bounds
+            for entity, found in self._found.items()
+        }
+
+
+LEAST_ANGLE = 1.0
+"""[°] That the axis of an angle spans at least."""
+
+ANGLES = (e.ANGULAR_MOMENTUM_ANGLE, e.GHOST_ANGLE)
+
+
 class Plots:
     """Remembers the run's start, and the last moment from which nothing has acted on the body."""
 
-    def __init__(self) -> None:
+    def __init__(self, ranges: Ranges) -> None:
+        self._ranges = ranges
         self._momentum_at_start: np.ndarray | None = None
         self._free_from: tuple[float, np.ndarray] | None = None
         self._effort_before: tuple[int, int, int] | None = None
@@ -53,10 +83,17 @@ class Plots:
         L, energies = derived.angular_momentum, derived.energies
         if self._momentum_at_start is None:
             self._momentum_at_start = L[0].copy()
-        send(e.ENERGY, times, scalar_columns(energies))
-        send(e.ANGULAR_MOMENTUM, times, scalar_columns(np.column_stack([L, np.linalg.norm(L, axis=1)])))
-        send(e.ANGULAR_MOMENTUM_ANGLE, times, scalar_columns(angle_to(self._momentum_at_start, L)[:, np.newaxis]))
-        send(e.ANGULAR_VELOCITY_BODY, times, scalar_columns(rows[:, 10:13]))
+        plotted = {
+            e.ENERGY: energies,
+            e.ANGULAR_MOMENTUM: np.column_stack([L, np.linalg.norm(L, axis=1)]),
+            e.ANGULAR_MOMENTUM_ANGLE: np.degrees(angle_to(self._momentum_at_start, L))[:, np.newaxis],
+            e.ANGULAR_VELOCITY_PRINCIPAL: rows[:, 10:13] @ principal_axes(np.asarray(body.inertia))[1],
+        }
+        if np.any(body.gravity) or rows[:, 7:10].any():
+            plotted[e.POSITION] = rows[:, 0:3]
+        for entity, values in plotted.items():
+            self._ranges.note(entity, values)
+            send(entity, times, scalar_columns(values))
         send(e.DRIFT, times, scalar_columns(self._drift(energies, L, disturbed)))
         return L
 

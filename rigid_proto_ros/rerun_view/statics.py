@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from .. import appearance
 from ..core.observer import BodySnapshot
 from . import entities as e
 from .columns import one_time
@@ -117,7 +118,7 @@ def send_mesh(stream: Stream, scene: Scene, number: int) -> None:
     """The mesh of a run that already had ``number`` others."""
     if scene.surface is None:
         return
-    stream.log_static(mesh_entity(number), drawn_mesh(scene.surface, (*e.MESH_COLOUR, 255)))
+    stream.log_static(mesh_entity(number), drawn_mesh(scene.surface, (*appearance.BODY_COLOUR, 255)))
     if stream.may_skip and scene.vertices.nbytes + scene.triangles.nbytes > LIVE_NUMBERS_MAX:
         return
     stream.log_static(
@@ -136,25 +137,30 @@ def send_styles(stream: Stream, size: float) -> None:
         names, colours = zip(*series, strict=True)
         stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
     axes = np.eye(3) * AXIS_LENGTH * size
-    stream.log_static(e.BODY_AXES, rr.Arrows3D(vectors=axes, colors=[e.RED, e.GREEN, e.BLUE], radii=0.006 * size))
-    stream.log_static(e.TRAIL, rr.Points3D.from_fields(colors=e.TRAIL_COLOUR, radii=TRAIL_RADIUS * size))
+    stream.log_static(
+        e.BODY_AXES,
+        rr.Arrows3D(vectors=axes, colors=[appearance.RED, appearance.GREEN, appearance.BLUE], radii=0.006 * size),
+    )
+    for trail, colour in ((e.TRAIL, appearance.POINT_TRAIL_COLOUR), (e.COM_TRAIL, appearance.TRAIL_COLOUR)):
+        stream.log_static(trail, rr.Points3D.from_fields(colors=colour, radii=TRAIL_RADIUS * size))
     for kind, colour in e.LOAD_COLOURS.items():
         for part in PARTS:
             arrow_colour = colour if part == "force" else e.TORQUE_COLOUR
             style = rr.Arrows3D.from_fields(colors=arrow_colour, radii=0.012 * size)
             stream.log_static(load_entity(kind, part), style)
     stream.log_static(e.STRING, rr.LineStrips3D.from_fields(radii=0.0035 * size))
-    stream.log_static(e.HAND, rr.Points3D.from_fields(colors=e.STRING_COLOUR, radii=0.02 * size))
-    _arrow_style(stream, e.ANGULAR_VELOCITY, e.OMEGA_COLOUR, 0.009 * size, "ω")
-    _arrow_style(stream, e.MOMENTUM, e.MOMENTUM_COLOUR, 0.009 * size, "L")
+    stream.log_static(e.STRING_LINE, rr.LineStrips3D.from_fields(colors=appearance.YELLOW, radii=0.0025 * size))
+    stream.log_static(e.HAND, rr.Points3D.from_fields(colors=appearance.STRING_COLOUR, radii=0.02 * size))
+    _arrow_style(stream, e.ANGULAR_VELOCITY, appearance.OMEGA_COLOUR, 0.009 * size, "ω")
+    _arrow_style(stream, e.MOMENTUM, appearance.MOMENTUM_COLOUR, 0.009 * size, "L")
     line = 0.0025 * size
     wire = rr.components.FillMode.MajorWireframe
-    style = rr.Boxes3D.from_fields(colors=e.GREY, radii=line, fill_mode=wire)
+    style = rr.Boxes3D.from_fields(colors=appearance.GREY, radii=line, fill_mode=wire)
     stream.log_static(e.BOUNDING_BOX, style)
-    stream.log_static(e.INERTIA_BOX, rr.Boxes3D.from_fields(colors=e.YELLOW, radii=line, fill_mode=wire))
-    stream.log_static(e.GHOST_BOX, rr.Boxes3D.from_fields(colors=e.GHOST_COLOUR, radii=line, fill_mode=wire))
+    stream.log_static(e.INERTIA_BOX, rr.Boxes3D.from_fields(colors=appearance.YELLOW, radii=line, fill_mode=wire))
+    stream.log_static(e.GHOST_BOX, rr.Boxes3D.from_fields(colors=appearance.GHOST_COLOUR, radii=line, fill_mode=wire))
     stream.log_static(
-        e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=e.GREEN, line_radii=0.6 * line, fill_mode=wire)
+        e.INERTIA_ELLIPSOID, rr.Ellipsoids3D.from_fields(colors=appearance.GREEN, line_radii=0.6 * line, fill_mode=wire)
     )
     _send_poinsot_styles(stream)
 
@@ -162,15 +168,15 @@ def send_styles(stream: Stream, size: float) -> None:
 def _send_poinsot_styles(stream: Stream) -> None:
     """The construction has the same size for every body."""
     translucent = rr.components.FillMode.TransparentFillMajorWireframe
-    ellipsoid = rr.Ellipsoids3D.from_fields(colors=(*e.BLUE, 255), line_radii=0.003, fill_mode=translucent)
+    ellipsoid = rr.Ellipsoids3D.from_fields(colors=(*appearance.BLUE, 255), line_radii=0.003, fill_mode=translucent)
     stream.log_static(e.POINSOT_ELLIPSOID, ellipsoid)
-    stream.log_static(e.POINSOT_POLHODE, rr.LineStrips3D.from_fields(colors=e.YELLOW, radii=0.012))
-    stream.log_static(e.POINSOT_SEPARATRIX, rr.LineStrips3D.from_fields(colors=e.RED, radii=0.007))
+    stream.log_static(e.POINSOT_POLHODE, rr.LineStrips3D.from_fields(colors=appearance.YELLOW, radii=0.012))
+    stream.log_static(e.POINSOT_SEPARATRIX, rr.LineStrips3D.from_fields(colors=appearance.RED, radii=0.007))
     plane = rr.Boxes3D.from_fields(colors=(95, 98, 112, 255), radii=0.003, fill_mode=translucent)
     stream.log_static(e.POINSOT_PLANE, plane)
-    stream.log_static(e.POINSOT_HERPOLHODE, rr.Points3D.from_fields(colors=e.ORANGE, radii=0.009))
-    _arrow_style(stream, e.POINSOT_OMEGA, e.OMEGA_COLOUR, 0.025, "ω")
-    _arrow_style(stream, e.POINSOT_MOMENTUM, e.MOMENTUM_COLOUR, 0.02, "L")
+    stream.log_static(e.POINSOT_HERPOLHODE, rr.Points3D.from_fields(colors=appearance.ORANGE, radii=0.009))
+    _arrow_style(stream, e.POINSOT_OMEGA, appearance.OMEGA_COLOUR, 0.025, "ω")
+    _arrow_style(stream, e.POINSOT_MOMENTUM, appearance.MOMENTUM_COLOUR, 0.02, "L")
 
 
 def _arrow_style(stream: Stream, entity: str, colour: tuple[int, ...], radius: float, label: str) -> None:

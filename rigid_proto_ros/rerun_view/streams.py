@@ -22,6 +22,7 @@ import rerun_bindings
 
 from ..core.errors import InputError
 from ..output_file import output_file
+from .layout import Subject
 from .ports import LOOPBACK
 from .rrd_file import end_without_index
 from .sent_layout import SentLayout
@@ -79,9 +80,9 @@ class Stream(ABC):
         """Log values that hold at all times."""
         rr.log(entity, *values, static=True, recording=self.recording)
 
-    def send_layout(self, size: float, initial_view: str, ghost: bool) -> None:
-        """Make a viewer open with the layout for a body of this size [m]."""
-        self.layout.fit(self.recording, size, initial_view, ghost)
+    def send_layout(self, size: float, initial_view: str, subject: Subject) -> None:
+        """Make a viewer open with the layout for a body of this size [m] and what its flight is about."""
+        self.layout.fit(self.recording, size, initial_view, subject)
 
     @abstractmethod
     def flush(self) -> None:

@@ -6,14 +6,19 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from .. import appearance
 from ..core.observer import ShownString
 from ..mailbox import Block
 from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
+from .plots import Ranges
 
 RATE = 100
 """[1/s, simulated] of the picture; tension is plotted at it too."""
+
+LINE_SIZES = 1.1
+"""Body sizes that the line of a string that pulls is drawn on beyond its knot."""
 
 SLACK_POINTS = 25
 BISECTIONS = 40
@@ -41,7 +46,10 @@ def sag(distance: np.ndarray, length: float) -> np.ndarray:
 class StringPicture:
     """Follows the string of one run; call in the order of what happened."""
 
-    def __init__(self) -> None:
+    def __init__(self, ranges: Ranges) -> None:
+        self._ranges = ranges
+        self.size = 1.0
+        """[m] Of the body, through which the string's line is drawn on."""
         self._string: ShownString | None = None
         self._ticks = Ticks(RATE)
         self._shown = False
@@ -54,6 +62,8 @@ class StringPicture:
         self._hands: list[np.ndarray] = []
         self._tensions: list[np.ndarray] = []
         self._energies: list[np.ndarray] = []
+        self._lines: list[np.ndarray] = []
+        self._distances: list[np.ndarray] = []
         self._counts: list[np.ndarray] = []
 
     @property
@@ -70,6 +80,7 @@ class StringPicture:
             self._counts.append(np.zeros(1, dtype=int))
             self._tensions.append(np.zeros(1))
             self._energies.append(np.zeros(1))
+            self._distances.append(np.zeros(1))
             self._shown = False
         self._string = string
 
@@ -96,6 +107,11 @@ class StringPicture:
         stretch = stretch if string.bilateral else np.maximum(stretch, 0.0)
         self._energies.append(0.5 * string.stiffness * stretch**2)
         self._hands.append(free_end)
+        along = span / np.maximum(distance, np.finfo(float).tiny)[:, np.newaxis]
+        knots = free_end + span
+        self._lines.append(np.stack([knots, knots + LINE_SIZES * self.size * along], axis=1)[tension > 0.0])
+        away = rows[:, 0:3] - free_end
+        self._distances.append(np.linalg.norm(np.cross(along, away), axis=1))
         self._strips.extend(_drawn(string, free_end, span, distance))
         self._shown = True
 
@@ -107,12 +123,22 @@ class StringPicture:
         counts, tensions = np.concatenate(self._counts), np.concatenate(self._tensions)
         times = time_columns(times_ns, walls)
         pulls = [bool(tension) for tension, count in zip(tensions, counts, strict=True) if count]
-        colours = [e.STRING_COLOUR if taut else e.SLACK_COLOUR for taut in pulls]
+        colours = [appearance.STRING_COLOUR if taut else e.SLACK_COLOUR for taut in pulls]
         send(e.STRING, times, rr.LineStrips3D.columns(strips=self._strips, colors=colours).partition(counts))
         hands = np.concatenate(self._hands) if self._hands else np.empty((0, 3))
         send(e.HAND, times, rr.Points3D.columns(positions=hands).partition(counts))
         send(e.STRING_TENSION, times, scalar_columns(tensions[:, np.newaxis]))
         send(e.STRING_ENERGY, times, scalar_columns(np.concatenate(self._energies)[:, np.newaxis]))
+        lines = np.concatenate(self._lines) if self._lines else np.empty((0, 2, 3))
+        pulling = np.array([1 if pull else 0 for pull in pulls])
+        drawn = np.zeros(len(counts), dtype=int)
+        drawn[counts > 0] = pulling
+        send(e.STRING_LINE, times, rr.LineStrips3D.columns(strips=lines).partition(drawn))
+        distances = np.concatenate(self._distances)
+        send(e.STRING_LINE_DISTANCE, times, scalar_columns(distances[:, np.newaxis]))
+        self._ranges.note(e.STRING_TENSION, tensions)
+        self._ranges.note(e.ENERGY, np.concatenate(self._energies))
+        self._ranges.note(e.STRING_LINE_DISTANCE, distances)
         self._reset()
 
 

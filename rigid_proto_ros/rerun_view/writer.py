@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from .. import appearance
+from ..core.errors import InputError
 from ..core.observer import BodySnapshot
 from ..mailbox import Block, Mark
+from ..scene_file import read_scene_text
 from . import entities as e
 from .arrows import ArrowScale, arrow_length
 from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .lanes import Lanes
+from .layout import Subject
 from .load_arrows import LoadArrows
-from .plots import Plots
+from .plots import Plots, Ranges
 from .poinsot_picture import PoinsotPicture
 from .statics import TRAIL_RADIUS, Scene, drawn_mesh, hide_mesh, send_body, send_mesh, send_scene, send_styles
 from .streams import Stream
@@ -75,12 +79,14 @@ class SceneWriter:
         self._began_wall_ns = time.time_ns()
         self._ticks = Ticks(PICTURE_RATE)
         self._trail = Trail()
-        self._plots = Plots()
+        self._com_trail = Trail()
+        self._ranges = Ranges()
+        self._plots = Plots(self._ranges)
         self._poinsot = PoinsotPicture()
         self._loads = LoadArrows()
-        self._ghost = Ghost()
+        self._ghost = Ghost(self._ranges)
         self._words = Words()
-        self._string = StringPicture()
+        self._string = StringPicture(self._ranges)
         self._lanes = Lanes()
         self._load_changes: list[tuple[int, bool]] = []
         self._acted = self._touched = False
@@ -262,6 +268,7 @@ class SceneWriter:
         self._view_size = self._scene.view_size(self._body) if self._scene is not None else self._size
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
+        self._string.size = self._size
 
     def _ghost_began(self, mark: Mark) -> None:
         first = self._ghost_body is None
@@ -274,12 +281,28 @@ class SceneWriter:
 
     def _send_styles(self, stream: Stream) -> None:
         send_styles(stream, self._size)
-        stream.send_layout(self._view_size, self._initial_view, self._ghost_body is not None)
+        stream.send_layout(self._view_size, self._initial_view, self._subject())
+
+    def _subject(self) -> Subject:
+        """What the flight is about."""
+        body = self._body
+        tied = False
+        if self._scene is not None and self._scene.text:
+            try:
+                tied = bool(read_scene_text(self._scene.text).values.get("string.attached"))
+            except InputError:
+                pass  # a scene of another program's, in a test or a recording: its flight is shown all the same
+        falls = body is not None and bool(np.any(body.gravity)) and not tied
+        return Subject(self._ghost_body is not None, falls, tied, body is not None and not body.gyroscopic)
+
+    def fit_axes(self, stream: Stream) -> None:
+        """Tell a stream that nobody watches yet how large its plotted values have been."""
+        stream.layout.fit_axes(stream.recording, self._ranges.axes())
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None and not stream.knows_ghost:
             stream.knows_ghost = True
-            stream.log_static(e.GHOST_MESH, drawn_mesh(self._scene.surface, (*e.GHOST_COLOUR, e.GHOST_ALPHA)))
+            stream.log_static(e.GHOST_MESH, drawn_mesh(self._scene.surface, (*appearance.GHOST_COLOUR, e.GHOST_ALPHA)))
 
     # Rows
 
@@ -362,6 +385,9 @@ class SceneWriter:
             spacing = 1.5 * TRAIL_RADIUS * self._size
             points, counts = self._trail.between(times_ns, rows, self._tip, spacing)
             self._send_rows(e.TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
+            if rows[:, 7:10].any():
+                points, counts = self._com_trail.between(times_ns, rows, np.zeros(3), spacing)
+                self._send_rows(e.COM_TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
 
     def _row_streams(self) -> list[Stream]:
         return [s for s in self._listening() if not (self._skip_live and s.may_skip)]

@@ -25,10 +25,10 @@ STYLE = f"""<style>
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
   {_SHEET} [style*="width: 20em"] {{ width: 100% !important; }}
-  {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}):not([style*="display: none"]) {{
+  {_SHEET} :has(> * > .mantine-Tabs-root > {_READOUTS}):not([style*="display: none"]) {{
     display: flex !important; flex-direction: column;
   }}
-  {_SHEET} .mantine-Tabs-root:has(> {_READOUTS}) {{ order: -1; }}
+  {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}) {{ order: -1; }}
   {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
 }}
 </style>"""

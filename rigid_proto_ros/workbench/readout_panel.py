@@ -22,12 +22,14 @@ from ..appearance import (
     OMEGA_SERIES,
     OMEGA_TITLE,
     OMEGA_UNIT,
+    STRING_ENERGY_SERIES,
+    TOTAL_ENERGY_SERIES,
     css,
 )
 from ..core.inertia_tensor import principal_axes
 from ..core.state import State
+from ..plot_range import AXIS_PIXELS, PlotRange, plot_range
 from ..scenario import Scenario
-from .plot_range import AXIS_PIXELS, PlotRange, plot_range
 from .readouts import angle_between
 
 PLOTTED_S = 20.0
@@ -109,7 +111,7 @@ class ReadoutPanel:
         with panel.add_tab("Readouts"):
             self._numbers = gui.add_html("waiting for the node …")
             self._plots = (
-                Plot(gui, ENERGY_TITLE, ENERGY_UNIT, ENERGY_SERIES),
+                Plot(gui, ENERGY_TITLE, ENERGY_UNIT, (*ENERGY_SERIES, *STRING_ENERGY_SERIES, *TOTAL_ENERGY_SERIES)),
                 Plot(gui, OMEGA_TITLE, OMEGA_UNIT, OMEGA_SERIES),
                 Plot(gui, MOMENTUM_ANGLE_TITLE, ANGLE_UNIT, MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE),
             )
@@ -140,12 +142,13 @@ class ReadoutPanel:
         kinetic = state.kinetic_energy(body.mass, body.inertia)
         translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
         rotational = kinetic - translational
-        potential = -body.mass * float(scenario.setup.gravity @ state.position) + string_energy
+        gravity = -body.mass * float(scenario.setup.gravity @ state.position)
+        total = kinetic + gravity + string_energy
         time_s = state.time_ns * 1e-9
         if now_s >= self._sample_due_s:
             self._sample_due_s = now_s + SAMPLE_S
             if not self._samples or time_s > self._samples[-1][0]:
-                energies = (translational, rotational, potential, kinetic + potential)
+                energies = (translational, rotational, gravity, string_energy, total)
                 self._samples.append((time_s, *energies, *w.tolist(), angle))
             while self._samples and self._samples[0][0] < time_s - PLOTTED_S:
                 self._samples.popleft()
@@ -154,7 +157,7 @@ class ReadoutPanel:
             spin = float(np.linalg.norm(state.angular_velocity_body))
             rows = (
                 ("time", f"{time_s:.2f} s"),
-                ("energy", f"{kinetic + potential:.5g} {ENERGY_UNIT}"),
+                ("energy", f"{total:.5g} {ENERGY_UNIT}"),
                 ("translational", f"{translational:.4g} {ENERGY_UNIT}"),
                 ("rotational", f"{rotational:.4g} {ENERGY_UNIT}"),
                 ("|L|", f"{length:.5g} {MOMENTUM_UNIT}"),

@@ -26,11 +26,11 @@ from ..appearance import (
 from ..core.inertia_tensor import equimomental_shapes
 from ..core.rotation import quaternion_from_matrix
 from ..core.surface import Surface
+from ..plot_range import nice_step
 from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
 from .acting import Hit
 from .motion_arrows import MotionArrows
-from .plot_range import nice_step
 from .poke_mark import PokeMark
 from .soft_shadow import SoftShadow
 from .surroundings import FLOOR, Surroundings

@@ -29,6 +29,11 @@ class PlotRange:
     low: float
     high: float
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The axis in the values' own unit."""
+        return self.low * 10.0**self.exponent, self.high * 10.0**self.exponent
+
     def title(self, name: str, unit: str) -> str:
         """The plot's title: the quantity, its power of ten and its unit."""
         power = f"10{self.exponent}".translate(SUPERSCRIPTS).replace("¹⁰", "10", 1) if self.exponent else ""
@@ -45,13 +50,13 @@ def plot_range(values: np.ndarray, least: float = 0.0) -> PlotRange:
     span = max(high - low, NARROWEST * largest, least)
     if span == 0.0:
         return PlotRange(0, -1.0, 1.0)
-    middle, positive = 0.5 * (low + high), low >= 0.0
+    middle = 0.5 * (low + high)
     step = nice_step(span / 4.0)
     # Outward to whole steps, with room at both ends: the range stays while the values change little.
     low = min(low, middle - 0.5 * span)
     high = max(high, middle + 0.5 * span)
     low, high = math.floor(low / step - 0.25) * step, math.ceil(high / step + 0.25) * step
-    return PlotRange(exponent, round(max(low, 0.0) if positive else low, 9), round(high, 9))
+    return PlotRange(exponent, round(low, 9), round(high, 9))
 
 
 def nice_step(length: float, steps: tuple[float, ...] = (1.0, 2.0, 5.0)) -> float:
