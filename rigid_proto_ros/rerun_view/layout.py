@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import rerun.blueprint as rrb
 
 from .. import appearance
@@ -104,13 +105,15 @@ def layout(size: float, initial_view: str, subject: Subject) -> Layout:
 
 def camera(size: float, subject: Subject) -> Any:
     """Looks at the body, of this size [m], from where it can be seen whole, or its path where that is what matters."""
-    away = size * (PATH_SIZES if subject.falls else 1.0)
-    return rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=[0.3 * away, -1.2 * away, 0.4 * away] if subject.falls else [0.95 * away, -0.75 * away, 0.5 * away],
-        look_target=[0.0, 0.0, 0.0],
-        eye_up=[0.0, 0.0, 1.0],
-    )
+    if subject.falls:
+        # Beside the plane of a throw along x, and above the body, where it has come from.
+        away, middle = PATH_SIZES * size, np.array([-0.1, 0.0, 0.2])
+        return _orbital(away * (middle + [0.3, -1.2, 0.2]), away * middle)
+    return _orbital(size * np.array([0.95, -0.75, 0.5]), np.zeros(3))
+
+
+def _orbital(position: np.ndarray, target: np.ndarray) -> Any:
+    return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=[0.0, 0.0, 1.0])
 
 
 def lesson(flight: Any, subject: Subject, plots: PlotViews) -> Any:
