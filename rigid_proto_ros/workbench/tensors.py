@@ -40,7 +40,7 @@ def model_properties(scenario: Scenario, model: str, com: str = "") -> MassPrope
 
 
 def comparison(scenario: Scenario) -> str:
-    """The true tensor and the one that flies, or the bounding box's where the true one flies: what counts for the motion in a
+    """The true tensor and the one in force, or the bounding box's where that is the true one: what counts for the motion in a
     sentence, and a table of the numbers.
 
     Errors of moments are relative to each moment, those of entries to the true tensor's largest, as ``inspect`` has them.
@@ -58,10 +58,11 @@ def comparison(scenario: Scenario) -> str:
         return _alone(scenario, f"No {other} to compare with: {error}")
     difference = model_difference(approximate, true)
     title = TITLES.get(other, other)
-    what = f"**{TITLES[flying]}** flies; the {title} would have" if flying == "solid" else f"**{title}** flies; it has"
+    what = f"Simulating: **{TITLES.get(flying, flying)}**. "
+    what += f"The {title} would have" if flying == "solid" else "Against the true solid it has"
     percents = ", ".join(_per_cent(error) for error in difference.principal_moments)
     lines = [
-        f"{what}",
+        what,
         "",
         f"- principal moments off by **{percents} %**",
         f"- principal axes turned by **{_degrees(difference.axes_turned)}**",
@@ -114,7 +115,7 @@ def _rounded(entry: float, largest: float) -> float:
 
 def _alone(scenario: Scenario, reason: str) -> str:
     body = scenario.setup.body
-    lines = [f"**{scenario.values['inertia_model']}** flies. {reason}", "", "|  |  |", "| --- | --- |"]
+    lines = [f"Simulating: **{scenario.values['inertia_model']}**. {reason}", "", "|  |  |", "| --- | --- |"]
     lines.append(f"| mass [kg] | {body.mass:.5g} |")
     lines += [f"| I{'₁₂₃'[k]} principal [kg m²] | {m:.5g} |" for k, m in enumerate(body.principal_moments)]
     return "\n".join(lines)
