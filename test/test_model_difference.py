@@ -7,12 +7,11 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.core.errors import MeshError
-from rigid_proto_ros.core.inertia_tensor import principal_axes
 from rigid_proto_ros.core.mass_properties import INERTIA_MODELS, MassProperties, MeshMoments
 from rigid_proto_ros.core.model_difference import model_difference
 from rigid_proto_ros.core.rotation import matrix_from_quaternion
@@ -30,18 +29,18 @@ def turned(moments, rotation_vector, com=(0.0, 0.0, 0.0)) -> MassProperties:
     return MassProperties(1.0, np.array(com), R @ np.diag(moments) @ R.T)
 
 
+@settings(deadline=None)  # the first example compiles
 @given(st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(*[st.floats(-3.0, 3.0)] * 3))
 def test_axes_are_turned_by_the_angle_between_the_two_bodies(small, any_turn) -> None:
     true = turned((1.0, 2.0, 2.5), any_turn)
     R = turned((1.0, 2.0, 3.0), any_turn)
     assert model_difference(R, true).axes_turned < 1e-7
     # Whatever the first turn, a further one by less than 45° about any axis is what is found.
-    own = principal_axes(turned((1.0, 2.0, 2.5), small).inertia)[0]
     angle = float(np.linalg.norm(small))
     if angle < 0.75:
         found = model_difference(turned((1.0, 2.0, 2.5), small), turned((1.0, 2.0, 2.5), (0.0, 0.0, 0.0)))
         assert found.axes_turned == pytest.approx(angle, abs=1e-7)
-        assert np.abs(found.principal_moments).max() < 1e-12 and own is not None
+        assert np.abs(found.principal_moments).max() < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -89,7 +88,7 @@ def test_explicit_numbers_keep_their_com_and_an_open_mesh_has_no_solids() -> Non
     assert read_scene("hammer", values).setup.body.center_of_mass.tolist() == pytest.approx(given_com)
     corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     open_one = MeshMoments(corner, np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]]), closed=False)
-    with pytest.raises(MeshError, match="open surface"):
+    with pytest.raises(MeshError, match="open"):
         open_one.mass_properties("bounding_box", mass=1.0, com="solid")
 
 

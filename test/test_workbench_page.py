@@ -380,9 +380,16 @@ def drag_message(phase: str, start: tuple, end: tuple) -> bytes:
 
 
 def test_a_killed_node_is_said_on_the_page_which_goes_on_with_the_next_one(page, bench) -> None:
-    os.kill(bench.children()["node"], signal.SIGKILL)
-    page.until(lambda: "has ended, or hangs" in page.text and "Start it again" in page.text, "word of the node's end")
-    assert "is flying" not in page.text and "is sleeping" not in page.text
+    node = bench.children()["node"]
+    os.kill(bench.process.pid, signal.SIGSTOP)  # until the page was read, the command starts no other one
+    try:
+        os.kill(node, signal.SIGKILL)
+        page.until(
+            lambda: "has ended, or hangs" in page.text and "Start it again" in page.text, "word of the node's end"
+        )
+        assert "is flying" not in page.text and "is sleeping" not in page.text
+    finally:
+        os.kill(bench.process.pid, signal.SIGCONT)
     page.until(lambda: "is sleeping" in page.text and "has ended" not in page.text, "another node on the same page")
 
 
