@@ -108,4 +108,4 @@ def test_inspect_says_of_every_model_what_counts(capsys: pytest.CaptureFixture) 
     assert models["solid"]["principal_moments_error"] == [0.0] * 3 and models["solid"]["principal_axes_turned"] == 0.0
     assert main(["inspect", "hammer", "--density", "7850"]) == 0
     (row,) = [line for line in capsys.readouterr().out.splitlines() if line.strip().startswith("bounding_box")]
-    assert "+90.9" in row and "deg" in row and row.endswith("0.0808")
+    assert "+90.9, -4.99, +3.13 %" in row and row.split()[-2:] == ["1.34", "0.0808"]
