@@ -36,7 +36,7 @@ INTERFACES = (
     _topic(SUBSCRIBED, "~/string/target", "geometry_msgs/PointStamped", "the hand at the string's free end; the first one ties the string, which lets go `string.timeout` after the last"),
     _topic(SUBSCRIBED, "~/string/attach", "geometry_msgs/PointStamped", "where on the body the string is tied, taken onto the surface; frames `world`, `body` (m from the COM), `<body_frame>/mesh`"),
     _topic(SUBSCRIBED, "~/inertia/set", "geometry_msgs/InertiaStamped", "mass, COM and tensor of the whole body; the model becomes `explicit` and the parameters follow"),
-    _topic(SUBSCRIBED, "~/schedule", "std_msgs/String", "one `set`, `release` or `clear_wrench` entry of a poke script as YAML, `t` in simulated seconds"),
+    _topic(SUBSCRIBED, "~/schedule", "std_msgs/String", "one entry of a poke script as YAML, or a list of entries, taken or refused as a whole; `t` in absolute simulated seconds"),
     _topic(PUBLISHED, "~/pose", "geometry_msgs/PoseStamped", "COM and attitude of the mesh's axes, in the world"),
     _topic(PUBLISHED, "~/twist", "geometry_msgs/TwistStamped", "velocity of the COM and angular velocity, both in world axes"),
     _topic(PUBLISHED, "~/odom", "nav_msgs/Odometry", "both; its twist is in body axes"),

@@ -30,7 +30,9 @@ EVERY_ENTRY = """
 - {t: 2.5, string: {attach: tip, target: [0.0, 0.0, 0.1]}}
 - {t: 2.7, string: {target: [0.0, 0.05, 0.1]}}
 - {t: 2.8, string: release}
+- {t: 2.9, at: {point: [0.0, 0.0, 0.07]}, impulse: [0.0, 0.0001, 0.0]}
 - {t: 2.9, set: {density: 9000.0, gravity: [0.0, 0.0, -0.1]}}
+- {t: 2.9, at: com, impulse: [0.0, 0.0001, 0.0]}
 - {t: 3.0, service: clear_wrench}
 - {t: 3.1, at: com, impulse: [0.0001, 0.0, 0.0], repeat: 5, every: 0.1, jitter: 0.05, seed: 7}
 """
@@ -50,7 +52,9 @@ SAID = """
     2.500000 s  string_target  world  [0.0, 0.0, 0.1]
     2.700000 s  string_target  world  [0.0, 0.05, 0.1]
     2.800000 s  string_release
+    2.900000 s  poke           world@point/0.0,0.0,0.07;impulse  force [0.0, 0.0001, 0.0]  torque [0.0, 0.0, 0.0]
     2.900000 s  set            {'density': 9000.0, 'gravity': [0.0, 0.0, -0.1]}
+    2.900000 s  poke           world@com;impulse  force [0.0, 0.0001, 0.0]  torque [0.0, 0.0, 0.0]
     3.000000 s  clear_wrench
 """
 

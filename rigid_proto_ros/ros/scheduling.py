@@ -29,7 +29,10 @@ LONG_TEXT = 20_000
 """Characters of a message that is read beside the physics thread: some milliseconds."""
 
 SLOW = frozenset(
-    {"mesh", "mesh_repair", "mesh_fallback", "inertia_model", "integrator", "ghost.inertia_model", "ghost.integrator"}
+    {
+        *("mesh", "mesh_repair", "mesh_fallback", "integrator", "ghost.integrator"),
+        *("inertia_model", "inertia_model_com", "ghost.inertia_model"),
+    }
 )
 """Parameters whose change may have to load a mesh, go over all of its triangles, or compile."""
 
