@@ -80,7 +80,7 @@ def _lay_out(y, p, control, weights, c):
             return 0
         if not is_one_sided(p) or parts >= _MAX_PARTS:
             break
-        switch, after, h = next_law(series, p, degree, h, law)
+        switch, after, h = next_law(series, p, degree, h, law, accuracy)
         if switch == NONE:
             break
         before_ns = int(math.floor((gone + switch) * 1e9))

@@ -9,6 +9,8 @@ the other two where the tension, or the stretch, changes sign, whose series are 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..compilation import njit
@@ -20,9 +22,11 @@ from .motion_series import A_KNOT, DISTANCE, STRETCH, TENSION, distance_series, 
 
 SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
 
-_AGREEMENT = 1e-3
-"""Of the way that the distance goes, by which its own series may differ from the distance that the motion's series give: where they
-differ by more the distance's doesn't converge."""
+_AGREEMENT = 0.03
+_AGREEMENT_SLACK = 1e-3
+"""Times the root of the accuracy, of the tension's terms: by so much the series of the distance may differ from what the motion's
+series give, which converge where it may not. The law changes where the tension is zero, so that a tension of the
+wrong sign counts by its square. Less where the string doesn't pull: there the length of the step knows nothing of it."""
 
 _NEGLIGIBLE = 1e-19
 """Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
@@ -48,11 +52,12 @@ def law_of(y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def next_law(c, p, degree, h, law):
+def next_law(c, p, degree, h, law, accuracy):
     """When within h seconds the law first changes, NONE for never; the one that follows; and how far of h that is known."""
     if law == SLACK:
         return _tautens(c, p, degree, h), PULLS, h
     g = np.empty(degree + 1)
+    tolerance = math.sqrt(accuracy) * (_AGREEMENT if law == PULLS else _AGREEMENT_SLACK)
     if law == SHORTENS:
         distance_series(c, degree)
     while True:
@@ -67,7 +72,7 @@ def next_law(c, p, degree, h, law):
         else:
             time, after = _stops_shortening(c, p, degree, h, g)
             told = h if time == NONE else time * h
-        if told == NONE or _converges(c, p, degree, told):
+        if told == NONE or _converges(c, p, degree, told, tolerance):
             return NONE if time == NONE else time * h, after, h
         h = 0.5 * told
 
@@ -133,13 +138,16 @@ def _stops_shortening(c, p, degree, h, g):
 
 
 @njit(cache=True, error_model="numpy")
-def _converges(c, p, degree, t):
-    """Whether the series of the knot's distance gives what the motion's series give."""
-    change, way, power = 0.0, 0.0, 1.0
+def _converges(c, p, degree, t, tolerance):
+    """Whether the series of the knot's distance gives the tension that the motion's series give."""
+    stiffness, damping = p[STIFFNESS], p[STRING_DAMPING]
+    tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0
     for k in range(1, degree + 1):
+        slope = damping * k * c[k, DISTANCE] * power
         power *= t
-        term = c[k, DISTANCE] * power
-        change += term
-        way += abs(term)
-    x, _ = stretch_at(c, p, degree, t)
-    return abs(x - (c[0, STRETCH] + change)) <= _AGREEMENT * way + 1e-14 * c[0, DISTANCE]
+        spring = stiffness * c[k, DISTANCE] * power
+        tension += slope + spring
+        terms += abs(slope) + abs(spring)
+    x, rate = stretch_at(c, p, degree, t)
+    wrong = abs(stiffness * x + damping * rate - tension)
+    return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE]

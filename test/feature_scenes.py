@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: MIT
+"""Random flights of every pair of features, for the simulation and for the reference (test/reference_flights.py) alike.
+
+All last END_S; the free end may move from MOVE_S[0] to MOVE_S[1], a wrench may act from LOAD_S[0] to LOAD_S[1].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from flights import SECOND, flight_setup, wrench
+from random_scenes import log_uniform, random_turn
+from reference_flights import DIRECTIONS, error, fly, numbers
+
+from rigid_proto_ros.core.body import Body, make_body
+from rigid_proto_ros.core.commands import MoveString
+from rigid_proto_ros.core.setup import Setup
+from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.core.string import StringSettings
+
+END_S = 2.0
+MOVE_S = (0.3, 0.4)
+LOAD_S = (0.5, 0.7)
+
+FEATURES = {
+    "spin": ("zero", "slow", "fast"),
+    "speed": ("zero", "ordinary"),
+    "string": ("pulls", "bilateral", "no rest length", "none"),
+    "start": ("slack", "taut", "at the free end"),
+    "knot": ("com", "off"),
+    "damping_ratio": (0.0, 0.1, 1.5),
+    "gravity": (False, True),
+    "linear_damping": (False, True),
+    "angular_damping": (False, True),
+    "hand": ("still", "moves"),
+    "load": ("none", "wrench"),
+    "scale": (1e-6, 1e-3, 1.0, 1e3),
+}
+"""Each with its levels; all pairs of levels of two features occur."""
+
+
+@dataclass(frozen=True)
+class SizedSetup(Setup):
+    """A setup of a body without a mesh but of known size ℓ [m]."""
+
+    size: float = 1.0
+
+    @property
+    def length(self) -> float:
+        return self.size
+
+
+@dataclass(frozen=True)
+class Scene:
+    """setup, and commands (command, time [ns]); numbers: what the reference takes of it (test/reference_flights.py)."""
+
+    setup: Setup
+    commands: tuple
+    numbers: np.ndarray
+
+    def simulation(self) -> Simulation:
+        simulation = Simulation(self.setup)
+        for command, time_ns in self.commands:
+            simulation.submit(command, time_ns)
+        return simulation
+
+
+def random_features(rng: np.random.Generator) -> dict:
+    """A level of each feature."""
+    return {name: levels[rng.integers(len(levels))] for name, levels in FEATURES.items()}
+
+
+def make_scene(features: dict, rng: np.random.Generator, accuracy: float = 1e-9) -> Scene:
+    """A scene of these features, all else at random."""
+    f, size = features, features["scale"] * log_uniform(rng, 0.3, 3.0)
+    body = _body(rng, size)
+    reach = np.sqrt(body.principal_moments.max() / body.mass)
+    arm = reach * rng.normal(size=3) if f["knot"] == "off" else np.zeros(3)
+    turn = random_turn(rng)
+    row = np.zeros(13)
+    row[3:7] = _quaternion(turn)
+    if f["spin"] != "zero":
+        spin = log_uniform(rng, 1e-6, 0.5) if f["spin"] == "slow" else log_uniform(rng, 1.0, 25.0)
+        row[10:13] = spin * _direction(rng)
+    if f["speed"] != "zero":
+        row[7:10] = size * log_uniform(rng, 0.1, 3.0) * _direction(rng)
+    has_string, rest = (
+        f["string"] != "none",
+        0.0 if f["string"] == "no rest length" else size * log_uniform(rng, 0.3, 2.0),
+    )
+    target = size * rng.normal(size=3)
+    # A bilateral string has no direction where its ends meet.
+    start = "slack" if f["start"] == "at the free end" and f["string"] == "bilateral" else f["start"]
+    # An effective mass is taken along the string: where rounding alone gives it a direction nobody knows it.
+    nearest = 0.0 if f["knot"] == "com" else 1e-4
+    distance = {"slack": rng.uniform(0.05, 0.99), "taut": rng.uniform(1.0, 1.2), "at the free end": nearest}[start]
+    away = (rest or size) * distance * _direction(rng)
+    row[0:3] = target + away - _rotation(row[3:7]) @ arm
+    if start == "at the free end" and f["knot"] == "com":
+        row[0:3] = target
+    settings = StringSettings()
+    if has_string:
+        settings = StringSettings(
+            attached=True,
+            attach=tuple(arm.tolist()),
+            target=tuple(target.tolist()),
+            frequency=log_uniform(rng, 1.5, 30.0),
+            damping_ratio=f["damping_ratio"],
+            rest_length=rest,
+            bilateral=f["string"] == "bilateral",
+            timeout_ns=0,
+        )
+    gravity = np.array([0.0, 0.0, -9.81 * size]) if f["gravity"] else np.zeros(3)
+    linear = body.mass * log_uniform(rng, 0.01, 3.0) if f["linear_damping"] else 0.0
+    angular = body.principal_moments.min() * log_uniform(rng, 0.01, 3.0) if f["angular_damping"] else 0.0
+    commands, moved, loads = [], target, [np.zeros(3)] * 6
+    if has_string and f["hand"] == "moves":
+        moved = target + size * log_uniform(rng, 0.01, 0.5) * _direction(rng)
+        commands.append((MoveString(tuple(moved.tolist())), round(MOVE_S[0] * SECOND)))
+    if f["load"] != "none":
+        loads = _loads(rng, body, reach, size)
+        commands += _wrenches(loads)
+    base = flight_setup(
+        body,
+        integrator="auto",
+        accuracy=accuracy,
+        initial=row,
+        gravity=gravity,
+        linear_damping=linear,
+        angular_damping=angular,
+        string=settings,
+    )
+    return Scene(
+        SizedSetup(**vars(base), size=size),
+        tuple(commands),
+        numbers_of(base, size, moved, loads),
+    )
+
+
+def numbers_of(setup: Setup, size: float, moved, loads) -> np.ndarray:
+    """A scene's numbers for the reference, k and c of the string by its own arithmetic."""
+    body, string, row = setup.body, setup.string, setup.initial
+    arm = np.array(string.attach) * body.scale - body.center_of_mass if string.attached else np.zeros(3)
+    R = _rotation(row[3:7])
+    span = row[0:3] + R @ arm - np.array(string.target)
+    length = np.linalg.norm(span)
+    ways = [R.T @ span / length] if length > 0.0 else list(np.eye(3))
+    levers = [np.cross(arm, way) for way in ways]
+    turning = float(np.mean([lever @ np.linalg.solve(body.inertia, lever) for lever in levers]))
+    mass = 1.0 / (1.0 / body.mass + turning)
+    stiffness = mass * string.frequency**2 if string.frequency > 0.0 else string.stiffness
+    names = ("force_world", "point_world", "torque_world", "force_body", "point_body", "torque_body")
+    return numbers(
+        {
+            "row": row,
+            "mass": body.mass,
+            "inertia": body.inertia,
+            "length": size,
+            "gravity": setup.gravity,
+            "linear_damping": setup.linear_damping,
+            "angular_damping": setup.angular_damping,
+            **dict(zip(names, loads, strict=True)),
+            "tied": string.attached,
+            "arm": arm,
+            "target": string.target,
+            "moved": moved,
+            "stiffness": stiffness,
+            "damping": 2.0 * string.damping_ratio * np.sqrt(stiffness * mass),
+            "rest_length": string.rest_length,
+            "one_sided": not (string.bilateral or string.rest_length == 0.0),
+        }
+    )
+
+
+TRIES = 6
+_CONDITION_RNG = 2024
+
+
+def share(scene: Scene, row: np.ndarray, accuracy: float, end_s: float = END_S) -> float:
+    """What the error of a row at ``end_s`` is of what it may be: accuracy × time × condition.
+
+    The condition is 1 at least; where that isn't enough it is measured, by errors of ten times the accuracy all along.
+    """
+    size = scene.setup.length
+    exact = fly(scene.numbers, LOAD_S, MOVE_S, end_s)
+    found, allowed = error(row, exact, size), accuracy * end_s
+    if found <= allowed:
+        return found / allowed
+    rng = np.random.default_rng(_CONDITION_RNG)
+    for _ in range(TRIES):
+        ways = rng.normal(size=(DIRECTIONS, 4, 3))
+        ways /= np.linalg.norm(ways, axis=2, keepdims=True)
+        disturbed = fly(scene.numbers, LOAD_S, MOVE_S, end_s, 10.0 * accuracy, ways)
+        allowed = max(allowed, error(disturbed, exact, size))
+    return found / allowed
+
+
+def _body(rng, size) -> Body:
+    """A few kg at a metre; anything from stick to ball, turned in its mesh."""
+    mass = log_uniform(rng, 0.1, 10.0) * size**3
+    second = mass * (0.3 * size) ** 2 * np.array([1.0, log_uniform(rng, 0.05, 1.0), log_uniform(rng, 0.05, 1.0)])
+    turn = random_turn(rng)
+    inertia = turn @ np.diag(second.sum() - second) @ turn.T
+    return make_body(mass, np.zeros(3), 0.5 * (inertia + inertia.T))
+
+
+def _loads(rng, body, reach, size):
+    """Force and its point, torque: in world axes, then in body axes."""
+    found = []
+    for _ in range(2):
+        force = body.mass * size * log_uniform(rng, 0.3, 10.0) * _direction(rng)
+        torque = body.principal_moments.min() * log_uniform(rng, 0.3, 10.0) * _direction(rng)
+        found += [force, reach * rng.normal(size=3), torque]
+    return found
+
+
+def _wrenches(loads):
+    for k, axes in enumerate(("world", "body")):
+        force, point, torque = loads[3 * k : 3 * k + 3]
+        frame = f"{axes}@point/{','.join(repr(float(c)) for c in point)};duration={LOAD_S[1] - LOAD_S[0]:.9f}"
+        yield wrench(frame, force.tolist(), torque.tolist(), held=False, tag=bytes([k])), round(LOAD_S[0] * SECOND)
+
+
+def _direction(rng) -> np.ndarray:
+    way = rng.normal(size=3)
+    return way / np.linalg.norm(way)
+
+
+def _rotation(q) -> np.ndarray:
+    x, y, z, w = q / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _quaternion(R) -> np.ndarray:
+    """xyzw, of any rotation but half turns."""
+    w = 0.5 * np.sqrt(max(1.0 + np.trace(R), 0.0))
+    q = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w * w]) / max(4.0 * w, 1e-9)
+    return q / np.linalg.norm(q)
