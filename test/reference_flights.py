@@ -22,9 +22,9 @@ STAGES = 12
 A, B = DOP853.A.copy(), DOP853.B.copy()
 C = np.array([math.fsum(row) for row in A])
 
-FINENESS = 0.12
-"""Of the shortest time scale of a flight."""
-LONGEST_S = 4e-3
+FINENESS = 0.06
+"""Of the shortest time scale of a flight: smaller steps than its order needs, as a slack or taut spell within one must show."""
+LONGEST_S = 2e-3
 SAME_DIRECTION_S = 0.25
 DIRECTIONS = 16
 """Ways in which a flight is disturbed, one after the other and then anew."""
@@ -203,7 +203,7 @@ def _step_size(Y, P, hand, time, pulls):
         unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
         softest += _solved(P, unit)[j]
     rate = math.sqrt(_dot(w, w)) + 0.5 * (P[_ANGULAR] * softest + P[_LINEAR] / P[_MASS])
-    if P[_TIED] != 0.0 and pulls:
+    if P[_TIED] != 0.0 and (pulls or P[_REST] > 0.0):
         r = _turned(q, _three(P, _ARM), 1.0)
         t = _cross(w, r)
         a = (
@@ -213,6 +213,8 @@ def _step_size(Y, P, hand, time, pulls):
         )
         along = (Y[7] + t[0] - hand[3], Y[8] + t[1] - hand[4], Y[9] + t[2] - hand[5])
         l = math.sqrt(_dot(a, a))
+        if not pulls:
+            return min(FINENESS / max(rate + math.sqrt(_dot(along, along)) / P[_REST], 1e-3), LONGEST_S)
         turning = _dot(r, r) * softest
         if P[_REST] > 0.0 and l > 0.0:
             lever = _cross(r, a)
@@ -278,8 +280,8 @@ def _fly_span(Y, low, P, hand, begin, span, loaded, disturbance, ways, a, b, c):
                 if until > 0.0 and (ended < 0 or until < high):
                     ended, high = second, until
         if ended >= 0:
-            bottom, at, real = 0.0, high, True
-            for trial in range(200):
+            bottom, at, real, trial = 0.0, high, True, 0
+            while True:
                 _step(Y, low, P, hand, time, at, loaded, pulls, K, Z, after, out, out_low, a, b, c)
                 _rates(out, P, hand, time + at, loaded, pulls, dY, after)
                 g, r = _guard(after, state, ended == 1)
@@ -290,9 +292,15 @@ def _fly_span(Y, low, P, hand, begin, span, loaded, disturbance, ways, a, b, c):
                 new = at - g / r if r > 0.0 and trial < 30 else -1.0
                 if not bottom < new < high:
                     new = 0.5 * (bottom + high)
-                if abs(new - at) <= 1e-17 + 2.0**-51 * at or not bottom < new < high:
+                found = abs(new - at) <= 1e-17 + 2.0**-51 * at or not bottom < new < high
+                if found and state == 2 and ended == 0 and after[0] <= 0.0:
+                    # Before it would have pulled again its stretch was gone.
+                    bottom, high, ended, trial = 0.0, at, 1, 1
+                    continue
+                if found:
                     break
                 at = new
+                trial += 1
             if real:
                 h = at
                 state = 0 if ended == 1 else (1 if state != 1 else (2 if P[_DAMPING] > 0.0 else 0))
