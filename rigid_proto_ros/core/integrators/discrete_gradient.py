@@ -13,7 +13,8 @@ free end exact too. Attitude and spin: integrators/midpoint_spin.py.
 Order 2 while ω_s h is small, bounded energy at any ω_s h: a stiff string becomes an inextensible one, its unresolved swing
 along its length wrong in phase. Given μ, what remains is one equation for the mean spin (Newton); μ itself is the root of a
 monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺. Where the spin turns by so much in
-a step that none is found, the step is halved until one is: energy allows a solution at any length, not every guess leads to it.
+a step that none is found, the step is halved until one is, down to a 4096th: energy allows a solution at any length, not every
+guess leads to it. A string so stiff and so far stretched that the body turns about many times within that ends the flight.
 
 Attitude and displacement carry low words, and everything else about the string is computed as a change (integrators/knot.py):
 otherwise roundings of the knot's place, weighed by the tension, add up to 1e-8 of the energy at 1e5 rad/s.
@@ -331,7 +332,7 @@ DISCRETE_GRADIENT = Integrator(
     order=2,
     evaluations=12,
     source="Gonzalez, J. Nonlinear Sci. 6 (1996) 449, with the midpoint rule of Simo and Wong (1991)",
-    limits="Bounded energy at any stiffness; a swing along the string that the step doesn't resolve has the wrong phase.",
+    limits="Bounded energy at any stiffness, until the string turns the body about many times within a step: there it stops. A swing along the string that the step doesn't resolve has the wrong phase.",
     stability_limit=1.0,
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=discrete_gradient_steps,
