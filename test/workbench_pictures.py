@@ -61,7 +61,7 @@ def draw_comparison(page: Page, picture: Path) -> None:
         f"{len(actions)} actions ({', '.join(actions)}), seen {time.monotonic() - began:.1f} s after the click: {found[0]}"
     )
     assert len(actions) <= 5
-    page.until(lambda: 2.0 <= page.readout[0] <= 2.6, "two seconds of flight")
+    page.until(lambda: page.readout[0] >= 2.0, "two seconds of flight")
     page.page.screenshot(path=picture)
 
 
