@@ -199,3 +199,29 @@ def test_no_label_begins_empty_for_viser_would_never_show_it() -> None:
     PokeMark(scene, (0, 0, 0))
     labels = [node for node in scene.nodes.values() if node.kind == "add_label"]
     assert len(labels) >= 5 and all(label.arguments[0] for label in labels)
+
+
+def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_one() -> None:
+    from types import SimpleNamespace
+
+    from rigid_proto_ros.workbench.scene_view import SceneView
+
+    class Scene(SceneStandIn):
+        def __getattr__(self, method: str):
+            return super().__getattr__(method) if method.startswith("add_") else lambda *a, **k: None
+
+        world_axes = SimpleNamespace(visible=True)
+
+    scene = Scene()
+    view = SceneView(SimpleNamespace(scene=scene, initial_camera=SimpleNamespace()))
+    scenario = read_scene("true_or_box_tensor", {})
+    view.set_body(scenario, zoom=True)
+    row, com = np.array([*scenario.setup.initial]), scenario.ghost.body.center_of_mass
+    labels = [scene.nodes[f"/{whose}/name"] for whose in ("body", "ghost")]
+    view.show_ghost(row, com, ("true", "its box"))
+    assert [label.text for label in labels] == ["true", "its box"] and all(label.visible for label in labels)
+    # At one and the same point of the mesh, each from its own COM.
+    apart = (labels[0].position - labels[1].position) * view.unit
+    assert apart == pytest.approx(com - scenario.setup.body.center_of_mass, abs=1e-12)
+    view.show_ghost(None, com, ("true", "its box"))
+    assert not any(label.visible for label in labels)

@@ -37,7 +37,7 @@ from .scene_view import SceneView
 from .session_tab import SessionTab
 from .shadow import Shadow
 from .show_tab import ShowTab
-from .side_by_side import SideBySide
+from .side_by_side import SideBySide, names
 from .sighting import DrawnPose, Sightings
 from .situation import Situation, bring_about
 from .status import ENDED, Status
@@ -471,7 +471,7 @@ class Page:
             view.show_hit(None if looking else self.acting.hit(setup, state))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
             scales = view.show_motion(state.position, momentum, spin)
-            view.show_ghost(ghost, com)
+            view.show_ghost(ghost, com, names(self.scenario, self.history.ghost is not None)[:2])
             self.side_by_side.show(now_s, self.scenario, state, ghost, self.history.ghost is not None)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else self.acting.string_energy(setup, state)

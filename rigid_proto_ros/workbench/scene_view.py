@@ -31,10 +31,10 @@ from ..rerun_view.surface_normals import shaded_surface
 from ..scenario import Scenario
 from .acting import Hit
 from .motion_arrows import MotionArrows
-from .poke_mark import PokeMark
+from .poke_mark import UNWRITTEN, PokeMark
 from .soft_shadow import SoftShadow
 from .surroundings import FLOOR, Surroundings
-from .trails import COM_TRAIL, POINT_TRAIL, Trails
+from .trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point
 
 BOUNDS_COLOUR = (90, 90, 90)
 
@@ -107,6 +107,11 @@ class SceneView:
         server.initial_camera.fov = math.radians(40.0)
         self._body_frame = scene.add_frame("/body", show_axes=False)
         self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
+        self._names = [
+            scene.add_label(f"/{whose}/name", UNWRITTEN, visible=False, anchor="bottom-center")
+            for whose in ("body", "ghost")
+        ]
+        self._tip = np.zeros(3)
         self._surroundings = Surroundings(scene)
         self._shadow = SoftShadow(scene, "/grid/shadow")
         # Length 1 is the picture's unit; the body's own are scaled to it.
@@ -192,6 +197,7 @@ class SceneView:
         drawn = (body.inertia.tobytes(), body.center_of_mass.tobytes(), *scale)
         if replaced or drawn != self._drawn_body:
             self._drawn_body = drawn
+            self._tip = farthest_point(surface, body) if surface is not None else np.zeros(3)
             self._draw_inertia(scenario, box, ellipsoid, corners)
         return replaced
 
@@ -351,15 +357,23 @@ class SceneView:
             handle.points = np.array([[self._drawn(p), self._drawn(p + v)] for p, v in arrows])
         _set_visible(handle, shown)
 
-    def show_ghost(self, row: np.ndarray | None, center_of_mass: np.ndarray) -> None:
-        """The ghost at a state's pose, or nowhere; its COM (3,) in scaled mesh coordinates."""
+    def show_ghost(self, row: np.ndarray | None, center_of_mass: np.ndarray, names: tuple[str, str]) -> None:
+        """The ghost at a state's pose, or nowhere; its COM (3,) in scaled mesh coordinates. names: of body and ghost, which
+        are written at the point of each that is farthest from the body's COM."""
         shown = row is not None and self._shown["Ghost"]
         if shown:
             self._ghost_frame.position = self._drawn(row[0:3])
             self._ghost_frame.wxyz = _wxyz(row[3:7])
             if self._surface is not None:
                 self._ghost.position = (self._middle * self._scale - center_of_mass) / self.unit
+            tip = self._tip * self._scale
+            for label, com, name in zip(self._names, (self._center_of_mass, center_of_mass), names, strict=True):
+                label.position = (tip - com) / self.unit
+                if label.text != name:
+                    label.text = name
         _set_visible(self._ghost_frame, shown)
+        for label in self._names:
+            _set_visible(label, shown)
 
     def _drawn(self, world_point) -> np.ndarray:
         return (np.asarray(world_point) - self.origin) / self.unit
