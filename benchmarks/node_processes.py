@@ -63,7 +63,7 @@ class Process:
     def _read_errors(self) -> None:
         for line in self.popen.stderr:
             self.errors.append(line)
-            if "is flying" in line:
+            if "is simulating" in line:
                 self._flying.set()
 
     def wait_until_flying(self) -> None:

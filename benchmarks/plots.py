@@ -148,7 +148,7 @@ def draw_gallery(rows: list[dict], path: Path) -> None:
         axes.set_xlabel("time [s]")
         axes.legend(fontsize=7)
     panels[0].set(ylabel="energy / energy at the start", title="A T-handle that nothing touches: energy must stay 1")
-    panels[1].set(ylabel="angle of L to its start [deg]", title="Its angular momentum must keep its direction")
+    panels[1].set(ylabel="drift of L's direction [deg]", title="Its angular momentum must keep its direction")
     _save(figure, path)
 
 

@@ -31,7 +31,7 @@ ENERGY_UNIT, OMEGA_UNIT, MOMENTUM_UNIT, ANGLE_UNIT = "J", "rad/s", "kg m²/s", "
 ENERGY_TITLE = "Energy"
 OMEGA_TITLE = "ω in principal axes"
 MOMENTUM_TITLE = "L in world axes"
-MOMENTUM_ANGLE_TITLE = "Angle of L to its start"
+MOMENTUM_ANGLE_TITLE = "Drift of L's direction"
 GHOST_ANGLE_TITLE = "Angle of the ghost to the body"
 
 

@@ -290,7 +290,7 @@ def _parameter_row(parameter: Parameter) -> tuple[str, ...]:
     if parameter.choices:
         meaning += ": " + ", ".join(_code(choice or '""') for choice in parameter.choices)
     if parameter.changes != LIVE:
-        meaning += " (at start only)" if parameter.changes == READ_ONLY else " (counts at the next reset)"
+        meaning += " (at start only)" if parameter.changes == READ_ONLY else " (takes effect at the next reset)"
     return _code(parameter.name), _default(parameter), parameter.unit, meaning
 
 

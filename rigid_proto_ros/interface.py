@@ -33,8 +33,8 @@ def _service(name: str, type: str, meaning: str) -> Interface:
 INTERFACES = (
     _topic(SUBSCRIBED, "~/wrench", "geometry_msgs/WrenchStamped", "held wrench: each message replaces the one before; it ends `wrench_timeout` after the last"),
     _topic(SUBSCRIBED, "~/poke", "geometry_msgs/WrenchStamped", "pulse: each message adds one that lasts `poke_duration`, or what its frame says"),
-    _topic(SUBSCRIBED, "~/string/target", "geometry_msgs/PointStamped", "the hand at the string's free end; the first one ties the string, which lets go `string.timeout` after the last"),
-    _topic(SUBSCRIBED, "~/string/attach", "geometry_msgs/PointStamped", "where on the body the string is tied, taken onto the surface; frames `world`, `body` (m from the COM), `<body_frame>/mesh`"),
+    _topic(SUBSCRIBED, "~/string/target", "geometry_msgs/PointStamped", "position of the string's free end; the first message ties the string, which is released `string.timeout` after the last"),
+    _topic(SUBSCRIBED, "~/string/attach", "geometry_msgs/PointStamped", "where on the body the string is tied, moved to the nearest point of the surface; frames `world`, `body` (m from the COM), `<body_frame>/mesh`"),
     _topic(SUBSCRIBED, "~/inertia/set", "geometry_msgs/InertiaStamped", "mass, COM and tensor of the whole body; the model becomes `explicit` and the parameters follow"),
     _topic(SUBSCRIBED, "~/schedule", "std_msgs/String", "one entry of a poke script as YAML, or a list of entries, taken or refused as a whole; `t` in absolute simulated seconds"),
     _topic(PUBLISHED, "~/pose", "geometry_msgs/PoseStamped", "COM and attitude of the mesh's axes, in the world"),
@@ -42,7 +42,7 @@ INTERFACES = (
     _topic(PUBLISHED, "~/odom", "nav_msgs/Odometry", "both; its twist is in body axes"),
     _topic(PUBLISHED, "~/imu", "sensor_msgs/Imu", "attitude, angular velocity and specific force in body axes, at the contact `imu_contact` or the COM"),
     _topic(PUBLISHED, "~/inertia", "geometry_msgs/InertiaStamped", "latched: mass, COM (scaled mesh coordinates) and tensor about it (mesh axes)"),
-    _topic(PUBLISHED, "~/applied", "geometry_msgs/WrenchStamped", "each wrench and poke as it took effect, its point settled on the body"),
+    _topic(PUBLISHED, "~/applied", "geometry_msgs/WrenchStamped", "each wrench and poke as it took effect, its point resolved on the body"),
     _topic(PUBLISHED, "~/events", "std_msgs/String", "one JSON line per command, change and service as applied, with a running SHA-256"),
     _topic(PUBLISHED, "~/scene", "std_msgs/String", "latched: all parameters and the mesh's hash, as a scene that starts the same simulation"),
     _topic(PUBLISHED, "~/robot_description", "std_msgs/String", "latched: URDF with mesh and inertia, for other viewers"),
@@ -53,5 +53,5 @@ INTERFACES = (
     _service("~/pause", "SetBool", "true stops simulated time, false lets it run"),
     _service("~/step", "Trigger", "while paused: one publication period"),
     _service("~/clear_wrench", "Trigger", "ends the held wrench and the running pulses"),
-    _service("~/string/release", "Trigger", "lets the string go"),
+    _service("~/string/release", "Trigger", "releases the string"),
 )  # fmt: skip

@@ -59,5 +59,5 @@ class RecordedSession:
         """What there is, in one line."""
         text = f"{len(self.times)} states to {1e-9 * self.end_ns:g} s, {len(self.events)} events"
         if not self.complete:
-            text += f"; not finished properly, {self.readable_bytes} of {self.file_bytes} bytes are whole"
+            text += f"; not finished properly, {self.readable_bytes} of {self.file_bytes} bytes are complete"
         return text

@@ -68,7 +68,9 @@ class Scenario:
         changes = parameters.convert_all(changes)
         for name, value in changes.items():
             if parameters.parameter_named(name).changes == parameters.READ_ONLY:
-                raise InputError(name, value, "a parameter that can change in flight; this one is set at start only")
+                raise InputError(
+                    name, value, "a parameter that can be changed while running; this one is set at start only"
+                )
         values = {**self.values, **changes}
         if "density" in changes and "mass" not in changes:
             values["mass"] = 0.0

@@ -259,7 +259,7 @@ def read_mcap(data: bytes, name: str, wanted: Any = lambda topic: True) -> McapC
     if content.complete:
         content.readable_bytes = len(data)
     elif not content.readable_bytes:
-        raise InputError("session", name, "a recording with something in it; this one was cut before its first piece")
+        raise InputError("session", name, "a recording with something in it; this one ends before its first chunk")
     return content
 
 

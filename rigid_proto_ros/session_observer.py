@@ -90,7 +90,7 @@ class McapObserver(Observer):
         except OSError as error:
             accepted = f"a file that can be written ({error.strerror})"
             raise InputError("record", str(path), accepted) from None
-        self._mailbox = Mailbox(lambda: self._stopped("the disk takes nothing any more"))
+        self._mailbox = Mailbox(lambda: self._stopped("nothing can be written to the disk any more"))
         self._thread = threading.Thread(target=self._write_until_closed, name="mcap", daemon=True)
         self._thread.start()
 
@@ -149,7 +149,7 @@ class McapObserver(Observer):
         self._mailbox.close()
         self._thread.join(CLOSE_TIMEOUT_S)
         if self._thread.is_alive():
-            self._stopped("the disk did not take the last states")
+            self._stopped("the last states could not be written")
 
     # The writing thread
 

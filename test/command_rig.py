@@ -306,7 +306,7 @@ class Commanded(RosClient):
         self.node_process = NodeProcess(environment, folder / "node.log", scene)
         try:
             super().__init__(environment, node)
-            self.node_process.wait_for("is flying")
+            self.node_process.wait_for("is simulating")
             self.listen("pose", "twist", "odom", "inertia", "applied", "events", "scene")
             self.watch_diagnostics()
             self.advertise(*COMMANDS)

@@ -122,7 +122,7 @@ def running_node(*arguments: object, environment: dict[str, str], log: Path) -> 
     """A rigid_body_node that flies; ended by SIGINT, with status 0, at the end."""
     node = RosProcess("rigid_body_node", *arguments, environment=environment, log=log)
     try:
-        node.wait_for("is flying")
+        node.wait_for("is simulating")
         yield node
     finally:
         status = node.end()

@@ -31,7 +31,7 @@ def auto(initial=AT_REST, **changes):
 @pytest.mark.parametrize(
     ("simulation", "method"),
     [
-        (auto(), "asleep"),
+        (auto(), "sleeping"),
         (auto(gravity=GRAVITY), "closed form"),
         (auto(np.array([0, 0, 0, 0, 0, 0, 1.0, 1, 0, 0, 0, 0, 0])), "closed form"),
         (auto(spinning((1, 2, 3))), "free_body"),
@@ -39,7 +39,7 @@ def auto(initial=AT_REST, **changes):
         (auto(spinning((1, 2, 3)), gyroscopic=False), "closed form"),
         (auto(spinning((1, 2, 3)), angular_damping=0.3), "taylor"),
         (auto(string=STRING), "taylor"),
-        (auto(string=StringSettings(attached=True, target=(0.0, 0.0, 0.5), rest_length=1.0)), "asleep"),
+        (auto(string=StringSettings(attached=True, target=(0.0, 0.0, 0.5), rest_length=1.0)), "sleeping"),
         (auto(spinning((1, 2, 3)), string=StringSettings(True, stiffness=1e15)), "discrete_gradient"),
     ],
 )

@@ -55,7 +55,7 @@ def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_
     assert recorded.end_ns >= 9_000_000_000
     verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
     assert verified.returncode == 0, verified.stderr
-    assert "same to the bit" in verified.stdout
+    assert "reproduced bit for bit" in verified.stdout
 
 
 @pytest.mark.stress

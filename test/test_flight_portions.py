@@ -100,7 +100,7 @@ def test_a_flight_pauses_at_the_last_time_that_a_stamp_can_say(monkeypatch, list
     rig.flight._anybody_listens = lambda: listeners
     while not rig.flight.timekeeping.paused:
         rig.flight.tick()
-    assert "the last that a stamp can say" in rig.flight.simulation.failure
+    assert "the largest that a stamp can hold" in rig.flight.simulation.failure
     assert rig.flight.simulation.time_ns <= 3 * SECOND
     assert max(rig.published, default=0) <= 3 * SECOND
     rig.flight.reset()

@@ -150,7 +150,7 @@ def test_the_recording_of_a_node_ended_by_a_signal_is_complete(ros_environment, 
         environment=ros_environment,
         log=tmp_path / "node",
     )
-    node.wait_for("is flying")
+    node.wait_for("is simulating")
     assert node.end(number) == 0, node.errors
     recorded = read_session(session)
     assert recorded.complete

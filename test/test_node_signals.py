@@ -29,7 +29,7 @@ def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environm
 @BOTH
 def test_up_without_a_viewer_ends(ros_environment, tmp_path, number):
     up = RosProcess("rigid_proto", "up", "--viewer", "none", environment=ros_environment, log=tmp_path / "up")
-    up.wait_for("is flying")
+    up.wait_for("is simulating")
     children = descendants(up.pid)
     assert up.end(number) == 0, up.errors
     assert not [pid for pid in children if alive(pid)]

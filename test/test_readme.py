@@ -149,7 +149,7 @@ def test_command_that_stays_up_gets_ready_and_ends_cleanly(command: str, ros_env
     pytest.importorskip("rclpy")
     module = {"rigid_proto": "rigid_proto_ros.cli.main", "rigid_body_node": "rigid_proto_ros.ros.main"}
     program, *arguments = words(command)
-    ready_when = "is flying"
+    ready_when = "is simulating"
     if arguments[0] == "workbench":
         pytest.importorskip("viser")
         arguments += ["--no-browser"]

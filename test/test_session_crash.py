@@ -103,7 +103,7 @@ def test_repair_makes_a_file_that_the_stock_reader_opens(recording, tmp_path, ca
     for offset in random.Random(5).sample(range(len(data) // 4, len(data)), 8):
         cut.write_bytes(data[:offset])
         assert main(["replay", str(cut), "--repair", str(repaired)]) == 0
-        assert "not finished" in capsys.readouterr().out
+        assert "truncated" in capsys.readouterr().out
         (before,), (after,) = read_runs(cut), read_runs(repaired)
         assert after.complete and after.lines == before.lines
         assert after.rows.tobytes() == before.rows.tobytes()
@@ -159,7 +159,7 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
     node = RosProcess("rigid_body_node", "--ros-args", *arguments, environment=environment, log=folder / "node")
     try:
         with RosClient(environment) as client:
-            node.wait_for("is flying")
+            node.wait_for("is simulating")
             client.meet()
             client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
             end = time.monotonic() + after_s

@@ -90,7 +90,7 @@ class User(FlownPage):
         available = self.time[-1] - self.time[0]
         self.do(lambda: self.page._session.every_second())
         self.set("Seconds back", float(min(available, self.widget("Seconds back").max)))
-        self.press("Go on from here")
+        self.press("Continue from here")
 
     def push(self, point, direction) -> None:
         """Click at a mesh point, and wait until the poke is over."""

@@ -11,7 +11,7 @@ from rigid_proto_ros.workbench.status import SHOWN_S, SILENT_S, Status
 CALM = {
     "state": "flying",
     "integrator": "auto",
-    "integrator_choice": "auto: asleep",
+    "integrator_choice": "auto: sleeping",
     "warning": "",
     "refused_total": "0",
     "refused_frame": "0",
@@ -61,9 +61,9 @@ def test_a_node_that_is_gone_is_said_with_what_to_do_until_it_is_back() -> None:
     status = Status("/rigid_body")
     assert "waiting" in status.text(0.0)
     status.report(CALM, 0.0)
-    assert "is flying" in status.text(1.0)
+    assert "is simulating" in status.text(1.0)
     text = status.text(1.0 + SILENT_S)
-    assert "is flying" not in text and "has ended" in text and "Start it again" in text
+    assert "is simulating" not in text and "has ended" in text and "Start it again" in text
     # Another one begins to count from 0: nothing went wrong with it.
     status.report({**CALM, "state": "paused"}, 20.0)
     assert status.text(20.0).startswith("`/rigid_body` is paused") and "⚠" not in status.text(20.0)

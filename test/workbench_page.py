@@ -49,7 +49,7 @@ class Bench:
     def wait(self) -> None:
         """Until page and node are there."""
         self.process.wait_for("The workbench is at")
-        self.process.wait_for("is flying")
+        self.process.wait_for("is simulating")
 
     @property
     def address(self) -> str:
@@ -84,7 +84,7 @@ class Page:
             ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
         )
         self.page.add_style_tag(content=see_through)
-        self.until(lambda: "is flying" in self.text or "is sleeping" in self.text, "a node on the page")
+        self.until(lambda: "is simulating" in self.text or "is sleeping" in self.text, "a node on the page")
 
     @property
     def readout(self) -> tuple[float, float]:

@@ -25,8 +25,10 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--mesh", metavar="PATH", help="fly this mesh instead of the bundled T-handle")
-    parser.add_argument("--out", type=Path, default=OUT, metavar="FOLDER", help="for the session (default out)")
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh instead of the bundled T-handle")
+    parser.add_argument(
+        "--out", type=Path, default=OUT, metavar="FOLDER", help="folder for the recording (default out)"
+    )
     parser.add_argument(
         "--duration",
         type=float,
@@ -69,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
             return 1
         # It has waited until the last command acted.
         last_s = read_script(script)[-1].t_ns * 1e-9
-        print(f"3. flying on to {max(args.duration, last_s):g} s, recorded by Rerun", flush=True)
+        print(f"3. simulating to {max(args.duration, last_s):g} s, recorded for Rerun", flush=True)
         _show_flight(args.duration - last_s, node)
         node_status = processes.end(node)
     if node_status != 0:
@@ -99,7 +101,7 @@ def _report(session: Path) -> int:
 
     recorded = read_session(session)
     if not len(recorded.times):
-        print(f"rigid_proto demo: {session} holds no states", file=sys.stderr)
+        print(f"rigid_proto demo: {session} contains no states", file=sys.stderr)
         return 1
     inertia = session_scenario(recorded).setup.body.inertia
     first, last = (State(int(recorded.times[k]), recorded.rows[k]) for k in (0, -1))
@@ -109,8 +111,8 @@ def _report(session: Path) -> int:
         size = float((state.angular_momentum(inertia) ** 2).sum()) ** 0.5
         print(
             f"   {name:5s} at {state.time_ns / 1e9:7.3f} s: position ({x[0]:.4g}, {x[1]:.4g}, {x[2]:.4g}) m, "
-            f"ω ({w[0]:.4g}, {w[1]:.4g}, {w[2]:.4g}) rad/s, |L| {size:.6g} N m s"
+            f"ω ({w[0]:.4g}, {w[1]:.4g}, {w[2]:.4g}) rad/s, |L| {size:.6g} kg m^2/s"
         )
-    print(f"\n{session} holds the session. Open it with:\n   .venv/bin/rerun {session}")
-    print(f"Compute it anew and compare every bit:\n   .venv/bin/rigid_proto replay {session} --verify")
+    print(f"\n{session} is the recorded session. Show it with:\n   .venv/bin/rerun {session}")
+    print(f"Simulate it again and compare every state bit for bit:\n   .venv/bin/rigid_proto replay {session} --verify")
     return 0

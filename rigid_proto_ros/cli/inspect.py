@@ -36,35 +36,39 @@ EXAMPLES = (
         "a part drawn in mm that weighs 1.2 kg, as a URDF <inertial>",
     ),
     ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
-    ("rigid_proto inspect --compare robot.urdf", "how far a robot's inertials are off"),
+    ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Mass, centre of mass and inertia of a mesh under every model; a broken mesh is told, not summed."
+        "Mass, centre of mass and inertia of a mesh under every model; a mesh that encloses no volume is refused."
     )
     mesh = parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
     completes(mesh, body_names)
     mass = parser.add_mutually_exclusive_group()
     mass.add_argument("--density", type=float, metavar="D", help=f"kg/m^3 (default {DENSITY:g})")
-    mass.add_argument("--mass", type=float, default=0.0, metavar="M", help="kg, whatever the size")
+    mass.add_argument("--mass", type=float, default=0.0, metavar="M", help="kg; takes precedence over density")
     parser.add_argument("--scale", nargs="+", default=["1"], metavar="S", help="one or three numbers (0.001: mm to m)")
-    parser.add_argument("--model", choices=MODELS, default="solid", help="how mass is spread (default solid)")
+    parser.add_argument("--model", choices=MODELS, default="solid", help="inertia model (default solid)")
     parser.add_argument(
         "--ballast", nargs=4, type=float, action="append", default=[], metavar=("M", "X", "Y", "Z"),
         help="a point mass in kg at mesh coordinates; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--repair", action="store_true", help="weld, drop copies, orient and cap what isn't closed")
-    parser.add_argument("--fallback", choices=FALLBACKS[1:], default="", help="what stands in for an open surface")
+    parser.add_argument(
+        "--repair", action="store_true", help="weld edges, remove duplicate faces, orient faces, cap holes"
+    )
+    parser.add_argument(
+        "--fallback", choices=FALLBACKS[1:], default="", help="fallback shape for a mesh that encloses no volume"
+    )
     parser.add_argument("--max-triangles", type=int, default=MAX_TRIANGLES, metavar="N", help="refuse larger meshes")
     parser.add_argument(
         "--verify", action="store_true", help="compare with exact rational arithmetic (exit 1 above 1e-13)"
     )
-    parser.add_argument("--compare", metavar="ROBOT", help="how far a URDF's, SDF's or MJCF's inertials are off")
-    parser.add_argument("--record", metavar="FILE.rrd", help="write a picture of it all for the Rerun viewer")
-    parser.add_argument("--frame", choices=FRAMES, default="mesh", help="where the exported link's frame is")
+    parser.add_argument("--compare", metavar="ROBOT", help="show the errors of the inertials in a URDF, SDF or MJCF")
+    parser.add_argument("--record", metavar="FILE.rrd", help="record mesh, COM, axes and boxes for the Rerun viewer")
+    parser.add_argument("--frame", choices=FRAMES, default="mesh", help="origin of the exported link's frame")
     output = parser.add_mutually_exclusive_group()
     output.add_argument("--json", action="store_true", help="one JSON object on stdout")
     output.add_argument("--urdf", action="store_true", help="a URDF <inertial> on stdout")

@@ -16,14 +16,14 @@ from ..command_line import Parser, complete, completing
 from ..core.errors import InputError
 
 COMMANDS = {
-    "inspect": "mass properties of a mesh, and a verdict on it",
-    "simulate": "the simulation without ROS, as fast as the machine goes",
-    "sweep": "many variations of one scene into one table",
-    "replay": "show, check or branch a recorded session",
+    "inspect": "mass properties of a mesh, and what is wrong with it",
+    "simulate": "simulate a scene without ROS, as fast as possible",
+    "sweep": "simulate many variations of a scene into one table",
+    "replay": "show, verify, convert, publish or branch a recorded session",
     "snapshot": "a picture of a recorded session, without a display",
-    "demo": "node, scripted pokes and recording in one go, ending by itself",
-    "up": "node and live view, until Ctrl-C",
-    "workbench": "node and interactive page, until Ctrl-C",
+    "demo": "start the node, send scripted pokes, record, and end",
+    "up": "start the node with a live view, until Ctrl-C",
+    "workbench": "start the node and an interactive page, until Ctrl-C",
 }
 
 EXAMPLES = (

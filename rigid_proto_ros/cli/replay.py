@@ -15,7 +15,10 @@ from ..progress import Progress
 EXAMPLES = (
     ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
     ("rigid_proto replay out/flight.mcap --record out/seen.rrd", "a bag as a Rerun recording"),
-    ("rigid_proto replay out/flight.rrd --at 4 --as-scene out/branch.yaml", "the scene at 4 s, to continue otherwise"),
+    (
+        "rigid_proto replay out/flight.rrd --at 4 --as-scene out/branch.yaml",
+        "the scene at 4 s, to continue with changes",
+    ),
     ("rigid_proto replay out/flight.mcap --publish states --speed 20", "publish its states over ROS, 20 times as fast"),
 )
 
@@ -25,15 +28,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
     )
-    parser.add_argument("--verify", action="store_true", help="compute it anew; exit 1 at the first difference")
-    parser.add_argument("--record", metavar="FILE", help="write it as a recording, .rrd for Rerun or .mcap")
-    parser.add_argument("--repair", metavar="FILE", help="write a whole file of a session that was cut")
-    parser.add_argument("--scene", metavar="FILE", help="the scene of a bag that lacks it")
-    parser.add_argument("--at", type=float, metavar="T", help="a moment of the session [s], for --as-scene")
+    parser.add_argument(
+        "--verify", action="store_true", help="simulate it again and compare; exit 1 at the first difference"
+    )
+    parser.add_argument("--record", metavar="FILE", help="convert it to another recording, .rrd (Rerun) or .mcap")
+    parser.add_argument(
+        "--repair", metavar="FILE", help="write a readable file with all that is complete in a damaged session"
+    )
+    parser.add_argument("--scene", metavar="FILE", help="the scene, for a bag without one")
+    parser.add_argument("--at", type=float, metavar="T", help="simulated time [s], for --as-scene")
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="write the scene that begins at --at")
-    parser.add_argument("--publish", choices=("states", "commands"), help="send it again, over ROS")
-    parser.add_argument("--node", metavar="NAME", help="the node to send commands to; the body in a bag with several")
-    parser.add_argument("--speed", type=float, metavar="X", help="times as fast, for --publish states (default 1)")
+    parser.add_argument("--publish", choices=("states", "commands"), help="publish it over ROS")
+    parser.add_argument(
+        "--node", metavar="NAME", help="the node to send commands to, or the body in a bag with several"
+    )
+    parser.add_argument("--speed", type=float, metavar="X", help="speed factor of --publish states (default 1)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,7 +80,7 @@ def _check(args: argparse.Namespace) -> None:
     if args.speed is not None and not (math.isfinite(args.speed) and 1e-6 <= args.speed <= 1e6):
         raise InputError("--speed", args.speed, "a factor from 1e-6 to 1e6")
     if args.speed is not None and args.publish != "states":
-        raise InputError("--speed", args.speed, "--publish states; a node that flies has real_time_factor")
+        raise InputError("--speed", args.speed, "it with --publish states; a running node has real_time_factor")
     if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
         raise InputError("--record", args.record, "another file than the session")
 
@@ -81,7 +90,7 @@ def _tell(name: str, session) -> None:
     span = f"{times.min() / 1e9:.9g} s to {times.max() / 1e9:.9g} s" if len(times) else "no time"
     print(f"{name}: {len(times)} states, {span}; {len(session.events)} commands and services")
     if not session.complete:
-        print(f"  not finished: {session.readable_bytes} of {session.file_bytes} bytes are whole")
+        print(f"  truncated: {session.readable_bytes} of {session.file_bytes} bytes are complete")
     if session.missing:
         print(f"  without {', '.join(session.missing)}")
     for time_ns, line in session.refusals:
@@ -91,9 +100,9 @@ def _tell(name: str, session) -> None:
 def _say_how_to_see_it(args: argparse.Namespace) -> None:
     shown = args.record or (args.session if args.session.endswith(".rrd") else "")
     if shown.endswith(".rrd"):
-        print(f"  open it with: rerun {shown}")
+        print(f"  show it with: rerun {shown}")
     elif not args.record:
-        print("  to see it, make a recording for Rerun: --record FILE.rrd")
+        print("  to show it, convert it for Rerun: --record FILE.rrd")
 
 
 def _verify(runs: list, args: argparse.Namespace) -> int:
@@ -115,7 +124,7 @@ def _verify(runs: list, args: argparse.Namespace) -> int:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
             return 1
         verified += 1
-    print("  verified: every command and state is the same to the bit")
+    print("  verified: every command and state is reproduced bit for bit")
     return 0
 
 
@@ -144,7 +153,7 @@ def _branch(session, args: argparse.Namespace) -> None:
     if branch.pokes:
         pokes = scene.with_name(f"{scene.stem}_pokes.yaml")
         pokes.write_text(branch.pokes_text, encoding="utf-8")
-        print(f"  what was acting then, no scene can say: fly it with --script {pokes}")
+        print(f"  a scene can't hold the wrenches that acted then; add --script {pokes}")
     for note in branch.notes:
         print(f"  {note}")
 

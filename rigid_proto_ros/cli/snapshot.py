@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Flight",
     )
-    parser.add_argument("--scene", metavar="FILE", help="the scene of a bag that lacks it")
+    parser.add_argument("--scene", metavar="FILE", help="the scene, for a bag without one")
     parser.add_argument("--node", metavar="NAME", default="", help="the body, in a bag with several")
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
 

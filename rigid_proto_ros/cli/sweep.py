@@ -24,17 +24,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     study = parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
     completes(study, study_names)
     parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
-    parser.add_argument("--threads", type=int, default=0, metavar="N", help="threads here (default: one a core)")
-    parser.add_argument("--dask", default="", metavar="ADDRESS", help="fly on the cluster of this scheduler")
-    parser.add_argument("--resume", action="store_true", help="go on with a run that was stopped or killed")
-    parser.add_argument("--yes", action="store_true", help="yes, more than ten million rows")
-    parser.add_argument("--row", type=int, metavar="N", help="fly one row alone")
+    parser.add_argument(
+        "--threads", type=int, default=0, metavar="N", help="threads on this machine (default: one per core)"
+    )
+    parser.add_argument("--dask", default="", metavar="ADDRESS", help="run on the Dask cluster of this scheduler")
+    parser.add_argument("--resume", action="store_true", help="continue a run that was stopped or killed")
+    parser.add_argument("--yes", action="store_true", help="allow more than ten million rows")
+    parser.add_argument("--row", type=int, metavar="N", help="simulate one row only")
     parser.add_argument("--ghosts", metavar="N,N,...", help="with --record: these rows side by side in one recording")
     parser.add_argument("--record", metavar="FILE.rrd", help="with --row or --ghosts: record it for Rerun")
     parser.add_argument(
         "--as-scene", metavar="FILE.yaml", help="with --row: write it as a scene, and its script beside"
     )
-    parser.add_argument("--plot", metavar="x=..,y=..", help="picture of the table: x, y, color, to=FILE.svg")
+    parser.add_argument("--plot", metavar="x=..,y=..", help="plot the table: x, y, color, to=FILE.svg")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -73,7 +75,7 @@ def _whole(study, args) -> int:
     except Interrupted as stopped:
         done = stopped.metadata["rows_done"]
         if done:
-            _tell(f"{done} of {study.rows} rows are in {file}; go on with --resume")
+            _tell(f"{done} of {study.rows} rows are in {file}; continue with --resume")
         raise
     if plot:
         plot_table(plot, file)
@@ -82,7 +84,7 @@ def _whole(study, args) -> int:
     else:
         print(f"{metadata['rows']} rows in {file}")
         if metadata["rows_by_simulation"]:
-            print(f"{metadata['rows_by_simulation']} of them were flown or refused one by one")
+            print(f"{metadata['rows_by_simulation']} of them were simulated or refused one by one")
         if metadata.get("rows_failed"):  # a table of an earlier version doesn't say
             print(f"{metadata['rows_failed']} of them failed; the column failure says why")
         if plot:

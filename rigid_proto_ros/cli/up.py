@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "scene", nargs="?", default="t_handle", metavar="SCENE.yaml", help="scene file or bundled name"
     )
     completes(scene, scene_names)
-    parser.add_argument("--mesh", metavar="PATH", help="fly this mesh")
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument("--viewer", choices=("auto", "web", "native", "none"), default="auto")
 
 

@@ -22,7 +22,7 @@ AT_FIRST = ("--open", "--anew")
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
     ("rigid_proto workbench --mesh part.obj", "your own mesh"),
-    ("rigid_proto workbench --node /rigid_body", "the page of a node that runs already"),
+    ("rigid_proto workbench --node /rigid_body", "the page of a running node"),
 )
 
 
@@ -30,12 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     scene = parser.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="scene file or bundled name (t_handle)")
     completes(scene, scene_names)
-    parser.add_argument("--mesh", metavar="PATH", help="fly this mesh")
-    parser.add_argument("--node", metavar="NAME", help="show the node of this name, which runs already")
-    parser.add_argument("--link", metavar="LINK", help="open this situation, made by a page's button")
-    parser.add_argument("--port", type=int, metavar="PORT", help="of the page (8080, or the next free one)")
-    parser.add_argument("--host", metavar="ADDRESS", help="that the page is served on (this machine only)")
-    parser.add_argument("--no-browser", action="store_true", help="only say the address")
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
+    parser.add_argument("--node", metavar="NAME", help="open the page for a running node of this name")
+    parser.add_argument("--link", metavar="LINK", help="open this link, made by a button of the page")
+    parser.add_argument(
+        "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
+    )
+    parser.add_argument("--host", metavar="ADDRESS", help="address to serve the page on (default: this machine only)")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, open no browser")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,7 +87,7 @@ def _stay(args: argparse.Namespace) -> int:
                     return _ended("rigid_body_node", node.returncode)
                 # The page has said that it is gone, and finds the next one by its name.
                 print(
-                    "rigid_proto workbench: the node was killed; here is another one, at the start of its scene",
+                    "rigid_proto workbench: the node was killed; a new one was started, at the start of its scene",
                     file=sys.stderr,
                 )
                 node, node_began = processes.start(node_command), time.monotonic()
@@ -95,7 +97,7 @@ def _stay(args: argparse.Namespace) -> int:
                 if page.returncode >= 0 or time.monotonic() < page_began + RESTART_S:
                     return _ended("the page", page.returncode)
                 # Killed: the body flies on, and the browsers find the next page by themselves.
-                print("rigid_proto workbench: the page was killed; here is another one", file=sys.stderr)
+                print("rigid_proto workbench: the page was killed; a new one was started", file=sys.stderr)
                 page_command = [part for part in page_command if part not in AT_FIRST]
                 page, page_began = processes.start(page_command), time.monotonic()
 

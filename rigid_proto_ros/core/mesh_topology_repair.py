@@ -76,7 +76,7 @@ def _drop_copies(surface: Surface) -> list[str]:
     topology = surface.topology()
     done = []
     if topology.duplicates.any():
-        done.append(f"dropped {int(np.count_nonzero(topology.duplicates))} repeated faces")
+        done.append(f"removed {int(np.count_nonzero(topology.duplicates))} duplicate faces")
         surface.drop(topology.duplicates)
         topology = surface.topology()
     if 2 * topology.opposites == len(surface.triangles):
@@ -86,7 +86,7 @@ def _drop_copies(surface: Surface) -> list[str]:
         back = np.ones(len(surface.triangles), dtype=bool)
         back[first] = False
         surface.drop(back)
-        done.append(f"dropped {int(np.count_nonzero(back))} back sides")
+        done.append(f"removed {int(np.count_nonzero(back))} faces wound opposite to another")
     return done
 
 

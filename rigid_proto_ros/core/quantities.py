@@ -38,7 +38,7 @@ QUANTITIES = {
     "momentum_turned": "rad",
 }
 """Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are from the
-start, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the angle of L to its start."""
+start, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the drift of L's direction."""
 
 NAMES = tuple(QUANTITIES)
 SPEED, SPIN, DISTANCE, TURNED, KINETIC, POTENTIAL, ENERGY, DRIFT, MOMENTUM, MOMENTUM_TURNED = range(13, 23)

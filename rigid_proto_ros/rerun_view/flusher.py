@@ -31,7 +31,7 @@ class Flusher:
     """
 
     def __init__(self, name: str, initial_view: str, on_error: Callable[[str], None], open_ended: bool = False) -> None:
-        self.mailbox = Mailbox(lambda: self._lost("recording stopped: the disk takes nothing any more"))
+        self.mailbox = Mailbox(lambda: self._lost("recording stopped: nothing can be written to the disk any more"))
         self.ghosts = Mailbox()
         self.file: FileStream | None = None
         self.server: LiveServer | None = None
@@ -87,7 +87,7 @@ class Flusher:
         self._thread.join(TIMEOUT_S)
         if self._thread.is_alive():
             end_without_waiting()
-            self._lost("recording stopped: the disk did not take the last states")
+            self._lost("recording stopped: the last states could not be written")
 
     def _wait_for(self, kind: str) -> None:
         done = threading.Event()

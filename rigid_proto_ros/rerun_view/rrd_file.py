@@ -47,9 +47,7 @@ def whole_bytes(path: Path) -> tuple[int, bool]:
                 break
             at += FRAME_HEAD.size + length
     if at == HEADER_BYTES:
-        raise InputError(
-            "session", str(path), "a recording with something in it; this one was cut before its first piece"
-        )
+        raise InputError("session", str(path), "a recording with something in it; this one ends before its first chunk")
     return at, False
 
 

@@ -230,5 +230,5 @@ class CommandIntake:
             first, self.wall_stamp = self.wall_stamp == 0, self.wall_stamp + count
             if first:
                 self._logger.warning(
-                    "a command is stamped by the system's clock: it acts now, as others like it will; stamps are simulated time"
+                    "a command is stamped with the system's clock: it acts now, and so do later ones; stamps of commands are simulated time"
                 )

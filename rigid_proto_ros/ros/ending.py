@@ -78,5 +78,8 @@ def leave(status: int) -> NoReturn:
 
 
 def _leave_stuck(status: int) -> NoReturn:
-    print(f"rigid_body_node: the middleware did not end within {TEARDOWN_S:g} s and is left to itself", file=sys.stderr)
+    print(
+        f"rigid_body_node: the middleware did not end within {TEARDOWN_S:g} s; the process ends without it",
+        file=sys.stderr,
+    )
     leave(status)

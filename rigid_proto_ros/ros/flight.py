@@ -256,7 +256,7 @@ class Flight:
 
     def _stop_at_the_last_stamp(self) -> None:
         self.simulation.failure = (
-            f"simulated time beyond {LAST_STAMP_NS // 1_000_000_000} s, the last that a stamp can say"
+            f"simulated time beyond {LAST_STAMP_NS // 1_000_000_000} s, the largest that a stamp can hold"
         )
         self._stepping = False
         self._check_failure()

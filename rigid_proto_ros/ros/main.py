@@ -90,7 +90,7 @@ def _run(argv: list[str], ending: Ending) -> int:
         executor_thread.start()
         physics.start()
         for node in nodes:
-            node.get_logger().info(f"{node.get_fully_qualified_name()} is flying {_described(node)}")
+            node.get_logger().info(f"{node.get_fully_qualified_name()} is simulating {_described(node)}")
         ending.wait()
         status = 1 if crashed.is_set() else 0
     finally:

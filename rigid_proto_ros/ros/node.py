@@ -259,7 +259,7 @@ class RigidBodyNode(Node):
         before, self._others = self._others, self.count_publishers("~/pose") - 1
         if self._others <= 0:
             return ""
-        warning = f"somebody else publishes {self.get_fully_qualified_name()}/pose too: nodes of one name take each other's commands"
+        warning = f"another node publishes {self.get_fully_qualified_name()}/pose: nodes of the same name receive each other's commands"
         if before <= 0:
             self.get_logger().warning(warning)
         return warning

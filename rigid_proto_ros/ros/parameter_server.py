@@ -23,9 +23,9 @@ _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
     """The ROS descriptor of a declared parameter."""
-    when = {READ_ONLY: "Set at start only."}.get(parameter.changes, f"Changes count {parameter.changes}.")
+    when = {READ_ONLY: "Set at start only."}.get(parameter.changes, f"Changes take effect {parameter.changes}.")
     if parameter.changes == parameters.LIVE:
-        when = "Can change in flight."
+        when = "Can be changed while the simulation runs."
     result = ParameterDescriptor(
         name=parameter.name,
         type=_TYPES[parameter.type],

@@ -112,7 +112,7 @@ def step_over(call: Callable, flight: Flight) -> int:
     reached = call(flight.step)
     while not reached:
         if time.monotonic() > end:
-            accepted = f"a publication period that is flown in {STEP_PATIENCE_S:g} s; it goes on"
+            accepted = f"a publication period that is simulated in {STEP_PATIENCE_S:g} s; it goes on"
             raise InputError("step", f"{flight.simulation.time_ns / 1e9:.9g} s reached", accepted)
         reached = call(lambda: not flight.stepping)
     return flight.simulation.time_ns

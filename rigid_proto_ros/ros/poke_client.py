@@ -70,9 +70,14 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     completes(what, lambda: _ONE_LINE_COMMANDS)
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
-    parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="added to every t (default 0.2)")
+    parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")
     parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
-    parser.add_argument("--wrench-timeout", type=float, metavar="S", help="of held wrenches, if not the node's own")
+    parser.add_argument(
+        "--wrench-timeout",
+        type=float,
+        metavar="S",
+        help="wrench_timeout to assume for held wrenches (default: the node's)",
+    )
     parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node")
     line = parser.add_argument_group("one command from the line")
     line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
@@ -82,7 +87,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--torque", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m")
     line.add_argument("--angular-impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m s (poke only)")
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
-    line.add_argument("--for", dest="duration", type=float, metavar="S", help="seconds that it lasts")
+    line.add_argument("--for", dest="duration", type=float, metavar="S", help="duration in seconds")
     complete(parser)
     args = parser.parse_args(argv)
     limits = (

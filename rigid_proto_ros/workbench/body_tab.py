@@ -67,7 +67,7 @@ class BodyTab:
         body = await asyncio.to_thread(mesh_body, mesh, repair=repair, fallback=fallback)
         self.show_verdict(
             [f"{finding.severity}: {finding.message}" for finding in body.verdict.findings]
-            or ["closed and consistently wound: nothing to say"]
+            or ["closed and consistently wound: no problems found"]
         )
 
     def show_verdict(self, lines: list[str]) -> None:
@@ -86,7 +86,7 @@ class BodyTab:
             self.upload_place = gui.add_folder("Upload", expand_by_default=True)
             self._verdict = gui.add_markdown("")
             self._controls.checkbox("mesh_repair", "Repair")
-            self._controls.choice("mesh_fallback", "Stand-in when open")
+            self._controls.choice("mesh_fallback", "Fallback if open")
 
         def shown(values):
             return values["mesh"] if values["mesh"] in body_names() else OWN_FILE
@@ -137,7 +137,7 @@ class BodyTab:
             with gui.add_folder("Edit the tensor", expand_by_default=False):
                 tensor = gui.add_text("Tensor", "", hint="ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes")
                 verdict = gui.add_markdown("")
-                present = gui.add_button("Take the present one")
+                present = gui.add_button("Copy the current tensor")
                 apply = gui.add_button(
                     "Fly it", disabled=True, hint="inertia_model explicit, with present mass and COM"
                 )

@@ -71,11 +71,11 @@ async def _list(page: Page) -> None:
 
 
 KEYS = (
-    Key("Space", "space", "pause, and go on", _pause),
-    Key("→", "arrowright", "one step on; pauses first", _step),
+    Key("Space", "space", "pause or resume", _pause),
+    Key("→", "arrowright", "one step forward; pauses first", _step),
     Key("←", "arrowleft", "look one step back", _back_a_step),
     Key("Backspace", "backspace", f"look {BACK_S:g} s back", _back),
-    Key("G", "G", "go on from the moment looked at", _go_on),
+    Key("G", "G", "continue from the time shown", _go_on),
     Key("R", "R", "reset", _reset),
     Key("C", "C", "centre on the body", _centre),
     Key("?", "?", "list the keys", _list, "shift"),

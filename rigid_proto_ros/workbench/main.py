@@ -25,11 +25,11 @@ def main(argv: list[str] | None = None) -> int:
     """Serve the page; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
     parser = argparse.ArgumentParser(prog="workbench page")
     parser.add_argument("--node", default="/rigid_body")
-    parser.add_argument("--running", action="store_true", help="the node is there already, or it is a mistake")
+    parser.add_argument("--running", action="store_true", help="the node has to be running already")
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--host", default=LOOPBACK)
     parser.add_argument("--open", action="store_true")
-    parser.add_argument("--anew", action="store_true", help="begin the flight when the first browser is there")
+    parser.add_argument("--anew", action="store_true", help="start simulating when the first browser has connected")
     parser.add_argument("--lesson", default="")
     parser.add_argument("--link", default="")
     args = parser.parse_args(argv)

@@ -53,7 +53,7 @@ class Panel:
 
     def show_state(self, paused: bool) -> None:
         """Whether simulated time stands still."""
-        text = "Simulated time stands still." if paused else ""
+        text = "The simulation is paused." if paused else ""
         if self._running.content != text:
             self._running.content = text
 
@@ -105,7 +105,7 @@ class Panel:
                 "Click", (POKE, PUSH), initial_value=POKE, hint="Shift-click does the other; for pages without shift"
             )
             self._force = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
-            suits = "Times the force that suits the body"
+            suits = "Factor on a force that suits the body"
             self._times = times = gui.add_text("Force ×", "1", hint=suits)
             self._slider = slider = log_slider(gui, FORCE_DECADES, suits)
             self._controls.number("poke_duration", "Duration [s]")
@@ -156,14 +156,16 @@ class Panel:
                 tools.frequency,
                 hint="Frequency of the effective mass (string.frequency)",
             )
-            scaled = gui.add_checkbox("Scaled by effective mass", True, hint="So that a nut and a ship pull alike")
+            scaled = gui.add_checkbox(
+                "Scaled by effective mass", True, hint="So that light and heavy bodies respond alike"
+            )
             controls.number("string.stiffness", "Stiffness [N/m]")
             controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
             controls.number("string.rest_length", "Rest length [m]")
             controls.checkbox("string.bilateral", "Pushes too")
             controls.checkbox("string.attached", "Tied from the start")
             controls.vector("string.attach", "Tied at x y z", 3)
-            controls.number("string.timeout", "Lets go after [s]")
+            controls.number("string.timeout", "Released after [s]")
 
         def take() -> None:
             tools.frequency = float(strength.value) if scaled.value else 0.0

@@ -74,7 +74,7 @@ def make_rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole
     present: the scene as it is now. Raises MeshError when the mesh that flew then is gone.
     """
     time_ns = session.end_ns
-    reason = "more happened than is kept"
+    reason = "more events happened than are kept"
     branch: Branch | None = None
     values: Mapping[str, Any] = {}
     exact = False
@@ -83,14 +83,14 @@ def make_rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole
             branch = branch_at(session, time_ns)
             values = read_scene_text(branch.scene).values
             exact = np.array_equal(_start(values), row)
-            reason = "not all that acted before was heard"
+            reason = "not all earlier commands were received"
         except MeshError:
             raise
         except InputError as error:
             reason = str(error)
     if branch is None or not exact:
         values = _recorded_values(session, row)
-        note = f"what acted then is left out, the state is the recorded one ({reason})"
+        note = f"the wrenches that acted then are left out; the state is the recorded one ({reason})"
         branch = Branch(scene_text(values, session.mesh_sha256), [], [note])
     script = branch.pokes_text if branch.pokes else ""
     return Rewind(

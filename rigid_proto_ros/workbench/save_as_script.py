@@ -56,7 +56,7 @@ def save_as_script(session: RecordedSession) -> SavedScript:
         raise InputError("events", f"{len(session.lines)} lines", "all lines of the log since the start or a reset")
     entries, notes = writer.entries, []
     scene = kept_scene(scenario)
-    head = "# Done by hand. Again: rigid_proto simulate SCENE --script THIS, or poke_client THIS --reset\n"
+    head = "# Done by hand. Reproduce it with: rigid_proto simulate SCENE --script THIS, or poke_client THIS --reset\n"
     script = head + "".join(f"- {flow(entry)}\n" for entry in entries)
     mesh = scenario.values["mesh"]
     if scenario.body_mesh is not None and scenario.body_mesh.mesh.path == mesh:

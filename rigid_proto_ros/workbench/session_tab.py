@@ -107,10 +107,10 @@ class SessionTab:
     def _rewind_folder(self) -> None:
         gui = self._gui
         with gui.add_folder("Rewind"):
-            gui.add_markdown("Go back, look, and go on from there: the old future stays as a ghost.")
+            gui.add_markdown("Go back in time and continue from there; the previous motion stays as a ghost.")
             self._back = gui.add_slider("Seconds back", 0.0, 10.0, STEP_S, 0.0)
-            self._go_on = gui.add_button("Go on from here", disabled=True)
-            self._forget = gui.add_button("Forget the ghost", visible=False)
+            self._go_on = gui.add_button("Continue from here", disabled=True)
+            self._forget = gui.add_button("Remove the ghost", visible=False)
             self._looking = gui.add_markdown("")
 
         @self._back.on_update
@@ -182,7 +182,9 @@ class SessionTab:
     def _save_folder(self) -> None:
         gui = self._gui
         with gui.add_folder("Save as script"):
-            gui.add_markdown("What was done since the last reset, as a scene and a script that fly the same again.")
+            gui.add_markdown(
+                "What was done since the last reset, as a scene and a script that reproduce it bit for bit."
+            )
             save = gui.add_button("Save scene and script")
             notes = gui.add_markdown("")
 
@@ -194,7 +196,10 @@ class SessionTab:
         saved = await asyncio.to_thread(self._page.history.save_as_script)
         client.send_file_download("scene.yaml", saved.scene.encode(), save_immediately=True)
         client.send_file_download("script.yaml", saved.script.encode(), save_immediately=True)
-        lines = [f"{saved.commands} commands. Fly it again:", "`rigid_proto simulate scene.yaml --script script.yaml`"]
+        lines = [
+            f"{saved.commands} commands. Reproduce it with:",
+            "`rigid_proto simulate scene.yaml --script script.yaml`",
+        ]
         notes.content = "\n\n".join([*lines, *saved.notes])
 
     # Link

@@ -74,7 +74,7 @@ class SideBySide:
 def names(scenario: Scenario, left: bool) -> tuple[str, str, str]:
     """What body and ghost are called, and in what alone they differ."""
     if left:
-        return "now", "as it went before", "One body, two futures."
+        return "now", "previous motion", "The same body from the same state, under different commands."
     own, other = str(scenario.values["inertia_model"]), str(scenario.values["ghost.inertia_model"])
     integrator = str(scenario.values["ghost.integrator"])
     if integrator and not other:

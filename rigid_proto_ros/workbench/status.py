@@ -55,7 +55,8 @@ class Status:
         if doing:
             return f"*{doing} …*"
         last = self._last
-        text = f"`{self._target}` is {last.get('state', 'there')}"
+        state = last.get("state", "running")
+        text = f"`{self._target}` is {'simulating' if state == 'flying' else state}"
         if (choice := last.get("integrator_choice")) and choice != last.get("integrator"):
             text += f", method {choice}"
         self._troubles = {said: until_s for said, until_s in self._troubles.items() if until_s > now_s}
@@ -67,7 +68,7 @@ class Status:
             return f"waiting for `{self._target}` …"
         self._silent_since = self._silent_since or time.strftime("%H:%M:%S")
         return (
-            f"⚠ **`{self._target}` has ended, or hangs: no word since {self._silent_since}.** The picture shows its last "
+            f"⚠ **`{self._target}` has ended, or hangs: no message since {self._silent_since}.** The picture shows its last "
             "state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in another terminal): this page goes "
             "on by itself when it is back."
         )

@@ -120,7 +120,7 @@ def _choose(integrator: Integrator, p: np.ndarray, y: np.ndarray, step_ns: int, 
         return OneStep("auto: closed form, nothing changes the spin", steady_steps, 1)
     if kind == COASTING:
         return OneStep("auto: closed form, nothing turns the body", None, 0)
-    return OneStep("auto: asleep, nothing moves or acts", None, 0, sleeping=True)
+    return OneStep("auto: sleeping, nothing moves or acts", None, 0, sleeping=True)
 
 
 def _series(why: str, accuracy: float, method: ModuleType) -> Stepper:
@@ -134,7 +134,7 @@ def _choose_for_string(p, y, step_ns: int, accuracy: float) -> Stepper:
     turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
     accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
     if x <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
-        return OneStep("auto: asleep, the string is slack and nothing moves", None, 0, sleeping=True)
+        return OneStep("auto: sleeping, the string is slack and nothing moves", None, 0, sleeping=True)
     # The knot is lightest, and the swing fastest, where the whole arm counts against the smallest moment.
     arm = p[ATTACH : ATTACH + 3]
     lightness = 1.0 / p[MASS] + float((arm * arm).sum()) / p[MOMENTS]
