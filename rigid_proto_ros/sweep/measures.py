@@ -46,7 +46,7 @@ def read_measures(spec, stop, watch: float, duration_s: float, field: str) -> Me
     stops = _conditions({} if stop is None else stop, field.replace("measure", "stop"))
     watching = bool(stops) or bool({"max", "min", "flips", "first", "max_difference"} & set(spec))
     if watching and duration_s * watch > MAX_LOOKS:
-        raise InputError("watch", watch, f"at most {MAX_LOOKS} looks at a flight of {duration_s:g} s")
+        raise InputError("watch", watch, f"at most {MAX_LOOKS} samples in a run of {duration_s:g} s")
     looks_ns, watched = _looks(watch if watching else 0.0, samples_ns, duration_ns)
     rows: list[tuple[str, list[float]]] = []
     for kind, value in spec.items():

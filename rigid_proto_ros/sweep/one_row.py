@@ -80,7 +80,7 @@ def _flight(study: Study, number: int):
     while (time_ns := publication_ns(len(times_ns), rate)) <= study.duration_ns:
         state = simulation.advance(time_ns)
         if simulation.failure:
-            raise InputError(f"row {number}", simulation.failure, "a row whose flight lasts")
+            raise InputError(f"row {number}", simulation.failure, "a row that can be simulated to its end")
         times_ns.append(time_ns)
         states.append(state.row)
     body, surface = scenario.setup.body, scenario.setup.surface

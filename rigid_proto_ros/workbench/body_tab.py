@@ -139,7 +139,7 @@ class BodyTab:
                 verdict = gui.add_markdown("")
                 present = gui.add_button("Copy the current tensor")
                 apply = gui.add_button(
-                    "Fly it", disabled=True, hint="inertia_model explicit, with present mass and COM"
+                    "Use this tensor", disabled=True, hint="inertia_model explicit, with present mass and COM"
                 )
 
         def judge() -> list[float] | None:
