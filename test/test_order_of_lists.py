@@ -125,7 +125,7 @@ def test_a_session_recorded_before_lists_is_verified_to_the_bit(capsys) -> None:
     at_one_instant = [kind for t, kind, _ in (decode_event(line, 1) for line in session.lines) if t == SECOND // 10]
     assert at_one_instant == ["set", "poke", "poke", "poke"]
     assert main(["replay", str(BEFORE_LISTS), "--verify"]) == 0
-    assert "every command and state is the same to the bit" in capsys.readouterr().out
+    assert "every command and state is reproduced bit for bit" in capsys.readouterr().out
 
 
 def test_recorded_frames_go_to_a_node_of_any_name() -> None:

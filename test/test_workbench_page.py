@@ -284,10 +284,10 @@ def test_a_tensor_is_judged_as_it_is_typed(page, ear) -> None:
     page.page.get_by_text("Edit the tensor").click()
     page.input("Tensor").fill("1 0 0 1 0 5")
     page.until(lambda: "A + B >= C" in page.text, "the reason why no body has this tensor")
-    assert page.page.get_by_role("button", name="Fly it", exact=True).is_disabled()
+    assert page.page.get_by_role("button", name="Use this tensor", exact=True).is_disabled()
     page.input("Tensor").fill("0.002 0 0 0.003 0 0.004")
     page.until(lambda: "✓ principal moments 0.002, 0.003, 0.004" in page.text, "a valid tensor")
-    page.button("Fly it")
+    page.button("Use this tensor")
     assert ear.until_value("explicit_inertia.tensor", lambda t: t[0] == 0.002) == [0.002, 0.0, 0.0, 0.003, 0.0, 0.004]
     ear.set_named({"inertia_model": "solid"})
 
@@ -324,7 +324,7 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     page.write("Seconds back", "0.5")
     page.until(lambda: "Looking at" in page.text, "a look back")
     reached_ns = ear.now_ns()
-    page.button("Go on from here")
+    page.button("Continue from here")
     reset = before + 1 + next(k for k, e in enumerate(ear.events()[before:]) if e is not None)
     ear.event("reset", reset)
     state = page.until(lambda: (p := ear.heard("pose", last=1)[0])["header"]["stamp"]["sec"] == 0 and p, "a new run")
@@ -334,8 +334,8 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     assert np.linalg.norm(start["initial.linear_velocity"]) > 0.0
     assert np.linalg.norm(start["initial.position"]) > 0.0
     assert state["pose"]["position"] != dict.fromkeys("xyz", 0.0)
-    page.until(lambda: page.page.get_by_role("button", name="Forget the ghost").is_visible(), "a ghost")
-    page.button("Forget the ghost")
+    page.until(lambda: page.page.get_by_role("button", name="Remove the ghost").is_visible(), "a ghost")
+    page.button("Remove the ghost")
     ear.set_named({n: [0.0] * 3 for n in ("initial.position", "initial.linear_velocity", "initial.angular_velocity")})
     ear.set_named({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 1.0]})
 
@@ -387,7 +387,7 @@ def test_a_killed_node_is_said_on_the_page_which_goes_on_with_the_next_one(page,
         page.until(
             lambda: "has ended, or hangs" in page.text and "Start it again" in page.text, "word of the node's end"
         )
-        assert "is flying" not in page.text and "is sleeping" not in page.text
+        assert "is simulating" not in page.text and "is sleeping" not in page.text
     finally:
         os.kill(bench.process.pid, signal.SIGCONT)
     page.until(lambda: "is sleeping" in page.text and "has ended" not in page.text, "another node on the same page")
