@@ -46,7 +46,7 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"measure": {"samples": None}}, "measure.samples", "at, of"),
         ({"measure": {"samples": {"at": [2.0], "of": ["speed"]}}}, "measure.samples, at", "to 1"),
         ({"stop": {"far": {"quantity": "distance", "above": 1, "below": 2}}}, "stop.far", "one of above, below"),
-        ({"watch": 1e6, "measure": {"max": ["spin"]}}, "watch", "looks"),
+        ({"watch": 1e6, "measure": {"max": ["spin"]}}, "watch", "samples"),
         ({"set": {"mass": "heavy"}}, "set.mass", "a finite number"),
         ({"reference": {"publish_clok": True}}, "parameter", "did you mean publish_clock"),
         ({"script": [{"t": 0.1, "at": "tipp", "force": [0, 0, 1]}]}, "script, command 1", "tip"),
