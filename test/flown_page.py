@@ -289,7 +289,9 @@ class FlownPage:
         place = state.position + state.rotation @ body.point(tuple(mesh_point))
         drawn = (place - view.origin) / view.unit
         self.do(lambda: self.page.pointer.grab(1, drawn, drawn))
-        time.sleep(0.05)  # the first target follows the knot
+        drag = self.page.pointer._drag
+        grabbed_s = drag.last_target_s
+        self.until(lambda: drag.last_target_s > grabbed_s, "first target, which follows the knot")
         return place
 
     def pull(self, place) -> None:

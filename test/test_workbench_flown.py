@@ -83,7 +83,8 @@ def test_a_command_that_the_ghosts_integrator_cannot_carry_is_said(flown: FlownP
     place = flown.grab([0.0, 0.0, 0.07])
     flown.pull(place + [0.0, 0.1, 0.0])
     flown.fly(0.1)
-    assert any("ghost doesn't take part" in text and "free_body" in text for text in flown.said)
+    said = flown.said
+    flown.until(lambda: any("ghost doesn't take part" in text and "free_body" in text for text in said), "word of it")
 
 
 def slider_below(flown: FlownPage, label: str):
