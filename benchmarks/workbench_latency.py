@@ -82,15 +82,15 @@ def browser_frames(address: str) -> tuple[float, str] | None:
         page.set_default_timeout(120e3)
         page.goto(address)
         page.wait_for_selector("canvas")
-        time.sleep(2.0 * COUNTED_S)  # shaders are compiled first
+        time.sleep(COUNTED_S)
         frames = page.evaluate(
             """seconds => new Promise(done => {
-                let frames = 0;
-                const began = performance.now();
+                let frames = -3, began = 0;  // the first ones wait for shaders
                 const count = () => {
+                    if (++frames == 0) began = performance.now();
                     const passed = (performance.now() - began) / 1e3;
-                    if (passed >= seconds) done(frames / passed);
-                    else { frames++; requestAnimationFrame(count); }
+                    if (frames > 0 && passed >= seconds) done(frames / passed);
+                    else requestAnimationFrame(count);
                 };
                 requestAnimationFrame(count);
             })""",
