@@ -48,7 +48,7 @@ class Contestant:
 def installed_peers() -> tuple[list[Contestant], list[str]]:
     """Contestants of every peer that can be imported, and what is missing."""
     found, missing = [], []
-    for module in ("mujoco", "drake", "pinocchio", "bullet", "scipy", "diffrax"):
+    for module in ("mujoco", "drake", "pinocchio", "bullet", "scipy", "diffrax", "heyoka"):
         try:
             found += importlib.import_module(f"peers_{module}").contestants()
         except ImportError as error:

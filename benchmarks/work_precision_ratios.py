@@ -12,7 +12,7 @@ KERNEL, WHOLE = "ours (kernel)", "ours"
 def ratios(rows: list[dict]) -> list[str]:
     """Lines of text: time of a step, P1, P2 at matched error, P4 and the strings; what wasn't run is left out."""
     rows = [r for r in rows if r["status"] == "ok" or r["status"] == "blew up"]
-    return [*_step(rows), *_p1(rows), *_p2(rows), *_p4(rows), *_string_targets(rows), *_strings(rows)]
+    return [*_step(rows), *_p1(rows), *_p2(rows), *_matched(rows), *_p4(rows), *_string_targets(rows), *_strings(rows)]
 
 
 def curves(rows: list[dict], problem: str) -> dict[tuple[str, str], list[dict]]:
@@ -83,6 +83,22 @@ def _p2(rows, target: float = 1e-10) -> list[str]:
         f"P2 at {target:g} rad: {key[0]} {key[1]} {t * 1e6:.1f} us; MuJoCo RK4 {theirs * 1e3:.2f} ms: "
         f"{theirs / t:.0f} times (target 400)"
         for t, key in reached[:6]
+    ]
+
+
+def _matched(rows, problem: str = "P2", target: float = 4e-9) -> list[str]:
+    """Every peer's best integrator against auto as a whole simulation, all at the same error."""
+    found = curves(rows, problem)
+    if (WHOLE, "auto") not in found:
+        return []
+    mine = time_at_error(found[WHOLE, "auto"], target)
+    reached = [(time_at_error(curve, target), key) for key, curve in found.items() if key[0] not in (KERNEL, WHOLE)]
+    best: dict[str, tuple[float, str]] = {}
+    for theirs, (tool, name) in sorted((t, key) for t, key in reached if math.isfinite(t)):
+        best.setdefault(tool, (theirs, name))
+    return [
+        f"{problem} at {target:g} rad: {tool} {name} {theirs * 1e6:.0f} us, ours {mine * 1e6:.1f} us: {theirs / mine:.1f} times"
+        for tool, (theirs, name) in best.items()
     ]
 
 

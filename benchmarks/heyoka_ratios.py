@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""`auto` against heyoka.py at equal error of the final attitude: the shortest of many runs taken in turn, in one process.
+
+For each problem both are flown over a range of accuracies and tolerances, and the times at an error are read off the two
+curves (log-log). `kernel` is the compiled loop over steps, called from Python as heyoka's propagate_until is; `simulation` is
+Simulation.advance with its commands and segments. What heyoka compiles, one system and tolerance at a time, isn't counted.
+
+    python benchmarks/heyoka_ratios.py [--only P2,damped,...] [--seconds 2]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import heyoka
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import peers_heyoka
+from motion_measures import errors
+from problem_references import reference_row
+from problems import PROBLEMS, Problem
+from result_table import ResultTable
+from rigid_proto_ros.core.integrators import control as ctl
+from rigid_proto_ros.core.motion import new_variables, to_row
+from work_precision_ours import prepare_simulation, simulation_of
+from work_precision_ratios import time_at_error
+
+TARGETS = (1e-6, 1e-8, 1e-10)
+KNOBS = [10.0 ** (-k / 2) for k in range(4, 29)]
+FLIGHTS, IN_A_ROW = 8, 10
+COLUMNS = ("problem", "what", "error_rad", "us", "heyoka_us", "ratio")
+
+
+def kernel_runs(problem: Problem, accuracy: float):
+    """(run, row, restart) of the adaptive kernel on a problem of one segment; None where there are more."""
+    if not all(w.end is None and w.begin == 0.0 and not w.impulse for w in problem.wrenches):
+        return None
+    simulation = simulation_of(problem, "auto", 1e-3, accuracy)
+    simulation.advance(1)
+    segment = simulation._segment
+    stepper, p = segment.stepper, segment._problem
+    if not hasattr(stepper, "_control"):
+        return None
+    start, fresh = new_variables(segment.start.row, p), np.zeros_like(stepper._control)
+    fresh[ctl.ACCURACY], fresh[ctl.DEGREE] = accuracy, stepper._control[ctl.DEGREE]
+    y, control, kernel = start.copy(), fresh.copy(), stepper._kernel
+    end_ns = round(problem.duration * 1e9)
+
+    def restart():
+        y[:], control[:] = start, fresh
+
+    def run():
+        came = kernel(y, p, control, stepper._following, stepper._workspace, end_ns, False)
+        if came < end_ns:
+            kernel(y, p, control, stepper._following, stepper._workspace, end_ns - came, True)
+
+    def row():
+        out = np.zeros(13)
+        to_row(y, p, problem.duration, out)
+        return out
+
+    return run, row, restart
+
+
+def whole(prepare):
+    """(run, row, restart) of a contestant's own way."""
+
+    def runs(problem: Problem, knob: float):
+        contestant = prepare(problem, knob)
+        if contestant is None:
+            return None
+
+        return lambda: contestant.advance(problem.duration), contestant.row, contestant.restart
+
+    return runs
+
+
+def batch_runs(problem: Problem, tolerance: float):
+    """FLIGHTS flights side by side by heyoka, of which the first is the problem's and the others nearly so."""
+    axes, start = peers_heyoka.start_of(problem)
+    if not problem.constant_body_wrench:
+        return None
+    starts = np.repeat(start[:, None], FLIGHTS, axis=1)
+    starts[4:7] *= 1.0 + 1e-3 * np.arange(FLIGHTS)
+    integrator = heyoka.taylor_adaptive_batch(peers_heyoka.system(problem, axes), starts.copy(), tol=tolerance)
+
+    def restart():
+        integrator.set_time(0.0)
+        integrator.state[:] = starts
+
+    def run():
+        integrator.propagate_until(problem.duration)
+
+    return run, lambda: peers_heyoka.row_of(integrator.state[:, 0], axes), restart
+
+
+CURVES = {
+    "heyoka": whole(peers_heyoka.prepare),
+    "heyoka batch": batch_runs,
+    "kernel": kernel_runs,
+    "simulation": whole(lambda problem, accuracy: prepare_simulation(problem, accuracy, "auto")),
+}
+
+
+def curves(problem: Problem, seconds: float) -> dict[str, list[dict]]:
+    """For each way rows of a flight's time [s], the shortest, and error [rad]: whatever else the machine does only adds to it."""
+    known, reference = [], reference_row(problem)
+    for what, prepare in CURVES.items():
+        for knob in KNOBS:
+            made = prepare(problem, knob)
+            if made is None:
+                break
+            run, row, restart = made
+            restart()
+            run()
+            known.append((what, run, errors(problem, row(), reference)["attitude_error_rad"], restart, []))
+    until = time.perf_counter() + seconds
+    while time.perf_counter() < until or len(known[0][-1]) < 5:
+        for _, run, _, restart, times in known:
+            # Several in a row: code and data are then where they are while one tool is used.
+            for _ in range(IN_A_ROW):
+                restart()
+                begin = time.perf_counter()
+                run()
+                times.append(time.perf_counter() - begin)
+    found: dict[str, list[dict]] = {what: [] for what in CURVES}
+    for what, _, error, _, times in known:
+        share = FLIGHTS if what == "heyoka batch" else 1
+        found[what].append({"median_s": min(times) / share, "attitude_error_rad": error})
+    return {what: sorted(rows, key=lambda r: r["median_s"]) for what, rows in found.items() if rows}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="P2,P2x100,damped,heavy,pokes")
+    parser.add_argument("--seconds", type=float, default=2.0, help="of timing, for each problem")
+    options = parser.parse_args()
+    table = ResultTable(Path(__file__).parent / "results" / "heyoka.csv", COLUMNS)
+    for name in options.only.split(","):
+        found = curves(PROBLEMS[name], options.seconds)
+        for target in TARGETS:
+            theirs = time_at_error(found["heyoka"], target)
+            for what, rows in found.items():
+                mine = time_at_error(rows, target)
+                row = {"problem": name, "what": what, "error_rad": target, "us": 1e6 * mine}
+                table.add({**row, "heyoka_us": 1e6 * theirs, "ratio": theirs / mine})
+                print(
+                    f"{name} at {target:g} rad: {what} {1e6 * mine:.2f} us, heyoka {1e6 * theirs:.2f} us: {theirs / mine:.2f}",
+                    flush=True,
+                )
+    table.write()
+
+
+if __name__ == "__main__":
+    main()
