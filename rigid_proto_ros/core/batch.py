@@ -15,7 +15,7 @@ from .batch_body import BODY, GYROSCOPIC, make_body_row
 from .batch_flight import AUTO, FIXED_STEPS, KERNELS, ONE_EXACT_STEP, fly
 from .compilation import njit
 from .flight_measures import measure_flight
-from .integrators import series_steps, taylor_adaptive
+from .integrators import series_steps, stiff_steps, taylor_adaptive
 from .integrators.auto import AUTO as AUTO_INTEGRATOR
 from .integrators.auto import steady_steps
 from .integrators.free_body import FREE_BODY, free_body_steps
@@ -158,9 +158,10 @@ def _no_adaptive_steps(y, p, control, following, workspace, span_ns, look):
 @cache
 def _kernels(integrator: Integrator) -> tuple:
     """The compiled kernels that an integrator may call, in the order of batch_flight's methods."""
-    kernels: list[Any] = [_no_steps, _no_steps, _no_steps, _no_adaptive_steps, _no_adaptive_steps]
+    kernels: list[Any] = [*[_no_steps] * 3, *[_no_adaptive_steps] * 3]
     if integrator.name == AUTO_INTEGRATOR.name:
-        kernels = [steady_steps, free_body_steps, _no_steps, taylor_adaptive.steps, series_steps.steps]
+        adaptive = (taylor_adaptive.steps, series_steps.steps, stiff_steps.steps)
+        kernels = [steady_steps, free_body_steps, _no_steps, *adaptive]
     elif integrator.name == FREE_BODY.name:
         kernels[1] = free_body_steps
     else:

@@ -21,9 +21,10 @@ from .acting import NEVER
 from .compilation import njit
 from .integrators import control as ctl
 from .integrators import motion_series, taylor
-from .integrators.auto import ANY_LOADS, FREE, STEADY, TURNING_LOADS, kind_of_segment
+from .integrators.auto import ANY_LOADS, FREE, STEADY, STIFF, TURNING_LOADS, kind_of_segment
 from .integrators.integrator import MAX_SPEED
 from .integrators.series_steps import rows
+from .integrators.stiff_steps import STAGE_ROWS
 from .loads import FORCE_BODY, FORCE_WORLD, LOADS_SIZE, MAX_ACCELERATION, MOMENT, TORQUE_BODY, TORQUE_WORLD
 from .motion import STORED, to_good_row, to_variables
 from .quantities import STATE, begin, which_is_met
@@ -46,7 +47,7 @@ LOAD = 14
 AUTO, ONE_EXACT_STEP, FIXED_STEPS = range(3)
 """How an integrator steps."""
 
-_STEADY, _FREE, _FIXED, _TAYLOR, _SERIES, _ASLEEP = range(6)
+_STEADY, _FREE, _FIXED, _TAYLOR, _SERIES, _STIFF, _ASLEEP = range(7)
 
 # That functions as values are experimental is no news for users: a test holds every state to the simulation's bits.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -58,7 +59,7 @@ ADAPTIVE_STEPS = types.FunctionType(
     int64(float64[::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], int64, boolean)
 )
 """A kernel (y, p, control, following, workspace, span_ns, look)."""
-KERNELS = types.Tuple((STEPS, STEPS, STEPS, ADAPTIVE_STEPS, ADAPTIVE_STEPS))
+KERNELS = types.Tuple((STEPS, STEPS, STEPS, ADAPTIVE_STEPS, ADAPTIVE_STEPS, ADAPTIVE_STEPS))
 """What the methods above call."""
 
 
@@ -207,6 +208,8 @@ def _method(stepping, p, y):
         return _FREE
     if kind == TURNING_LOADS:
         return _TAYLOR
+    if kind == STIFF:
+        return _STIFF
     return _SERIES if kind == ANY_LOADS else _ASLEEP
 
 
@@ -223,6 +226,8 @@ def _commit(method, kernels, y, p, control, following, room, step_ns, span_ns):
         advanced = kernels[_TAYLOR](y, p, control, following, room[0], span_ns, False)
     elif method == _SERIES:
         advanced = kernels[_SERIES](y, p, control, following, room[1], span_ns, False)
+    elif method == _STIFF:
+        advanced = kernels[_STIFF](y, p, control, following, room[2], span_ns, False)
     else:
         return 0
     return -1 if control[ctl.FAILED] != 0.0 else int(advanced)
@@ -242,6 +247,8 @@ def _reach(method, kernels, y, p, control, following, room, rest_ns):
         return kernels[_FIXED](y, p, h, 1) == 1
     if method == _TAYLOR:
         return kernels[_TAYLOR](y, p, control, following, room[0], rest_ns, True) == rest_ns
+    if method == _STIFF:
+        return kernels[_STIFF](y, p, control, following, room[2], rest_ns, True) == rest_ns
     return kernels[_SERIES](y, p, control, following, room[1], rest_ns, True) == rest_ns
 
 
@@ -265,7 +272,11 @@ def fly(settings, times, body, gyroscopic, stepping, kernels, commands, loads, l
     p, y, trial = np.zeros(pr.SIZE), np.zeros(STORED), np.zeros(STORED)
     control, following = np.zeros(ctl.SIZE), np.zeros(STORED)
     degree = times[b.DEGREE]
-    room = (np.zeros((degree + 1, taylor.COLUMNS)), np.zeros((rows(degree), motion_series.COLUMNS)))
+    room = (
+        np.zeros((degree + 1, taylor.COLUMNS)),
+        np.zeros((rows(degree), motion_series.COLUMNS)),
+        np.zeros((STAGE_ROWS, STORED)),
+    )
     common = np.zeros(pr.SIZE)
     _problem_of_body(body, settings, gyroscopic, common)
     pulses, ends_ns = np.zeros(count, np.int64), np.zeros(count, np.int64)

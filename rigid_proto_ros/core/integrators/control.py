@@ -26,7 +26,8 @@ LAW = 10  # the string's law at its start
 SWITCH = 11  # time after which the last series holds and no more the first [s]; infinite for none
 LAST_START = 12  # where the last series starts [s]
 LAST_LAW = 13  # the law of the last series
-SIZE = 14
+NEXT = 14  # length proposed for the next step [s], by those methods that reject steps; 0 at a segment's start
+SIZE = 15
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
