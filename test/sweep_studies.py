@@ -97,3 +97,15 @@ PULLED = {
 def study(spec: dict, **changes) -> Study:
     """A study with some keys changed."""
     return make_study({**spec, **changes})
+
+
+HONEY = {
+    **POKES,
+    "samples": 6,
+    "vary": {
+        "angular_damping": {"log_uniform": [1e-3, 1e6]},
+        "linear_damping": {"log_uniform": [1.0, 1e9]},
+        "script.4.duration": {"uniform": [0.05, 0.3]},
+    },
+}
+"""Damping from soft to as stiff as it can be."""

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from sweep_studies import POKES, PULLED, STRUCTURE, study
+from sweep_studies import HONEY, POKES, PULLED, STRUCTURE, study
 
 from rigid_proto_ros.core.integrators import INTEGRATORS
 from rigid_proto_ros.sweep.chunk import Chunk, run_chunk
@@ -29,7 +29,7 @@ def differing_rows(own, chunk: Chunk) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("spec", [POKES, STRUCTURE, PULLED], ids=["pokes", "structure", "string"])
+@pytest.mark.parametrize("spec", [POKES, STRUCTURE, PULLED, HONEY], ids=["pokes", "structure", "string", "stiff"])
 def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
     own = study(spec)
     chunk = run_chunk(own, 0, own.rows)
@@ -37,7 +37,7 @@ def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
     failed = sum(reason is not None for reason in chunk.columns["failure"])
     if spec is PULLED:
         assert chunk.simulated == own.rows and failed == 0
-    elif spec is POKES:
+    elif spec in (POKES, HONEY):
         assert chunk.simulated == 0
     else:
         # A ballast below zero is a row with its reason, and the others go through the batch.

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from .accelerations import specific_force
+from .accuracy_floor import accuracy_floor
 from .acting import ActingLoads
 from .loads import LoadSum
 from .segment import Segment
@@ -49,6 +50,16 @@ class Readings:
     def floor_binds(self) -> bool:
         """Rounding, not the accuracy asked for, limits some step of the present segment."""
         return self._segment.stepper.floor_binds
+
+    @property
+    def accuracy_floor(self) -> str:
+        """Why rounding, and not the accuracy asked for, limits the present segment; empty when it doesn't or nothing adapts to it."""
+        setup, segment = self.setup, self._segment
+        if setup.integrator.name not in ("auto", "free_body"):
+            return ""
+        elapsed = (self.state.time_ns - segment.start_ns) * 1e-9
+        exact = segment.evaluates_once
+        return accuracy_floor(setup, self.state, segment.stepper.floor_binds, exact, elapsed)
 
     @property
     def too_coarse(self) -> str:

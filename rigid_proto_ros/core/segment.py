@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .integrators.integrator import MAX_SPEED, Integrator
+from .integrators.stepping import OneStep
 from .motion import HAND_WORK, HEAT, new_variables, to_good_row
 from .problem import HAS_STRING
 from .state import State
@@ -51,6 +52,11 @@ class Segment:
     def steps(self) -> int:
         """Steps committed so far."""
         return self.stepper.steps
+
+    @property
+    def evaluates_once(self) -> bool:
+        """Whether the segment is one exact step, however long, of a body that turns."""
+        return isinstance(self.stepper, OneStep) and not self.stepper.sleeping
 
     @property
     def evaluations(self) -> int:

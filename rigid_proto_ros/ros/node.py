@@ -247,6 +247,7 @@ class RigidBodyNode(Node):
             "angular_momentum_drift": simulation.angular_momentum_drift,
             "integrator": simulation.setup.integrator.name,
             "integrator_choice": simulation.choice,
+            "accuracy_floor": simulation.accuracy_floor,
             "steps": simulation.steps,
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",

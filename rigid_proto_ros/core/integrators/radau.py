@@ -401,8 +401,6 @@ def radau_step(y, p, h, taut, V, out):
     return evaluations
 
 
-
-
 @njit(cache=True, error_model="numpy")
 def stage_variables(y, p, h, V, i, out):
     """Variables at stage i of a step of h seconds from y with velocities V at its stages, into out; returns the stage's time [s]."""
