@@ -28,7 +28,6 @@ def test_an_exact_step_says_when_rounding_is_more_than_the_accuracy(body, spin, 
     simulation = flight(body, integrator="auto", accuracy=accuracy, initial=spinning(spin))
     row = simulation.advance(SECOND).row
     exact, _ = free_motion(body.inertia, spin, 1)
-    # 1e5 rad/s: 1e-11 rad; the needle 4e-9 rad; everyday 1e-15 rad.
     assert angle_between(row[3:7], exact) <= accuracy or simulation.accuracy_floor
     assert bool(simulation.accuracy_floor) == (body is not BOX or max(spin) > 1e3)
 

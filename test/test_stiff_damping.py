@@ -43,7 +43,6 @@ def test_a_spin_soon_goes_as_fast_as_its_torque_keeps_up(rate, accuracy):
         half = [float(mp.sin(angle / 2)), float(mp.cos(angle / 2))]
         speed = float(slow + (spin - slow) * kept)
     error = distance(row, (0, 0, *half), np.zeros(3), np.zeros(3), np.array([0, 0, speed]))
-    # Measured up to 3e-14 at 1e-12.
     assert error <= accuracy
     assert simulation.force_evaluations <= MOST_EVALUATIONS
     assert simulation.steps <= 300

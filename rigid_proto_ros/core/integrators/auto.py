@@ -105,7 +105,7 @@ def damping_is_stiff(p, y):
     """Whether some damping of a segment with problem p from variables y on is so much faster than the motion beside it that it, and
     not the motion, would set the length of explicit steps.
 
-    An explicit step of about 1.5/λ costs 2 µs (15 µs with a string), an implicit one of 0.3 of a radian 200 µs.
+    An explicit step is about 1.5/λ long; an implicit one is some tenths of a radian of the motion, and costs some hundred times as much.
     """
     spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
     smallest = p[MOMENTS]
