@@ -17,7 +17,7 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @BOTH
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
     demo = RosProcess("rigid_proto", "demo", "--out", tmp_path, environment=ros_environment, log=tmp_path / "demo")
-    demo.wait_for("3. flying")
+    demo.wait_for("3. simulating")
     children = descendants(demo.pid)
     assert children
     assert demo.end(number) == 0, demo.errors
