@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .command_codec import command_of_event, frame_names
-from .core.commands import Command
+from .core.commands import Change, Command
 from .core.errors import InputError
 from .core.observer import Observer
 from .core.simulation import Simulation
@@ -74,6 +74,7 @@ class Resimulation:
         self._observer = observer or Observer()
         self.ghost: Ghost | None = None
         self._mesh_of = mesh_of
+        self._changes_ns = -1
         self.node_name = node_name
         waiting: list[tuple[int, str, dict, Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
@@ -100,8 +101,12 @@ class Resimulation:
         if command is None:
             self.simulation.log(kind, content)
         else:
-            # What acted at one instant acts in the order of the log, whatever rule made it; it was judged then.
-            self.simulation.submit(command, time_ns, (b"", number), (None, self.simulation.setup))
+            if isinstance(command, Change):
+                self._changes_ns = time_ns
+            # What acts under a change of its own instant can't be judged before that acts.
+            judged = (None, self.simulation.setup) if self._changes_ns == time_ns else None
+            # What acted at one instant acts in the order of the log, whatever rule made it.
+            self.simulation.submit(command, time_ns, (b"", number), judged)
 
     def _command(self, kind: str, content: dict, number: int) -> Command | None:
         values = self.scenario.values

@@ -25,6 +25,7 @@ from rigid_proto_ros.session_runs import decode_event
 
 SCENE = {"mesh": "t_handle", "density": 7850.0, "integrator": "rk4", "initial.angular_velocity": [0.5, -2.0, 3.0]}
 BEFORE_LISTS = Path(__file__).parent / "recorded" / "before_lists.mcap"
+"""With rk4, whose rounding is no matter of the version."""
 DONE = [
     {"at": {"vertex": 3}, "impulse": [0.0, 0.0, 0.001]},
     {"set": {"density": 9000.0}},
