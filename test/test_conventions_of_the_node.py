@@ -219,7 +219,7 @@ def test_a_second_node_of_the_same_name_is_warned_of_by_both(ros_environment, tm
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
         nodes = [NodeProcess(environment, tmp_path / f"{k}.log", {"mesh": "t_handle"}) for k in (1, 2)]
-        said = "somebody else publishes /rigid_body/pose too"
+        said = "another node publishes /rigid_body/pose"
         try:
             with RosClient(environment) as client:
                 client.until(lambda: all(node.log.read_text().count(said) == 1 for node in nodes), "a warning of each")

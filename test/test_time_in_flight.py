@@ -130,7 +130,7 @@ def test_stamps_zero_and_past_mean_now_and_one_of_the_systems_clock_is_told_apar
     gained = rig.gained(before)
     assert gained == {"late": 2, "wall_stamp": 2, "refused_total": 1, "refused_stamp": 1}
     # Told once in the node's life, and counted from then on.
-    assert rig.node_process.log.read_text().count("stamped by the system's clock") == 1
+    assert rig.node_process.log.read_text().count("stamped with the system's clock") == 1
     pokes = rig.wait_event("poke", 5)
     assert len(pokes) == 5
     acted_before = int(rig.diagnostics()["sim_time_ns"])
