@@ -22,6 +22,7 @@ ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
 ALLOWED = {
     "numpy": (f"{PACKAGE}.",),
     "numba": (f"{PACKAGE}.core.", f"{PACKAGE}.mesh_"),
+    "llvmlite": (f"{PACKAGE}.core.",),  # comes with numba
     "yaml": (
         f"{PACKAGE}.scene_file",
         f"{PACKAGE}.plain_yaml",
@@ -94,7 +95,7 @@ def test_core_imports_numpy_numba_the_standard_library_and_itself() -> None:
     def allowed(module: str, name: str) -> bool:
         top = name.split(".")[0]
         return not within(module, f"{PACKAGE}.core.") or (
-            top in ("numpy", "numba") or top in sys.stdlib_module_names or within(name, f"{PACKAGE}.core.")
+            top in ("numpy", "numba", "llvmlite") or top in sys.stdlib_module_names or within(name, f"{PACKAGE}.core.")
         )
 
     assert not complaints(allowed)
