@@ -69,9 +69,9 @@ def starts_of(simulation, until_ns: int, count: int) -> list[tuple]:
         segment = simulation._segment
         if simulation._segment.start.time_ns == at_ns:
             continue
-        y = segment._variables.copy()
-        if segment.stepper.look(y, segment._problem, int(at_ns) - segment.committed_ns):
-            found.append((segment._problem.copy(), y, (at_ns - segment.start.time_ns) * 1e-9))
+        # The shorter step that was taken to the time asked for.
+        y = segment.sampled.copy()
+        found.append((segment.problem.copy(), y, (at_ns - segment.start.time_ns) * 1e-9))
     return found
 
 

@@ -162,11 +162,11 @@ def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None
     # A command at time 0 acts with the first advance beyond it.
     simulation.advance(1)
     segment = simulation._segment
-    p, kernel = segment._problem, INTEGRATORS[integrator].kernel_for(segment._problem)
+    p, kernel = segment.problem, INTEGRATORS[integrator].kernel_for(segment.problem)
     if kernel is None:
         return None
     begin = time.perf_counter()
-    start = segment._variables.copy()
+    start = segment.variables.copy()
     kernel(start.copy(), p, 1e-9, 1)
     compile_s = time.perf_counter() - begin
     now = {}

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 from flights import SECOND
+from one_segment import OneSegment, make_problem
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
 from rigid_proto_ros.core.body import make_body
@@ -22,8 +23,6 @@ from rigid_proto_ros.core.integrators.integrator import (
     Integrator,
 )
 from rigid_proto_ros.core.loads import LoadSum, cross
-from rigid_proto_ros.core.problem import make_problem
-from rigid_proto_ros.core.segment import Segment
 from rigid_proto_ros.core.state import State
 from rigid_proto_ros.core.string import StringSettings, Tied, tie
 
@@ -129,7 +128,7 @@ def flown(integrator: Integrator | str, scene: Scene, step_ns: int, until_ns: in
     """The state at ``until_ns`` by fixed steps."""
     integrator = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
     problem, start = scene.problem_and_start()
-    segment = Segment(start, problem, integrator, step_ns)
+    segment = OneSegment(start, problem, integrator, step_ns)
     segment.advance(until_ns)
     return segment.look(until_ns)
 

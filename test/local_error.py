@@ -50,22 +50,23 @@ def committed_steps(
             continue
         simulation.advance(int(start_ns))
         segment, portion = simulation._segment, 1000
+        number = segment.number
         while simulation.time_ns < until_ns:
-            steps, begin_ns, before = segment.steps, segment.committed_ns, segment._variables.copy()
+            steps, begin_ns, before = segment.steps, segment.committed_ns, segment.variables.copy()
             simulation.advance(min(until_ns, simulation.time_ns + portion))
-            if simulation._segment is not segment:
+            if segment.number != number:
                 break
             taken = segment.steps - steps
             if taken == 1:
                 origin_ns = segment.start.time_ns
                 found.append(
                     CommittedStep(
-                        segment._problem.copy(),
+                        segment.problem.copy(),
                         before,
-                        segment._variables.copy(),
+                        segment.variables.copy(),
                         begin_ns - origin_ns,
                         segment.committed_ns - origin_ns,
-                        segment.stepper.floor_binds,
+                        segment.floor_binds,
                     )
                 )
                 break

@@ -28,7 +28,7 @@ import numpy as np
 from ..compilation import njit
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
 from .runge_kutta import advance, is_good, rates, stages
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 TABLEAU = np.array([[0.0, 0.0], [1.0, 0.0]])
 WEIGHTS = np.array([0.5, 0.5])
@@ -56,7 +56,7 @@ HEUN = Integrator(
     stability_limit=1.0,
     carries=LOADS | {ANGULAR_DAMPING, NO_GYROSCOPIC_TERM},
     kernel=heun_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )
 '''
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from flights import AT_REST, SECOND, flight, spinning, wrench
 from integrator_scenes import MASS, ROW, TENSOR, Scene, error
+from one_segment import OneSegment
 from reference_motion import angle_between, free_motion
 
 from rigid_proto_ros.core.body import make_body
@@ -16,7 +17,6 @@ from rigid_proto_ros.core.integrators.integrator import (
     NO_GYROSCOPIC_TERM,
     WORLD_TORQUE,
 )
-from rigid_proto_ros.core.segment import Segment
 from rigid_proto_ros.core.string import StringSettings
 
 BODY = make_body(MASS, (0.0, 0.0, 0.0), TENSOR)
@@ -95,7 +95,7 @@ def test_the_global_error_follows_the_accuracy(scene, accuracy):
     scene = SCENES[scene]
     reference = scene.reference([1.0])[0]
     problem, start = scene.problem_and_start()
-    segment = Segment(start, problem, INTEGRATORS["auto"], SECOND // 1000, accuracy)
+    segment = OneSegment(start, problem, INTEGRATORS["auto"], SECOND // 1000, accuracy)
     segment.advance(SECOND)
     # Local rates add up to at most the accuracy here, rounding aside: measured up to 0.4 of it.
     assert error(segment.look(SECOND), reference) <= accuracy + 1e-13

@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 from flights import spinning
+from one_segment import make_problem
 
 from rigid_proto_ros.core.body import make_body
 from rigid_proto_ros.core.integrators import INTEGRATORS
 from rigid_proto_ros.core.integrators.integrator import STRING
 from rigid_proto_ros.core.loads import LoadSum
 from rigid_proto_ros.core.motion import new_variables
-from rigid_proto_ros.core.problem import make_problem
 from rigid_proto_ros.core.rotation import matrix_from_quaternion
 from rigid_proto_ros.core.state import State
 from rigid_proto_ros.core.string import StringSettings, tie

@@ -32,7 +32,7 @@ def drifts(name: str, steps: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Step counts, half-decade by half-decade, the largest drift of E and L up to each, and the largest | |q|² − 1 |."""
     simulation = flight(make_body(2.0, np.zeros(3), TENSOR), integrator=name, initial=spinning(SPIN))
     segment = simulation._segment
-    p, y = segment._problem, segment._variables.copy()
+    p, y = segment.problem, segment.variables.copy()
     moments, kernel = p[MOMENTS : MOMENTS + 3].copy(), INTEGRATORS[name].kernel_for(p)
     start = invariants(y, moments)
     L = np.linalg.norm(start[1:4])
@@ -74,9 +74,9 @@ def test_energy_and_momentum_walk_at_random_for_a_hundred_million_steps(name):
 def test_attitudes_stay_rotations_for_a_million_steps(name):
     simulation = flight(make_body(2.0, np.zeros(3), TENSOR), integrator=name, initial=spinning((0.07, 0.19, -0.06)))
     segment = simulation._segment
-    y, kernel = segment._variables.copy(), INTEGRATORS[name].kernel_for(segment._problem)
+    y, kernel = segment.variables.copy(), INTEGRATORS[name].kernel_for(segment.problem)
     for _ in range(100):
-        assert kernel(y, segment._problem, 1e-3, STEPS // 100) == STEPS // 100
+        assert kernel(y, segment.problem, 1e-3, STEPS // 100) == STEPS // 100
         # |RᵀR − 1| of the matrix of q is at most twice this.
         assert abs((y[:4] ** 2).sum() - 1.0) <= 2e-15
 

@@ -5,28 +5,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numba import boolean, float64, int64, types
-from numba.core.types.function_type import CompileResultWAP
 
-from .batch_body import BODY, GYROSCOPIC, make_body_row
-from .batch_flight import AUTO, FIXED_STEPS, KERNELS, ONE_EXACT_STEP, fly
+from . import batch_body as b
+from . import flight as fl
+from . import problem as pr
+from .batch_body import GYROSCOPIC, make_body_row
+from .body import BODY, INERTIA, MASS
 from .compilation import njit
 from .flight_measures import measure_flight
-from .integrators import series_steps, stiff_steps, taylor_adaptive
-from .integrators.auto import AUTO as AUTO_INTEGRATOR
-from .integrators.auto import steady_steps
-from .integrators.free_body import FREE_BODY, free_body_steps
 from .integrators.integrator import Integrator
-from .quantities import CONTEXT, STATE
+from .integrators.stepping import COLUMNS, METHOD, ROWS, method_table, provide_kernel
+from .integrators.taylor_adaptive import MAX_DEGREE
+from .loads import LOAD, is_within_magnitude
+from .quantities import CONTEXT, STATE, begin, which_is_met
 
 
 @dataclass
 class Variants:
     """Many variations of one scene. settings (n, SETTINGS), times (n, TIMES), ballast (n, k, 4), constants (CONSTANTS,):
-    core/batch_body.py. commands (n, c, 3), loads (n, c, LOAD): core/batch_flight.py. Those alike in all have one row only.
+    core/batch_body.py. commands (n, c, 3), loads (n, c, LOAD): core/flight.py and core/loads.py. Those alike in all have one row only.
     """
 
     settings: np.ndarray
@@ -41,16 +41,11 @@ class Variants:
         return len(self.settings)
 
     @property
-    def stepping(self) -> int:
-        """How the integrator steps, as core/batch_flight.py numbers it."""
-        return {AUTO_INTEGRATOR.name: AUTO, FREE_BODY.name: ONE_EXACT_STEP}.get(self.integrator.name, FIXED_STEPS)
-
-    @property
     def arrays(self) -> tuple:
         """What the compiled call takes of it."""
         ints = (self.times, self.commands)
         floats = (self.settings, self.ballast, self.constants, self.loads)
-        return (*map(np.ascontiguousarray, (*floats, *ints)), self.stepping, _kernels(self.integrator))
+        return (*map(np.ascontiguousarray, (*floats, *ints)), self.integrator.chooses, _methods(self.integrator))
 
 
 @dataclass
@@ -80,44 +75,109 @@ _VARIANTS = (
     float64[:, :, ::1],  # loads
     int64[:, ::1],  # times
     int64[:, :, ::1],  # commands
-    int64,  # stepping
-    KERNELS,
+    boolean,  # the method is chosen by what a segment holds
+    int64[:, :, ::1],  # methods by degree
 )
 _LOOKS = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
 _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1])
 
 
 @njit(cache=True, error_model="numpy")
-def _one(
-    i, settings, ballast, constants, loads, times, commands, stepping, kernels, body, looks_ns, stops, context, states
+def _fly(
+    settings, times, body, gyroscopic, chooses, methods, commands, loads, looks_ns, stops, context, tables, states
 ):
-    """Body and flight of variation i; as ``fly`` returns."""
+    """One flight: fills states (m, STATE) at looks_ns (m,) ascending, each before what acts at that very time.
+
+    settings (SETTINGS,), times (TIMES,), body (BODY,): core/batch_body.py. methods: core/integrators/stepping.py. commands
+    (c, 3) in the order in which they act and loads (c, LOAD). stops (k, 3): the flight ends at the first look at which one
+    holds. context: core/quantities.py, filled here. tables: arrays of core/flight.py with room for all. Returns how many looks
+    it reached, and which stop held or −1; 0 looks: the simulation must say what is wrong.
+    """
+    f, n, rows_ns, rows, events = tables
+    count = commands.shape[0]
+    for c in range(count):
+        if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
+            return 0, -1
+    n[:] = 0
+    n[fl.HELD] = fl.NOBODY
+    row = f[fl.ROW : fl.ROW + 13]
+    if not b.initial_row(settings, row):
+        return 0, -1
+    states[0, :13], states[0, 13] = row, 0.0
+    g = settings[b.GRAVITY : b.GRAVITY + 3]
+    begin(body[MASS], body[INERTIA : INERTIA + 9], g, states[0], context)
+    f[fl.START : fl.START + 13] = row
+    f[fl.BODY : fl.BODY + BODY] = body
+    damping = (settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING])
+    pr.begin_body(f[fl.COMMON : fl.COMMON + pr.SIZE], body, g, damping[0], damping[1], gyroscopic)
+    f[fl.ACCURACY], f[fl.DEGREE] = settings[b.ACCURACY], times[b.DEGREE]
+    n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
+    n[fl.CHOOSES] = 1 if chooses else 0
+    for c in range(count):
+        rows_ns[c, :3] = commands[c]
+        rows[c, :LOAD] = loads[c]
+    n[fl.DUE_END] = count
+    fl.begin_segment(f, n, rows, methods)
+    for look in range(looks_ns.shape[0]):
+        if fl.fly(f, n, rows_ns, rows, events, methods, looks_ns[look]) != fl.REACHED:
+            return 0, -1
+        states[look, :13], states[look, 13] = row, 0.0
+        stop = which_is_met(stops, states[look], context)
+        if stop >= 0:
+            return look + 1, stop
+    return looks_ns.shape[0], -1
+
+
+@njit(cache=True, error_model="numpy")
+def _one(
+    i,
+    settings,
+    ballast,
+    constants,
+    loads,
+    times,
+    commands,
+    chooses,
+    methods,
+    body,
+    looks_ns,
+    stops,
+    context,
+    tables,
+    states,
+):
+    """Body and flight of variation i; as ``_fly`` returns."""
     own = settings[i if settings.shape[0] > 1 else 0]
     if not make_body_row(own, ballast[i if ballast.shape[0] > 1 else 0], constants, body):
         return 0, -1
-    c = i if commands.shape[0] > 1 else 0
+    command = commands[i if commands.shape[0] > 1 else 0]
     load = loads[i if loads.shape[0] > 1 else 0]
     own_times = times[i if times.shape[0] > 1 else 0]
-    return fly(
-        own,
-        own_times,
-        body,
-        constants[GYROSCOPIC],
-        stepping,
-        kernels,
-        commands[c],
-        load,
-        looks_ns,
-        stops,
-        context,
-        states,
+    method = methods[own_times[b.DEGREE]]
+    gyroscopic = constants[GYROSCOPIC]
+    return _fly(
+        own, own_times, body, gyroscopic, chooses, method, command, load, looks_ns, stops, context, tables, states
     )
+
+
+@njit(cache=True, error_model="numpy")
+def _tables(variants, references):
+    """Arrays of core/flight.py with room for any of these flights."""
+    commands, room = 0, 0
+    for side in (variants, references):
+        commands = max(commands, side[5].shape[1])
+        for method in side[7].reshape((-1, METHOD)):
+            room = max(room, method[ROWS] * method[COLUMNS])
+    rows = commands + 1
+    f, n = np.zeros(fl.ROOM + room), np.zeros(fl.INTEGERS, np.int64)
+    events = np.zeros((4 * rows + 4, fl.EVENT), np.int64)
+    return f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
 
 
 def _fly_block(first, last, variants, references, has_references, looks_ns, watched, stops, measures, results):
     """Variations first to last − 1."""
     status, end_ns, stop, measured, finals = results
-    body, context = np.zeros(BODY), np.zeros(CONTEXT)
+    body, context, tables = np.zeros(BODY), np.zeros(CONTEXT), _tables(variants, references)
     states = np.zeros((looks_ns.shape[0], STATE))
     others = np.zeros((looks_ns.shape[0] if has_references else 1, STATE))
     # One place that flies, whichever it is: a second one would be compiled a second time.
@@ -126,7 +186,7 @@ def _fly_block(first, last, variants, references, has_references, looks_ns, watc
         status[i] = 0
         reached = 0
         for side in range(0 if has_references else 1, 2):
-            reached, stop[i] = _one(i, *sides[side], body, looks_ns, ends[side], context, kept[side])
+            reached, stop[i] = _one(i, *sides[side], body, looks_ns, ends[side], context, tables, kept[side])
             if reached == 0:
                 break
         if reached == 0:
@@ -145,34 +205,15 @@ def _compiled():
     return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_block)
 
 
-@njit(cache=True)
-def _no_steps(y, p, h, n):
-    return 0
-
-
-@njit(cache=True)
-def _no_adaptive_steps(y, p, control, following, workspace, span_ns, look):
-    return 0
-
-
 @cache
-def _kernels(integrator: Integrator) -> tuple:
-    """The compiled kernels that an integrator may call, in the order of batch_flight's methods."""
-    kernels: list[Any] = [*[_no_steps] * 3, *[_no_adaptive_steps] * 3]
-    if integrator.name == AUTO_INTEGRATOR.name:
-        adaptive = (taylor_adaptive.steps, series_steps.steps, stiff_steps.steps)
-        kernels = [steady_steps, free_body_steps, _no_steps, *adaptive]
-    elif integrator.name == FREE_BODY.name:
-        kernels[1] = free_body_steps
-    else:
-        kernels[2] = integrator.kernel
-    for kernel, taken in zip(kernels, KERNELS, strict=True):
-        kernel.compile(taken.signature)
-    # The compiled results themselves: dispatchers would be looked through again at every call.
-    return tuple(
-        CompileResultWAP(kernel.get_compile_result(taken.signature))
-        for kernel, taken in zip(kernels, KERNELS, strict=True)
-    )
+def _methods(integrator: Integrator) -> np.ndarray:
+    """Tables of the integrator's methods by degree, with the kernels that a flight without a string calls."""
+    tables = [method_table(integrator, degree) for degree in range(MAX_DEGREE + 1)]
+    for table in tables:
+        for number, method in enumerate(integrator.methods):
+            if not method.on_string:
+                provide_kernel(integrator, table, number)
+    return np.array(tables)
 
 
 def fly_variants(

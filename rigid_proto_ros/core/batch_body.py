@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from .body import AXES, BODY_SCALE, COM, INERTIA, LENGTH, MASS, MOMENTS, QUATERNION
 from .compilation import njit
 from .inertia_tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
 from .mass_properties import SCALE_LIMITS, loaded, stretched
@@ -52,17 +53,6 @@ GYROSCOPIC = 22
 CONSTANTS = 23
 
 EXPLICIT, ORDINARY, SHELL = 0, 1, 2
-
-# A row of a body.
-MASS = 0
-COM = 1  # (3,) [m, mesh axes after scaling]
-INERTIA = 4  # (9,) row by row
-MOMENTS = 13  # (3,) ascending
-AXES = 16  # (9,) principal axes row by row
-QUATERNION = 25  # (4,) principal to body
-BODY_SCALE = 29  # (3,)
-LENGTH = 32  # ℓ [m]
-BODY = 33
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,15 +1,60 @@
 # SPDX-License-Identifier: MIT
-"""The rigid body: mass properties, principal axes, and where mesh points lie on it."""
+"""The rigid body: mass properties, principal axes, and where mesh points lie on it.
+
+Compiled kernels read a body as a row of BODY doubles.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from .compilation import njit
 from .inertia_tensor import principal_axes
 from .rotation import quaternion_from_matrix
+
+# Where the numbers of a body stand in its row.
+MASS = 0
+COM = 1  # (3,) [m, mesh axes after scaling]
+INERTIA = 4  # (9,) row by row
+MOMENTS = 13  # (3,) ascending
+AXES = 16  # (9,) principal axes row by row
+QUATERNION = 25  # (4,) principal to body
+BODY_SCALE = 29  # (3,)
+LENGTH = 32  # ℓ, what displacement errors are measured by [m]; 1 where no mesh gives it a size
+BODY = 33
+
+
+@njit(cache=True, error_model="numpy")
+def angular_acceleration(body, x, y, z):
+    """I⁻¹ τ of a torque x, y, z, in body axes."""
+    P, m = AXES, MOMENTS
+    a = (body[P] * x + body[P + 3] * y + body[P + 6] * z) / body[m]
+    b = (body[P + 1] * x + body[P + 4] * y + body[P + 7] * z) / body[m + 1]
+    c = (body[P + 2] * x + body[P + 5] * y + body[P + 8] * z) / body[m + 2]
+    return (
+        body[P] * a + body[P + 1] * b + body[P + 2] * c,
+        body[P + 3] * a + body[P + 4] * b + body[P + 5] * c,
+        body[P + 6] * a + body[P + 7] * b + body[P + 8] * c,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def arm(body, x, y, z):
+    """Mesh coordinates x, y, z to metres from the COM, body axes."""
+    s, c = BODY_SCALE, COM
+    return x * body[s] - body[c], y * body[s + 1] - body[c + 1], z * body[s + 2] - body[c + 2]
+
+
+@njit(cache=True, error_model="numpy")
+def normal(body, x, y, z):
+    """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
+    x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size
 
 
 @dataclass(frozen=True)
@@ -29,38 +74,31 @@ class Body:
     principal_quaternion: np.ndarray
 
     @cached_property
-    def smallest_moment(self) -> float:
-        """I₁ [kg m²] as a plain float."""
-        return float(self.principal_moments[0])
-
-    @cached_property
-    def _placement(self) -> list[tuple[float, float]]:
-        return list(zip(self.scale.tolist(), self.center_of_mass.tolist(), strict=True))
-
-    def arm(self, mesh_point: tuple[float, float, float]) -> tuple[float, float, float]:
-        """``point`` of plain floats."""
-        (a, x), (b, y), (c, z) = self._placement
-        return mesh_point[0] * a - x, mesh_point[1] * b - y, mesh_point[2] * c - z
+    def row(self) -> np.ndarray:
+        """The body as compiled kernels read it (BODY,)."""
+        row = np.ones(BODY)
+        row[MASS] = self.mass
+        row[COM : COM + 3] = self.center_of_mass
+        row[INERTIA : INERTIA + 9] = self.inertia.ravel()
+        row[MOMENTS : MOMENTS + 3] = self.principal_moments
+        row[AXES : AXES + 9] = self.principal_axes.ravel()
+        row[QUATERNION : QUATERNION + 4] = self.principal_quaternion
+        row[BODY_SCALE : BODY_SCALE + 3] = self.scale
+        return row
 
     def point(self, mesh_point) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""
-        return np.asarray(mesh_point) * self.scale - self.center_of_mass
+        x, y, z = mesh_point
+        return np.array(arm(self.row, float(x), float(y), float(z)))
 
     def mesh_point(self, point) -> np.ndarray:
         """Metres from the COM, body axes, to mesh coordinates (3,)."""
         return (np.asarray(point) + self.center_of_mass) / self.scale
 
-    def normal(self, mesh_normal) -> np.ndarray:
-        """A unit normal (3,) of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
-        turned = np.asarray(mesh_normal) / self.scale
-        turned = turned / np.sqrt((turned * turned).sum())
-        return turned
-
     def angular_acceleration(self, torque_body) -> np.ndarray:
         """I⁻¹ τ (3,), both in body axes."""
-        P = self.principal_axes
-        turned = (P * np.asarray(torque_body)[:, None]).sum(axis=0) / self.principal_moments
-        return (P * turned).sum(axis=1)
+        x, y, z = torque_body
+        return np.array(angular_acceleration(self.row, float(x), float(y), float(z)))
 
 
 def make_body(mass: float, center_of_mass, inertia, scale=(1.0, 1.0, 1.0)) -> Body:

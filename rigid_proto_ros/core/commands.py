@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from .errors import CommandRefused
+from .flight import CLEAR
 from .frames import Frame
 from .loads import Load
 from .setup import Setup
@@ -177,11 +178,17 @@ Listed = tuple[bytes, int]
 Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
-@dataclass
+@dataclass(slots=True)
 class Pending:
-    """A command waiting for its time, with its load where that was settled already, and under which setup."""
+    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row (bytes) as the flight's tables hold them, its load where that
+    was settled already, and under which setup.
+    """
 
     time_ns: int
     command: Command
+    listed: Listed | None = None
     load: Load | None = None
     settled_for: Setup | None = None
+    kind: int = CLEAR
+    duration_ns: int = -1
+    row: bytes = b""

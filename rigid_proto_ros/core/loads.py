@@ -4,24 +4,33 @@
 Three kinds of load differ on a turning body: a torque fixed in the world, a world force at a point of the body, and a force
 that turns with the body. Any number of each sums to the same few vectors, because the torque of world forces Fᵢ at body
 points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial vector of M R.
+
+What a load does is compiled, once: live flights, offline ones and sweeps call the functions here on a load's row.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass, replace
+import struct
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
+from numba import boolean, float64
 
+from . import body as of_body
 from .body import Body
+from .compilation import njit
 from .errors import CommandRefused
 from .frames import Frame, point_text
+from .kernel_calls import entry_of
+from .rotation import matrix_elements
 from .state import State
 from .surface import Surface
 
 MAX_ACCELERATION = 1e15
 """m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it would leave no digits."""
-
 
 # Where the sums of loads stand in one row of LOADS_SIZE doubles.
 FORCE_WORLD = 0  # (3,) [N]
@@ -30,11 +39,124 @@ TORQUE_WORLD = 6  # (3,) [N m]
 TORQUE_BODY = 9  # (3,) [N m]
 MOMENT = 12  # (9,) M row by row [N m]
 LOADS_SIZE = 21
-_NO_MOMENT = (0.0,) * 9
+
+# Where the numbers of one load stand in its row of LOAD doubles.
+LOAD_AXES = 0
+WORLD_AXES, BODY_AXES, NORMAL_AXES = 0.0, 1.0, 2.0
+HAS_POINT = 1
+POINT = 2  # (3,) [mesh coordinates]
+FORCE = 5  # (3,) [N, or N s]
+TORQUE = 8  # (3,) [N m, or N m s]
+NORMAL = 11  # (3,) inward, of the unscaled mesh
+LOAD = 14
+
+_AXES = ("world", "body", "normal")
+_AXES_NUMBERS = {"world": WORLD_AXES, "body": BODY_AXES, "normal": NORMAL_AXES}
+_ROW = struct.Struct("=14d")
+_ORIGIN = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Load:
+@njit(cache=True, error_model="numpy")
+def arm_of(load, body):
+    """From the COM to the point of attack [m, body axes]: three numbers."""
+    if load[HAS_POINT] == 0.0:
+        return 0.0, 0.0, 0.0
+    return of_body.arm(body, load[POINT], load[POINT + 1], load[POINT + 2])
+
+
+@njit(cache=True, error_model="numpy")
+def own_force(load, body):
+    """The force in body axes, of a load whose axes turn with the body: three numbers."""
+    f = load[FORCE]
+    if load[LOAD_AXES] == NORMAL_AXES:
+        x, y, z = of_body.normal(body, load[NORMAL], load[NORMAL + 1], load[NORMAL + 2])
+        return f * x, f * y, f * z
+    return f, load[FORCE + 1], load[FORCE + 2]
+
+
+@njit(cache=True, error_model="numpy")
+def _bound(x, y, z):
+    """√3 times the largest component: not below the length, and without its overflow."""
+    return 1.7320508075688772 * max(abs(x), abs(y), abs(z))
+
+
+@njit(cache=True, error_model="numpy")
+def magnitudes(load, body):
+    """Bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes: by |r||F| and the smallest moment."""
+    force = _bound(load[FORCE], load[FORCE + 1], load[FORCE + 2])
+    torque = _bound(load[TORQUE], load[TORQUE + 1], load[TORQUE + 2])
+    if load[HAS_POINT] != 0.0:
+        x, y, z = arm_of(load, body)
+        torque += _bound(x, y, z) * force
+    return force / body[of_body.MASS], torque / body[of_body.MOMENTS]
+
+
+@njit(cache=True, error_model="numpy")
+def is_within_magnitude(load, body):
+    """Whether both stay within MAX_ACCELERATION; an overflow to NaN doesn't."""
+    linear, angular = magnitudes(load, body)
+    return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
+
+
+@functools.cache
+def _within_magnitude() -> Callable:
+    return entry_of(is_within_magnitude, boolean(float64[::1], float64[::1]))
+
+
+@njit(cache=True, error_model="numpy")
+def is_zero(load):
+    """Whether there is neither force nor torque."""
+    return not load[FORCE : FORCE + 6].any()
+
+
+@njit(cache=True, error_model="numpy")
+def share_of(load, body, share):
+    """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r Fᵀ of a world force."""
+    share[:] = 0.0
+    rx, ry, rz = arm_of(load, body)
+    tx, ty, tz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
+    if load[LOAD_AXES] == WORLD_AXES:
+        for j in range(3):
+            f = load[FORCE + j]
+            share[FORCE_WORLD + j] = f
+            if load[HAS_POINT] != 0.0:
+                share[MOMENT + j], share[MOMENT + 3 + j], share[MOMENT + 6 + j] = rx * f, ry * f, rz * f
+        share[TORQUE_WORLD], share[TORQUE_WORLD + 1], share[TORQUE_WORLD + 2] = tx, ty, tz
+        return
+    fx, fy, fz = own_force(load, body)
+    if load[HAS_POINT] != 0.0:
+        tx, ty, tz = tx + (ry * fz - rz * fy), ty + (rz * fx - rx * fz), tz + (rx * fy - ry * fx)
+    share[FORCE_BODY], share[FORCE_BODY + 1], share[FORCE_BODY + 2] = fx, fy, fz
+    share[TORQUE_BODY], share[TORQUE_BODY + 1], share[TORQUE_BODY + 2] = tx, ty, tz
+
+
+@njit(cache=True, error_model="numpy")
+def apply_impulse(load, body, row):
+    """What an impulse does to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
+    a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
+    hx, hy, hz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
+    if load[LOAD_AXES] == WORLD_AXES:
+        jx, jy, jz = load[FORCE], load[FORCE + 1], load[FORCE + 2]
+        fx, fy, fz = a * jx + d * jy + g * jz, b * jx + e * jy + h * jz, c * jx + f * jy + i * jz
+        hx, hy, hz = a * hx + d * hy + g * hz, b * hx + e * hy + h * hz, c * hx + f * hy + i * hz
+    else:
+        fx, fy, fz = own_force(load, body)
+        jx, jy, jz = a * fx + b * fy + c * fz, d * fx + e * fy + f * fz, g * fx + h * fy + i * fz
+    if load[HAS_POINT] != 0.0:
+        rx, ry, rz = arm_of(load, body)
+        hx, hy, hz = hx + (ry * fz - rz * fy), hy + (rz * fx - rx * fz), hz + (rx * fy - ry * fx)
+    if jx != 0.0 or jy != 0.0 or jz != 0.0:
+        row[7] += jx / body[of_body.MASS]
+        row[8] += jy / body[of_body.MASS]
+        row[9] += jz / body[of_body.MASS]
+    if hx != 0.0 or hy != 0.0 or hz != 0.0:
+        x, y, z = of_body.angular_acceleration(body, hx, hy, hz)
+        row[10] += x
+        row[11] += y
+        row[12] += z
+
+
+class Load(NamedTuple):
     """One command's wrench, its point settled on the body.
 
     axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,): the
@@ -52,6 +174,19 @@ class Load:
         return not (any(self.force) or any(self.torque))
 
     @property
+    def packed(self) -> bytes:
+        """The load's row (LOAD,) as bytes."""
+        axes, point, force, torque, normal = self
+        return _ROW.pack(
+            _AXES_NUMBERS[axes], point is not None, *(point or _ORIGIN), *force, *torque, *(normal or _ORIGIN)
+        )
+
+    @property
+    def row(self) -> np.ndarray:
+        """The load as compiled functions read it (LOAD,)."""
+        return np.frombuffer(self.packed).copy()
+
+    @property
     def frame_id(self) -> str:
         """The settled frame: world or body axes, and the point in mesh coordinates."""
         axes = "world" if self.axes == "world" else "body"
@@ -60,7 +195,7 @@ class Load:
 
     def arm(self, body: Body) -> np.ndarray:
         """From the COM to the point of attack (3,) [m, body axes]."""
-        return np.zeros(3) if self.mesh_point is None else body.point(self.mesh_point)
+        return np.array(arm_of(self.row, body.row))
 
     def force_body(self, body: Body, state: State) -> np.ndarray:
         """The force (3,) in body axes at this state."""
@@ -70,35 +205,13 @@ class Load:
 
     def own_force(self, body: Body) -> np.ndarray:
         """The force (3,) in body axes, of a load whose axes turn with the body."""
-        if self.axes == "normal":
-            return self.force[0] * body.normal(self.mesh_normal)
-        return np.asarray(self.force, dtype=float)
-
-    def share(self, body: Body) -> np.ndarray:
-        """What the load adds to the sums (LOADS_SIZE,): forces and torques by axes, and the moment r Fᵀ of a world force."""
-        fx, fy, fz = self.force
-        tx, ty, tz = self.torque
-        rx, ry, rz = (0.0, 0.0, 0.0) if self.mesh_point is None else body.arm(self.mesh_point)
-        if self.axes == "world":
-            moment = (rx * fx, rx * fy, rx * fz, ry * fx, ry * fy, ry * fz, rz * fx, rz * fy, rz * fz)
-            return np.array((fx, fy, fz, 0.0, 0.0, 0.0, tx, ty, tz, 0.0, 0.0, 0.0, *moment))
-        if self.axes == "normal":
-            fx, fy, fz = self.own_force(body).tolist()
-        if self.mesh_point is not None:
-            tx, ty, tz = tx + (ry * fz - rz * fy), ty + (rz * fx - rx * fz), tz + (rx * fy - ry * fx)
-        return np.array((0.0, 0.0, 0.0, fx, fy, fz, 0.0, 0.0, 0.0, tx, ty, tz, *_NO_MOMENT))
+        return np.array(own_force(self.row, body.row))
 
     def check_magnitude(self, body: Body) -> None:
-        """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION.
-
-        A world wrench is judged over all attitudes: by |r||F| and the smallest principal moment.
-        """
-        force, torque = _norm_bound(self.force), _norm_bound(self.torque)
-        if self.mesh_point is not None:
-            torque += _norm_bound(body.arm(self.mesh_point)) * force
-        linear, angular = force / body.mass, torque / body.smallest_moment
-        # Negated, so that an overflow to NaN is refused too.
-        if not (linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION):
+        """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
+        row = np.frombuffer(self.packed)
+        if not _within_magnitude()(row, body.row):
+            linear, angular = magnitudes(row, body.row)
             raise CommandRefused(
                 "magnitude",
                 "wrench",
@@ -107,10 +220,18 @@ class Load:
             )
 
 
+def load_of_row(row: np.ndarray) -> Load:
+    """The load whose row (LOAD,) this is."""
+    axes, has_point, *numbers = row.tolist()
+    point, force, torque, normal = (tuple(numbers[k : k + 3]) for k in range(0, 12, 3))
+    named = _AXES[int(axes)]
+    return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
+
+
 class LoadSum:
     """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F world).
 
-    All are parts of ``values`` (LOADS_SIZE,), in the order of Load.share.
+    All are parts of ``values`` (LOADS_SIZE,), in the order of ``share_of``.
     """
 
     def __init__(self, values: np.ndarray | None = None) -> None:
@@ -121,28 +242,6 @@ class LoadSum:
         self.torque_body = self.values[TORQUE_BODY : TORQUE_BODY + 3]
         self.moment = self.values[MOMENT:].reshape(3, 3)
 
-    def add(self, load: Load, body: Body) -> None:
-        self.values += load.share(body)
-
-
-def apply_impulse(load: Load, body: Body, state: State) -> State:
-    """The state right after an impulse: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
-    R = state.rotation
-    if load.axes == "world":
-        impulse_world = np.asarray(load.force)
-        impulse_body, angular_body = _transposed_times(R, impulse_world), _transposed_times(R, np.asarray(load.torque))
-    else:
-        impulse_body, angular_body = load.own_force(body), np.asarray(load.torque)
-        impulse_world = (R * impulse_body).sum(axis=1)
-    if load.mesh_point is not None:
-        angular_body = angular_body + cross(load.arm(body), impulse_body)
-    row = state.row.copy()
-    if impulse_world.any():
-        row[7:10] += impulse_world / body.mass
-    if angular_body.any():
-        row[10:13] += body.angular_acceleration(angular_body)
-    return replace(state, row=row)
-
 
 def settle(
     frame: Frame, force, torque, body: Body, surface: Surface | None, contacts: dict, state: State | None
@@ -151,14 +250,17 @@ def settle(
 
     state None leaves a ray unsettled: it is checked again when it takes effect.
     """
-    force, torque = tuple(float(f) for f in force), tuple(float(t) for t in torque)
-    if not all(map(math.isfinite, (*force, *torque))):
+    force, torque = tuple(map(float, force)), tuple(map(float, torque))
+    # Of finite numbers a sum that isn't finite overflowed; only then each is looked at.
+    if not math.isfinite(sum(force) + sum(torque)) and not all(map(math.isfinite, (*force, *torque))):
         raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
-    if frame.axes == "normal" and (any(force[1:]) or any(torque)):
+    if frame.axes != "normal":
+        return Load(frame.axes, _mesh_point(frame, body, surface, contacts, state), force, torque)
+    if any(force[1:]) or any(torque):
         raise CommandRefused("frame", "wrench", [*force, *torque], "force.x alone in normal axes")
     mesh_point = _mesh_point(frame, body, surface, contacts, state)
     mesh_normal = None
-    if frame.axes == "normal" and mesh_point is not None:
+    if mesh_point is not None:
         if surface is None:
             raise CommandRefused("frame", "frame_id", frame.text, "normal axes only on a body with a mesh")
         normal = surface.inward_normal(mesh_point)
@@ -193,11 +295,6 @@ def _mesh_point(frame, body, surface, contacts, state):
     if hit is None:
         raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
     return tuple(float(x) for x in hit[0])
-
-
-def _norm_bound(vector) -> float:
-    """√3 times the largest component: not below the length, and without its overflow."""
-    return 1.7320508075688772 * max(abs(vector[0]), abs(vector[1]), abs(vector[2]))
 
 
 def cross(a, b) -> np.ndarray:

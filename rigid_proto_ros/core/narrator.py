@@ -10,7 +10,6 @@ import numpy as np
 from .loads import Load
 from .observer import BodySnapshot, Observer, ShownLoad, ShownString, listens
 from .setup import Setup
-from .state import State
 from .string import Tied
 
 if TYPE_CHECKING:
@@ -32,6 +31,7 @@ class Narrator:
         self.observer = observer
         self._told: dict[str, str] = {}
         self.shows_loads = listens(observer, "load_began")
+        self.hears_loads = any(listens(observer, m) for m in ("applied", "load_began", "load_ended"))
         self._shows_status = listens(observer, "status")
         self._shows_string = listens(observer, "string_changed")
 
@@ -46,8 +46,7 @@ class Narrator:
         self.body(simulation)
         if self.shows_loads:
             for acting in simulation.acting:
-                kind = "wrench" if acting is simulation.acting.held else "poke"
-                self.load_began(simulation, acting.load_id, kind, acting.load)
+                self.load_began(simulation, acting.load_id, "wrench" if acting.held else "poke", acting.load)
         self.string(simulation)
 
     def body(self, simulation: Simulation) -> None:
@@ -77,15 +76,17 @@ class Narrator:
     def load_began(self, simulation: Simulation, load_id: int, kind: str, load: Load) -> None:
         """A load begins to act; ``kind`` is wrench, poke or impulse."""
         if self.shows_loads:
-            shown = _shown_load(kind, load, simulation.setup, simulation.state)
+            shown = _shown_load(kind, load, simulation.setup)
             self.observer.load_began(simulation.time_ns, load_id, shown)
 
     def string(self, simulation: Simulation) -> None:
         """The string, where it changed since it was last told."""
         tied = simulation.string
-        if tied is self._told_string or not self._shows_string:
+        if tied is self._told_string:
             return
         self._told_string = tied
+        if not self._shows_string:
+            return
         self.observer.string_changed(
             simulation.time_ns, None if tied is None else _shown_string(tied, simulation.setup)
         )
@@ -106,9 +107,9 @@ def snapshot(setup: Setup) -> BodySnapshot:
     )
 
 
-def _shown_load(kind: str, load: Load, setup: Setup, state: State) -> ShownLoad:
+def _shown_load(kind: str, load: Load, setup: Setup) -> ShownLoad:
     axes = "world" if load.axes == "world" else "body"
-    force = np.asarray(load.force) if axes == "world" else load.force_body(setup.body, state)
+    force = np.asarray(load.force) if axes == "world" else load.own_force(setup.body)
     return ShownLoad(kind, axes, load.arm(setup.body), force, np.asarray(load.torque))
 
 

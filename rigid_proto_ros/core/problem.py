@@ -17,14 +17,9 @@ it is the even motion of the string's free end.
 
 from __future__ import annotations
 
-import numpy as np
-
+from . import body as of_body
 from . import loads as of_loads
-from .body import Body
 from .compilation import njit
-from .loads import LoadSum
-from .state import State
-from .string import Tied
 
 MOMENTS = 0  # (3,) principal moments [kg m²]
 TORQUE_BODY = 3  # (3,) τ_b [N m]
@@ -57,66 +52,31 @@ HAND_VELOCITY = 68  # (3,) of the free end [m/s, world]
 SIZE = 71
 
 
-def problem_of_body(
-    body: Body, gravity, linear_damping: float, angular_damping: float, gyroscopic: bool, length: float = 1.0
-) -> np.ndarray:
-    """What is the same in every segment of this body (SIZE,): all but loads, string and start."""
-    p = np.zeros(SIZE)
-    p[MOMENTS : MOMENTS + 3] = body.principal_moments
-    p[DAMPING_LINEAR] = linear_damping / body.mass
+# Where the numbers of a tied string stand in its row.
+KNOT = 0  # (3,) [mesh coordinates]
+ORIGIN = 3  # (3,) of the free end's way [m, world]
+TARGET = 6  # (3,) [m, world]
+K, C, REST, PUSHES = 9, 10, 11, 12
+STRING = 13
+
+
+@njit(cache=True, error_model="numpy")
+def begin_body(p, body, gravity, linear_damping, angular_damping, gyroscopic):
+    """Fill p with what is the same in every segment of a body (BODY,): all but loads, string and start."""
+    p[:] = 0.0
+    for k in range(3):
+        p[MOMENTS + k] = body[of_body.MOMENTS + k]
+        p[REFERENCE_ACCELERATION + k] = gravity[k]
+    for k in range(9):
+        p[PRINCIPAL_AXES + k] = body[of_body.AXES + k]
+    for k in range(4):
+        p[PRINCIPAL_QUATERNION + k] = body[of_body.QUATERNION + k]
+    p[DAMPING_LINEAR] = linear_damping / body[of_body.MASS]
     p[DAMPING_ANGULAR] = angular_damping
-    p[GYROSCOPIC] = float(gyroscopic)
-    p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3] = gravity
+    p[GYROSCOPIC] = gyroscopic
     p[REFERENCE_DAMPING] = p[DAMPING_LINEAR]
-    p[PRINCIPAL_AXES : PRINCIPAL_AXES + 9] = body.principal_axes.ravel()
-    p[PRINCIPAL_QUATERNION : PRINCIPAL_QUATERNION + 4] = body.principal_quaternion
-    p[MASS] = body.mass
-    p[LENGTH] = length
-    return p
-
-
-def problem_of_segment(
-    common: np.ndarray, body: Body, loads: np.ndarray, state: State, string: Tied | None = None
-) -> np.ndarray:
-    """The segment's problem (SIZE,): the body's own part under summed loads (LOADS_SIZE,), and a string if tied, from a
-    state on.
-    """
-    p = common.copy()
-    begin_problem(p, loads, state.row)
-    if string is not None:
-        hand = string.hand_velocity(state.time_ns)
-        acceleration = p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3].copy()
-        p[REFERENCE_VELOCITY : REFERENCE_VELOCITY + 3] = hand
-        p[REFERENCE_ACCELERATION : REFERENCE_ACCELERATION + 3] = 0.0
-        p[REFERENCE_DAMPING] = 0.0
-        p[START_VELOCITY_ADDED : START_VELOCITY_ADDED + 3] = state.linear_velocity - hand
-        p[ACCELERATION_ADDED : ACCELERATION_ADDED + 3] = acceleration - p[DAMPING_LINEAR] * hand
-        p[TRANSLATES] = 1.0
-        p[HAS_STRING] = 1.0
-        p[STIFFNESS] = string.stiffness
-        p[STRING_DAMPING] = string.damping
-        p[REST_LENGTH] = string.rest_length
-        p[BILATERAL] = float(string.bilateral or string.rest_length == 0.0)
-        p[ATTACH : ATTACH + 3] = _to_principal(body.principal_axes, string.arm(body))
-        p[STRING_START : STRING_START + 3] = state.position - string.free_end(state.time_ns)
-        p[HAND_VELOCITY : HAND_VELOCITY + 3] = hand
-    return p
-
-
-def make_problem(
-    body: Body,
-    loads: LoadSum,
-    gravity,
-    linear_damping: float,
-    angular_damping: float,
-    gyroscopic: bool,
-    state: State,
-    string: Tied | None = None,
-    length: float = 1.0,
-) -> np.ndarray:
-    """The segment's problem (SIZE,) for a body under summed loads, and a string if tied, from a state on."""
-    common = problem_of_body(body, gravity, linear_damping, angular_damping, gyroscopic, length)
-    return problem_of_segment(common, body, loads.values, state, string)
+    p[MASS] = body[of_body.MASS]
+    p[LENGTH] = body[of_body.LENGTH]
 
 
 @njit(cache=True, error_model="numpy")
@@ -146,5 +106,26 @@ def begin_problem(p, loads, row):
     p[TRANSLATES] = 1.0 if pushes else 0.0
 
 
-def _to_principal(P, vector) -> np.ndarray:
-    return P[0] * vector[0] + P[1] * vector[1] + P[2] * vector[2]
+@njit(cache=True, error_model="numpy")
+def begin_string(p, body, string, begin_ns, end_ns, row, now_ns):
+    """Complete the problem p with a tied string (STRING,) whose free end goes from origin to target between these times."""
+    seconds, ends = (end_ns - begin_ns) * 1e-9, now_ns >= end_ns
+    x, y, z = of_body.arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+    P = PRINCIPAL_AXES
+    for k in range(3):
+        hand = 0.0 if ends else (string[TARGET + k] - string[ORIGIN + k]) / seconds
+        free_end = string[TARGET + k] if ends else string[ORIGIN + k] + ((now_ns - begin_ns) * 1e-9) * hand
+        p[REFERENCE_VELOCITY + k] = hand
+        p[START_VELOCITY_ADDED + k] = row[7 + k] - hand
+        p[ACCELERATION_ADDED + k] = p[REFERENCE_ACCELERATION + k] - p[DAMPING_LINEAR] * hand
+        p[REFERENCE_ACCELERATION + k] = 0.0
+        p[ATTACH + k] = p[P + k] * x + p[P + 3 + k] * y + p[P + 6 + k] * z
+        p[STRING_START + k] = row[k] - free_end
+        p[HAND_VELOCITY + k] = hand
+    p[REFERENCE_DAMPING] = 0.0
+    p[TRANSLATES] = 1.0
+    p[HAS_STRING] = 1.0
+    p[STIFFNESS] = string[K]
+    p[STRING_DAMPING] = string[C]
+    p[REST_LENGTH] = string[REST]
+    p[BILATERAL] = 1.0 if string[PUSHES] != 0.0 or string[REST] == 0.0 else 0.0

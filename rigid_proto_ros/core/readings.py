@@ -7,7 +7,7 @@ import numpy as np
 
 from .accelerations import specific_force
 from .accuracy_floor import accuracy_floor
-from .acting import ActingLoads
+from .flight_arrays import Acting, FlightArrays
 from .loads import LoadSum
 from .segment import Segment
 from .setup import Setup
@@ -21,35 +21,38 @@ class Readings:
 
     setup: Setup
     state: State
-    acting: ActingLoads
     _pending: list
     _string: StringControl
-    _segment: Segment
-    # Of the segments before the present one.
-    _finished_steps: int
-    _finished_evaluations: int
-    _finished_work: float
-    _finished_heat: float
+    _arrays: FlightArrays
+
+    @property
+    def acting(self) -> list[Acting]:
+        """The loads that act now: in the order in which they began."""
+        return list(self._arrays.acting())
+
+    @property
+    def _segment(self) -> Segment:
+        return Segment(self._arrays)
 
     @property
     def steps(self) -> int:
         """Steps committed since start or reset; looking takes none."""
-        return self._finished_steps + self._segment.steps
+        return self._arrays.steps
 
     @property
     def force_evaluations(self) -> int:
         """Evaluations of the equations of motion in those steps."""
-        return self._finished_evaluations + self._segment.evaluations
+        return self._arrays.evaluations
 
     @property
     def choice(self) -> str:
         """Which method carries the body now, and why."""
-        return self._segment.stepper.choice
+        return self._segment.choice
 
     @property
     def floor_binds(self) -> bool:
         """Rounding, not the accuracy asked for, limits some step of the present segment."""
-        return self._segment.stepper.floor_binds
+        return self._segment.floor_binds
 
     @property
     def accuracy_floor(self) -> str:
@@ -57,9 +60,8 @@ class Readings:
         setup, segment = self.setup, self._segment
         if setup.integrator.name not in ("auto", "free_body"):
             return ""
-        elapsed = (self.state.time_ns - segment.start_ns) * 1e-9
-        exact = segment.evaluates_once
-        return accuracy_floor(setup, self.state, segment.stepper.floor_binds, exact, elapsed)
+        elapsed = (self.state.time_ns - segment.start.time_ns) * 1e-9
+        return accuracy_floor(setup, self.state, segment.floor_binds, segment.evaluates_once, elapsed)
 
     @property
     def too_coarse(self) -> str:
@@ -83,12 +85,12 @@ class Readings:
     @property
     def hand_work(self) -> float:
         """What the hand at the string's free end has worked since start or reset [J]."""
-        return self._finished_work + self._segment.hand_work
+        return self._arrays.hand_work
 
     @property
     def string_heat(self) -> float:
         """What the string's damper has turned to heat since start or reset [J]."""
-        return self._finished_heat + self._segment.heat
+        return self._arrays.heat
 
     @property
     def potential_energy(self) -> float:
@@ -129,11 +131,11 @@ class Readings:
     def at_rest(self) -> bool:
         """Nothing moves, acts or is about to."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
-        return still and not self.acting and self.string is None and not self.has_pending
+        return still and not self._arrays.acts and self.string is None and not self.has_pending
 
     def specific_force(self, point) -> np.ndarray:
         """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]."""
         return specific_force(self.setup, self._load_sum(), self.string, self.state, point)
 
     def _load_sum(self) -> LoadSum:
-        return LoadSum(self.acting.sum(self.setup.body))
+        return LoadSum(self._arrays.sums)

@@ -51,17 +51,30 @@ def normalize(qx, qy, qz, qw):
     return qx * scale, qy * scale, qz * scale, qw * scale
 
 
+@njit(cache=True)
+def matrix_elements(x, y, z, w):
+    """The rotation matrix, body to world, of a unit quaternion: nine numbers row by row."""
+    return (
+        *(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        *(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        *(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
+@njit(cache=True)
+def _matrices(q, R):
+    for k in range(q.shape[0]):
+        elements = matrix_elements(q[k, 0], q[k, 1], q[k, 2], q[k, 3])
+        for j in range(9):
+            R[k, j] = elements[j]
+
+
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Rotation matrix (3, 3), body to world, of a unit quaternion q (4,) xyzw, or (n, 3, 3) of (n, 4)."""
-    q = np.asarray(q, dtype=float)
-    # Of one, plain floats: arrays of size one cost more than their arithmetic.
-    x, y, z, w = q.tolist() if q.ndim == 1 else np.moveaxis(q, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows) if q.ndim == 1 else np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    q = np.ascontiguousarray(q, dtype=float)
+    R = np.empty(q.shape[:-1] + (9,))
+    _matrices(q.reshape(-1, 4), R.reshape(-1, 9))
+    return R.reshape(*q.shape[:-1], 3, 3)
 
 
 @njit(cache=True, error_model="numpy")

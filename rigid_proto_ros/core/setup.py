@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from .body import Body
+from .body import LENGTH, Body
 from .integrators.integrator import Integrator
-from .problem import problem_of_body
+from .problem import SIZE, begin_body
 from .string import StringSettings
 from .surface import Surface
 
@@ -53,8 +53,16 @@ class Setup:
         return 0.5 * float((diagonal * diagonal).sum()) ** 0.5
 
     @cached_property
+    def body_row(self) -> np.ndarray:
+        """The body with its length, as compiled functions read it (BODY,)."""
+        row = self.body.row.copy()
+        row[LENGTH] = self.length
+        return row
+
+    @cached_property
     def problem(self) -> np.ndarray:
         """What all segments under this setup have in common (core/problem.py)."""
-        return problem_of_body(
-            self.body, self.gravity, self.linear_damping, self.angular_damping, self.gyroscopic, self.length
-        )
+        p, gravity = np.zeros(SIZE), np.asarray(self.gravity, dtype=float)
+        damping = (float(self.linear_damping), float(self.angular_damping))
+        begin_body(p, self.body_row, gravity, damping[0], damping[1], float(self.gyroscopic))
+        return p

@@ -10,12 +10,9 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Protocol
 
-import numpy as np
-
-from .acting import NEVER, Acting, ActingLoads
+from . import flight as fl
 from .commands import (
     Change,
     ClearWrench,
@@ -30,14 +27,13 @@ from .commands import (
 )
 from .errors import CommandRefused, InputError
 from .event_log import EventLog
+from .flight_arrays import FlightArrays
 from .integrators import check_carried
-from .integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, STRING, needs_of_load
-from .loads import Load, apply_impulse, cross, settle
+from .integrators.integrator import ANGULAR_DAMPING, MAX_SPEED, NO_GYROSCOPIC_TERM, STRING, needs_of_load
+from .loads import Load, cross, settle
 from .narrator import Narrator, snapshot
 from .observer import BodySnapshot, Observer
-from .problem import problem_of_segment
 from .readings import Readings
-from .segment import IntegrationFailed, Segment
 from .setup import Setup
 from .state import State
 from .string_control import StringControl
@@ -66,8 +62,8 @@ class Simulation(Readings):
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self.listed: Listed | None = None
-        self._load_ids = 0
         check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
+        self._arrays = FlightArrays(setup)
         self._start_over()
 
     # Who watches
@@ -112,17 +108,21 @@ class Simulation(Readings):
         that isn't the present one: a change before it in its list may allow what the present setup doesn't. Raises
         CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
         """
-        when_ns = self.time_ns if at_ns is None else max(at_ns, self.time_ns)
+        when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
         load, setup = (judge(command, self.setup), self.setup) if judged is None else judged
-        self._arrivals += 1
-        pending = Pending(when_ns, command)
+        pending = Pending(when_ns, command, listed)
         if load is not None and command.frame.point[0] != "ray":
-            pending.load, pending.settled_for = load, setup
-        # Arrival decides only between messages that are equal to the byte.
-        heapq.heappush(self._pending, (when_ns, order_key(command, listed), self._arrivals, pending, listed))
+            _settle(pending, load, setup)
+        self._push(pending)
         if self.follower is not None:
             self.follower.submit(command, when_ns, listed)
         return when_ns
+
+    def _push(self, pending: Pending) -> None:
+        self._arrivals += 1
+        key = order_key(pending.command, pending.listed)
+        # Arrival decides only between messages that are equal to the byte.
+        heapq.heappush(self._pending, (pending.time_ns, key, self._arrivals, pending))
 
     def refuse(self, error: CommandRefused, count: int = 1) -> None:
         """Count a refusal, of so many commands at once, and tell the observer."""
@@ -139,7 +139,8 @@ class Simulation(Readings):
         """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
         stay.
         """
-        self._tell_ended(self.acting.end_all())
+        self._arrays.end_all()
+        self._tell([])
         self.observer.reset()
         self.events.reset()
         replaced = setup is not None and setup is not self.setup
@@ -158,37 +159,105 @@ class Simulation(Readings):
         """
         if until_ns < self.time_ns:
             raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
+        while True:
+            # 1. What loads alone bring about on the way is handed to the compiled flight.
+            event_ns, due = self._hand_over(until_ns)
+            # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
+            if not self._fly(event_ns, due):
+                return self._stop_in_last_good_state()
+            if event_ns == until_ns:
+                return self.state
+            # 3. That event is brought about; with what acts now a new segment begins.
+            self._act()
+
+    def _hand_over(self, until_ns: int) -> tuple[int, list[Pending]]:
+        """Until when the compiled flight gets along, and the commands that it carries out on the way."""
+        tied, pending = self._string.tied, self._pending
+        if tied is not None and tied.release_ns is not None:
+            until_ns = min(until_ns, tied.release_ns)
+        due: list[Pending] = []
+        if not pending or pending[0][0] >= until_ns:
+            return until_ns, due
+        taken = []
+        while pending and pending[0][0] < until_ns:
+            if not self._is_ready(pending[0][-1]):
+                until_ns = pending[0][0]
+                break
+            taken.append(heapq.heappop(pending))
+        # All commands of one instant act together.
+        while taken and taken[-1][0] == until_ns:
+            heapq.heappush(pending, taken.pop())
+        due = [entry[-1] for entry in taken]
+        self._arrays.put(due)
+        return until_ns, due
+
+    def _is_ready(self, pending: Pending) -> bool:
+        """Whether nothing but arithmetic is left to do when the command acts."""
+        if pending.settled_for is self.setup:
+            return True
+        if not isinstance(pending.command, WrenchCommand):
+            return isinstance(pending.command, ClearWrench)
         try:
-            # 1. Until the next command event: full steps, then one shorter step that ends exactly there.
-            while (event_ns := self._next_event_ns()) < until_ns:
-                self._segment.advance(event_ns)
-                # 2. Commands act; with new loads a new segment begins.
-                self._act(event_ns, self._segment.look(event_ns))
-            # 3. Full steps up to the time asked for, and a look at it that leaves no trace.
-            self._segment.advance(until_ns)
-            self.state = self._segment.look(until_ns)
-            self.time_ns = until_ns
-        except IntegrationFailed as failed:
-            self._stop_in_last_good_state(failed)
-        return self.state
+            return self._still_holds(pending)
+        except CommandRefused:
+            return False  # refused when it acts, and not before
 
-    # What happens at an event
+    def _fly(self, until_ns: int, due: list[Pending]) -> bool:
+        """The compiled flight to ``until_ns``, and word of what began and ended; False when the motion failed."""
+        arrays = self._arrays
+        reached = arrays.fly(until_ns)
+        if not reached:
+            waiting = len(due) - arrays.waiting
+            for pending in due[waiting:]:
+                self._push(pending)
+            del due[waiting:]
+        if due or self._narrator.hears_loads:
+            self._tell(due)
+        self.time_ns = until_ns if reached else arrays.time_ns
+        self.state = State(self.time_ns, arrays.row.copy())
+        return reached
 
-    def _next_event_ns(self) -> int:
-        event_ns = self.acting.next_end_ns
-        if self._pending:
-            event_ns = min(event_ns, self._pending[0][0])
-        if self._string.tied is not None:
-            event_ns = min(event_ns, self._string.next_event_ns(self._segment.start_ns, NEVER))
-        return event_ns
+    def _tell(self, due: list[Pending]) -> None:
+        """Log the commands that acted, and tell the observer what began and ended."""
+        observer, narrator = self.observer, self._narrator
+        if not (narrator.hears_loads or observer.hears_events()):
+            for pending in due:
+                self.events.note(pending.time_ns, pending.command)
+            return
+        first = self._arrays.first_due
+        for now_ns, what, load_id, row in self._arrays.last_events():
+            self.time_ns = now_ns
+            if what == fl.ENDED:
+                observer.load_ended(now_ns, load_id)
+                continue
+            pending = due[row - first]
+            command, load = pending.command, pending.load
+            if what == fl.DONE:
+                self._log_command(command)
+            elif load is not None and what == fl.APPLIED:
+                observer.applied(now_ns, command, load, self.setup.body)
+            elif load is not None:
+                kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
+                narrator.load_began(self, load_id, kind, load)
 
-    def _act(self, now_ns: int, state: State) -> None:
-        """Everything that ends or begins at ``now_ns``; a new segment if anything did."""
-        self.time_ns, self.state = now_ns, state
-        changed = self._tell_ended(self.acting.end_due(now_ns))
+    def _log_command(self, command: Command) -> None:
+        # A change is told at once: waiting in a queue it would keep its whole setup, mesh included.
+        if self.observer.hears_events() or isinstance(command, Change):
+            self.log(command.kind, command.content)
+        else:
+            self.events.note(self.time_ns, command)
+
+    # What happens at an event that takes more than arithmetic
+
+    def _act(self) -> None:
+        """Everything that ends or begins now; a new segment if anything did."""
+        arrays, now_ns = self._arrays, self.time_ns
+        changed = arrays.end_due()
+        self._tell([])
         changed |= self._string.end_due(now_ns)
         while self._pending and self._pending[0][0] == now_ns:
-            *_, pending, self.listed = heapq.heappop(self._pending)
+            pending = heapq.heappop(self._pending)[-1]
+            self.listed = pending.listed
             try:
                 self._apply(pending)
                 changed = True
@@ -198,16 +267,21 @@ class Simulation(Readings):
                 self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
         self.listed = None
         if changed:
-            self._segment.cut(now_ns)
-            self._finish_segment()
+            arrays.tie(self._string.tied)
+            arrays.cut_segment()
+            self._narrator.string(self)
 
     def _apply(self, pending: Pending) -> None:
         command = pending.command
-        if isinstance(command, WrenchCommand):
-            self._begin_load(command, self._load_of(pending))
-        elif isinstance(command, ClearWrench):
-            self._tell_ended(self.acting.end_all())
-        elif isinstance(command, Change):
+        if isinstance(command, WrenchCommand | ClearWrench):
+            if isinstance(command, WrenchCommand) and not self._still_holds(pending):
+                _settle(pending, _settled(command, self.setup, self.state), self.setup)
+            self._arrays.put([pending])
+            self._arrays.apply()
+            self._tell([pending])
+            self.state = self._arrays.state
+            return
+        if isinstance(command, Change):
             self._change(command.apply())
         elif isinstance(command, TieString):
             self._string.tie_at(command, self.setup, self.state)
@@ -216,51 +290,23 @@ class Simulation(Readings):
             self._string.move(command, self.setup, self.state)
         elif isinstance(command, ReleaseString):
             self._string.release()
-        # A change is told at once: waiting in a queue it would keep its whole setup, mesh included.
-        if self.observer.hears_events() or isinstance(command, Change):
-            self.log(command.kind, command.content)
-        else:
-            self.events.note(self.time_ns, command)
+        self._log_command(command)
 
-    def _load_of(self, pending: Pending) -> Load:
-        """The load settled at submission, or settled anew when it was a ray or the mesh has changed since."""
+    def _still_holds(self, pending: Pending) -> bool:
+        """Whether the load settled at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
+
+        Raises CommandRefused when the body or the integrator that there is now can't take it.
+        """
         setup, before = self.setup, pending.settled_for
         if before is setup:
-            return pending.load
-        if before is not None and before.surface is setup.surface:
-            if before.body is not setup.body:
-                pending.load.check_magnitude(setup.body)
-            _check_load_carried(pending.command, pending.load, setup)
-            return pending.load
-        return _settled(pending.command, setup, self.state)
-
-    def _begin_load(self, command: WrenchCommand, load: Load) -> None:
-        self._load_ids += 1
-        now_ns, load_id = self.time_ns, self._load_ids
-        self.observer.applied(now_ns, command, load, self.setup.body)
-        if command.frame.impulse:
-            self.state = apply_impulse(load, self.setup.body, self.state)
-            self._narrator.load_began(self, load_id, "impulse", load)
-            return
-        if command.held:
-            self._tell_ended(self.acting.end_held())
-            if load.is_zero:
-                return
-            self.acting.hold(Acting(load, now_ns, self._end_of_held(now_ns), load_id))
-        else:
-            duration_s = command.frame.duration_s
-            duration_ns = self.setup.poke_duration_ns if duration_s is None else round(duration_s * 1e9)
-            self.acting.add(Acting(load, now_ns, now_ns + duration_ns, load_id))
-        self._narrator.load_began(self, load_id, command.kind, load)
-
-    def _end_of_held(self, begin_ns: int) -> int:
-        timeout_ns = self.setup.wrench_timeout_ns
-        return max(begin_ns + timeout_ns, self.time_ns) if timeout_ns else NEVER
-
-    def _tell_ended(self, ended: list[Acting]) -> bool:
-        for acting in ended:
-            self.observer.load_ended(self.time_ns, acting.load_id)
-        return bool(ended)
+            return True
+        if before is None or before.surface is not setup.surface:
+            return False
+        if before.body is not setup.body:
+            pending.load.check_magnitude(setup.body)
+        _check_load_carried(pending.command, pending.load, setup)
+        pending.settled_for = setup
+        return True
 
     def _change(self, new: Setup) -> None:
         """Take another setup in flight. The same mesh at the same size stays where it is, so a COM that moves within it
@@ -270,57 +316,35 @@ class Simulation(Readings):
         old, self.setup = self.setup, new
         moved = new.body.center_of_mass - old.body.center_of_mass
         if new.geometry == old.geometry and moved.any():
-            R = self.state.rotation
-            shift = (R * moved).sum(axis=1)
-            row = self.state.row.copy()
+            shift = (self.state.rotation * moved).sum(axis=1)
+            row = self._arrays.row
             row[0:3] += shift
             row[7:10] += cross(self.state.angular_velocity, shift)
-            self.state = replace(self.state, row=row)
-        if self.acting.held is not None:
-            self.acting.hold_until(self._end_of_held(self.acting.held.begin_ns))
+            self.state = self._arrays.state
+        self._arrays.take(new)
         self._string.change(old, new, self.state)
         if new.surface is not old.surface and new.surface is not None:
             self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))
         self.announce()
 
-    # Segments
-
-    def _new_segment(self, start: State) -> Segment:
-        setup = self.setup
-        problem = problem_of_segment(setup.problem, setup.body, self.acting.sum(setup.body), start, self.string)
-        return Segment(start, problem, setup.integrator, setup.step_ns, setup.accuracy)
-
-    def _finish_segment(self) -> None:
-        """Keep the segment's counts and begin another from the present state."""
-        self._finished_steps += self._segment.steps
-        self._finished_evaluations += self._segment.evaluations
-        self._finished_work += self._segment.hand_work
-        self._finished_heat += self._segment.heat
-        self._segment = self._new_segment(self.state)
-        self._narrator.string(self)
+    # The beginning and a bad end
 
     def _start_over(self) -> None:
         self._pending: list[tuple] = []
         self.listed = None
-        self.acting = ActingLoads()
-        self._finished_steps = 0
-        self._finished_evaluations = 0
-        self._finished_work = 0.0
-        self._finished_heat = 0.0
         self.failure = ""
         self.time_ns = 0
         self.state = State(0, self.setup.initial.copy())
         self._string = StringControl(self.setup, self.state)
-        self._segment = self._new_segment(self.state)
+        self._arrays.start_over(self.setup, self._string.tied)
         self._narrator.start_over()
         self._narrator.string(self)
 
-    def _stop_in_last_good_state(self, failed: IntegrationFailed) -> None:
-        if np.isfinite(failed.last_good.row).all() and failed.last_good.time_ns >= self.time_ns:
-            self.state = failed.last_good
-        self.time_ns = self.state.time_ns
-        self.failure = str(failed)
-        self._finish_segment()
+    def _stop_in_last_good_state(self) -> State:
+        when = f"{self._segment.committed_ns * 1e-9:.9g} s"
+        self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
+        self._arrays.finish_segment()
+        return self.state
 
 
 def judge(command: Command, setup: Setup) -> Load | None:
@@ -341,9 +365,22 @@ def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> Load:
     return load
 
 
+def _settle(pending: Pending, load: Load, setup: Setup) -> None:
+    """The load, as the tables of a flight take it, was settled under this setup."""
+    frame = pending.command.frame
+    pending.load, pending.settled_for, pending.row = load, setup, load.packed
+    if pending.command.held:
+        pending.kind = fl.HELD_WRENCH
+    elif frame.impulse:
+        pending.kind = fl.IMPULSE
+    else:
+        pending.kind = fl.PULSE
+        pending.duration_ns = -1 if frame.duration_s is None else round(frame.duration_s * 1e9)
+
+
 def _check_load_carried(command: WrenchCommand, load: Load, setup: Setup) -> None:
     # An impulse acts at once: the integrator never sees it.
-    if not command.frame.impulse:
+    if not (setup.integrator.carries_loads or command.frame.impulse):
         check_carried(setup.integrator, needs_of_load(load))
 
 

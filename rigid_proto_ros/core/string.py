@@ -69,6 +69,12 @@ class Tied:
     rest_length: float
     bilateral: bool
 
+    @property
+    def row(self) -> np.ndarray:
+        """The string as compiled functions read it (STRING,), see core/problem.py."""
+        numbers = (self.stiffness, self.damping, self.rest_length, float(self.bilateral))
+        return np.array([*self.attach, *self.origin, *self.target, *numbers])
+
     def arm(self, body: Body) -> np.ndarray:
         """From the COM to the knot (3,) [m, body axes]."""
         return body.point(self.attach)

@@ -27,13 +27,6 @@ class StringControl:
             mass = setup.initial_string_mass
             self.tied = tie(settings, settings.attach, settings.target, setup.body, state, 0, mass)
 
-    def next_event_ns(self, now_ns: int, never: int) -> int:
-        """When the free end arrives or the string lets go, whichever is first after ``now_ns``."""
-        if self.tied is None:
-            return never
-        arrives = self.tied.end_ns if self.tied.end_ns > now_ns else never
-        return min(arrives, never if self.tied.release_ns is None else self.tied.release_ns)
-
     def end_due(self, now_ns: int) -> bool:
         """Whether the free end arrived at this very time, or the string let go."""
         if self.tied is None:

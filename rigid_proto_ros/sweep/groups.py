@@ -9,7 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core import batch_body as bb
-from ..core import batch_flight as bf
+from ..core import flight as fl
+from ..core import loads as ld
 from ..core.batch import Variants
 from ..core.errors import InputError
 from ..core.integrators.taylor_adaptive import degree_for
@@ -133,8 +134,8 @@ class Group:
                 good[i] = False
         longest = max((len(s.commands) for s in scripts if s), default=0)
         commands = np.zeros((count, longest, 3), np.int64)
-        commands[:, :] = bf.NEVER, -1, bf.CLEAR
-        loads = np.zeros((count, longest, bf.LOAD))
+        commands[:, :] = fl.NEVER, -1, fl.CLEAR
+        loads = np.zeros((count, longest, ld.LOAD))
         for i, script in enumerate(scripts):
             if script:
                 commands[i, : len(script.commands)] = script.commands

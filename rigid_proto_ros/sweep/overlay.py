@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..command_codec import ScriptCommand
-from ..core import batch_flight as bf
+from ..core import flight as fl
+from ..core import loads as ld
 from ..poke_script import MAX_TIME_S, expand_script
 from .study import Study
 from .targets import Target
 from .templates import Script, Settler, script_of
 
-_VECTORS = {"force": bf.FORCE, "impulse": bf.FORCE, "torque": bf.TORQUE, "angular_impulse": bf.TORQUE}
+_VECTORS = {"force": ld.FORCE, "impulse": ld.FORCE, "torque": ld.TORQUE, "angular_impulse": ld.TORQUE}
 _TIMING = {"repeat", "every", "jitter", "seed"}
 _OTHER_KINDS = {"wrench", "string", "set", "service"}
 
@@ -52,13 +53,13 @@ class Overlay:
         """Commands (n, c, 3) and loads (n, c, LOAD) of ``count`` rows in order of time, and which rows have good values (n,)."""
         size = len(self.commands)
         commands = np.broadcast_to(self.base.commands, (count, size, 3)).copy()
-        loads = np.broadcast_to(self.base.loads, (count, size, bf.LOAD)).copy()
+        loads = np.broadcast_to(self.base.loads, (count, size, ld.LOAD)).copy()
         good = np.ones(count, bool)
         for target, values in targets:
             own = [k for k, command in enumerate(self.commands) if command.entry == target.entry]
             good &= _lay(target, values, own, commands, loads)
         # Stable: equal times act in the order of the script.
-        order = np.argsort(commands[:, :, bf.AT_NS], axis=1, kind="stable")
+        order = np.argsort(commands[:, :, fl.AT_NS], axis=1, kind="stable")
         commands = np.take_along_axis(commands, order[:, :, None], axis=1)
         return commands, np.take_along_axis(loads, order[:, :, None], axis=1), good
 
@@ -73,9 +74,9 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
     for k in own:
         if key in ("t", "duration"):
             # To the nearest nanosecond, halves to even, as round() has it.
-            commands[:, k, bf.AT_NS if key == "t" else bf.DURATION_NS] = np.rint(values * 1e9)
+            commands[:, k, fl.AT_NS if key == "t" else fl.DURATION_NS] = np.rint(values * 1e9)
         elif key == "push":
-            loads[:, k, bf.FORCE] = values
+            loads[:, k, ld.FORCE] = values
         elif component:
             loads[:, k, _VECTORS[key] + component[0]] = values
         else:

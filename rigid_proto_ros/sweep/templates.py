@@ -10,14 +10,14 @@ import numpy as np
 
 from ..command_codec import ScriptCommand
 from ..core import batch_body as bb
-from ..core import batch_flight as bf
+from ..core import flight as fl
 from ..core.commands import WrenchCommand
 from ..core.errors import InputError, MeshError
 from ..core.frames import parse_frame
 from ..core.integrators import check_carried, integrator_named
 from ..core.integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, Integrator, needs_of_load
 from ..core.integrators.taylor_adaptive import degree_for
-from ..core.loads import Load, settle
+from ..core.loads import LOAD, Load, settle
 from ..scenario import BodyMesh, nanoseconds
 
 FAST = {
@@ -44,8 +44,6 @@ TIMES = {"step": bb.STEP_NS, "poke_duration": bb.POKE_NS}
 MAX_COMMANDS = 2000
 """Of a script in the compiled batch; longer ones are rare, and rows of them are the simulation's."""
 
-_AXES = {"world": bf.WORLD_AXES, "body": bf.BODY_AXES, "normal": bf.NORMAL_AXES}
-
 
 class NotCarried(Exception):
     """The compiled batch can't carry the row; the simulation can, or knows why not."""
@@ -53,7 +51,7 @@ class NotCarried(Exception):
 
 @dataclass(frozen=True)
 class Script:
-    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of core/batch_flight.py."""
+    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of core/flight.py and core/loads.py."""
 
     commands: np.ndarray
     loads: np.ndarray
@@ -161,26 +159,17 @@ class Settler:
 
     def numbers(self, command: ScriptCommand) -> tuple[list[int], np.ndarray, Load | None]:
         """A command's integers, its load's numbers, and what the integrator has to carry of it."""
-        row = np.zeros(bf.LOAD)
         if command.kind == "clear_wrench":
-            return [command.t_ns, -1, bf.CLEAR], row, None
+            return [command.t_ns, -1, fl.CLEAR], np.zeros(LOAD), None
         if command.kind not in ("wrench", "poke"):
             raise NotCarried
         frame, settled = self.frame(command.frame_id)
         held = command.kind == "wrench"
         WrenchCommand(held, frame, command.force, command.torque, command.t_ns, command.frame_id, b"")
         load = Load(settled.axes, settled.mesh_point, command.force, command.torque, settled.mesh_normal)
-        kind = bf.HELD if held else bf.IMPULSE if frame.impulse else bf.PULSE
+        kind = fl.HELD_WRENCH if held else fl.IMPULSE if frame.impulse else fl.PULSE
         duration_ns = -1 if frame.duration_s is None else round(frame.duration_s * 1e9)
-        row[bf.LOAD_AXES] = _AXES[load.axes]
-        if load.mesh_point is not None:
-            row[bf.HAS_POINT] = 1.0
-            row[bf.POINT : bf.POINT + 3] = load.mesh_point
-        if load.mesh_normal is not None:
-            row[bf.NORMAL : bf.NORMAL + 3] = load.mesh_normal
-        row[bf.FORCE : bf.FORCE + 3] = command.force
-        row[bf.TORQUE : bf.TORQUE + 3] = command.torque
-        return [command.t_ns, duration_ns, kind], row, None if frame.impulse else load
+        return [command.t_ns, duration_ns, kind], load.row, None if frame.impulse else load
 
 
 def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
@@ -189,5 +178,5 @@ def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, 
         raise NotCarried
     ordered = [settler.numbers(command) for command in commands]
     integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, 3)
-    loads = np.array([row for _, row, _ in ordered]).reshape(-1, bf.LOAD)
+    loads = np.array([row for _, row, _ in ordered]).reshape(-1, LOAD)
     return Script(integers, loads), [load for _, _, load in ordered if load is not None]

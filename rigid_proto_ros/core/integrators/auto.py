@@ -17,7 +17,7 @@ Taylor steps are as long as the accuracy allows, read off their coefficients. Th
 from __future__ import annotations
 
 import math
-from types import ModuleType
+from collections.abc import Callable
 
 import numpy as np
 
@@ -46,7 +46,6 @@ from ..problem import (
     TRANSLATES,
 )
 from ..rotation import multiply, normalize, rotate
-from . import control as ctl
 from . import series_steps, stiff_steps, taylor_adaptive
 from .discrete_gradient import DISCRETE_GRADIENT
 from .equations import stretch
@@ -54,7 +53,7 @@ from .exponential import exponential
 from .free_body import free_body_steps
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
-from .stepping import AdaptiveSteps, FixedSteps, OneStep, Stepper
+from .stepping import ADAPTIVE, FIXED_STEPS, NOTHING, ONE_STEP, Method
 from .taylor_adaptive import degree_for
 
 STIFF_RATE = 2e4
@@ -90,8 +89,8 @@ def steady_steps(y, p, h, n):
     return n
 
 
-ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, ON_STRING, STIFF = range(8)
-"""Kinds of segments, as the table above has them."""
+ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(10)
+"""Kinds of segments, as the table above has them; each is one of auto's methods."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,7 +136,25 @@ def damping_is_stiff(p, y):
 
 
 @njit(cache=True, error_model="numpy")
-def kind_of_segment(p, y):
+def fastest_swing(p):
+    """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against the
+    smallest moment.
+    """
+    x, y, z = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    return math.sqrt(p[STIFFNESS] * (1.0 / p[MASS] + (x * x + y * y + z * z) / p[MOMENTS]))
+
+
+@njit(cache=True, error_model="numpy")
+def _kind_on_string(p, y):
+    turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
+    accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
+    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
+        return SLACK_AT_REST
+    return ON_STIFF_STRING if fastest_swing(p) > FASTEST_STRING else ON_STRING
+
+
+@njit(cache=True, error_model="numpy")
+def kind_of_segment(p, y, accuracy):
     """Which of the kinds a segment with problem p from variables y on is."""
     spins = _vector(y, 4)
     turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
@@ -145,7 +162,7 @@ def kind_of_segment(p, y):
     if damping_is_stiff(p, y):
         return STIFF
     if p[HAS_STRING] != 0.0:
-        return ON_STRING
+        return _kind_on_string(p, y)
     if not turned:
         if not spins and not translates:
             moves = _vector(p, REFERENCE_VELOCITY) or _vector(p, REFERENCE_ACCELERATION)
@@ -157,48 +174,53 @@ def kind_of_segment(p, y):
     return ANY_LOADS if p[HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
 
 
-def _choose(integrator: Integrator, p: np.ndarray, y: np.ndarray, step_ns: int, accuracy: float) -> Stepper:
-    """The stepper of a segment with problem p from variables y on."""
-    kind = kind_of_segment(p, y)
-    if kind == TURNING_LOADS:
-        return _series("the loads turn with the body", accuracy, taylor_adaptive)
-    if kind == ANY_LOADS:
-        return _series("loads that depend on the attitude", accuracy, series_steps)
-    if kind == STIFF:
-        return _series("", accuracy, stiff_steps)
-    if kind == FREE:
-        return OneStep("auto: free_body, one exact step without torque", free_body_steps, 1)
-    if kind == ON_STRING:
-        return _choose_for_string(p, y, step_ns, accuracy)
-    if kind == STEADY:
-        return OneStep("auto: closed form, nothing changes the spin", steady_steps, 1)
-    if kind == COASTING:
-        return OneStep("auto: closed form, nothing turns the body", None, 0)
-    return OneStep("auto: sleeping, nothing moves or acts", None, 0, sleeping=True)
+def _constant(choice: str) -> Callable[..., str]:
+    return lambda p, step_s, accuracy: choice
 
 
-def _series(why: str, accuracy: float, method: ModuleType) -> Stepper:
-    degree = degree_for(accuracy)
-    choice = f"auto: taylor of degree {degree}, {why}" if why else "auto: radau of order 9, stiff damping"
-    return AdaptiveSteps(choice, ctl.new_control(accuracy, degree), method.steps, method.workspace(degree))
+def _series(why: str) -> Callable[..., str]:
+    return lambda p, step_s, accuracy: f"auto: taylor of degree {degree_for(accuracy)}, {why.format(fastest_swing(p))}"
 
 
-def _choose_for_string(p, y, step_ns: int, accuracy: float) -> Stepper:
-    x, _ = stretch(y, p)
-    turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
-    accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
-    if x <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
-        return OneStep("auto: sleeping, the string is slack and nothing moves", None, 0, sleeping=True)
-    # The knot is lightest, and the swing fastest, where the whole arm counts against the smallest moment.
-    arm = p[ATTACH : ATTACH + 3]
-    lightness = 1.0 / p[MASS] + float((arm * arm).sum()) / p[MOMENTS]
-    fastest = math.sqrt(p[STIFFNESS] * lightness)
-    if fastest > FASTEST_STRING:
-        stepper = FixedSteps(DISCRETE_GRADIENT, p, y, step_ns, accuracy)
-        stepper.choice = f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
-        stepper.floor_binds = True
-        return stepper
-    return _series(f"a string of up to {fastest:.3g} rad/s", accuracy, series_steps)
+def _stiff(p: np.ndarray, step_s: float, accuracy: float) -> str:
+    fastest = fastest_swing(p)
+    return f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
+
+
+def _methods(integrator: Integrator) -> tuple[Method, ...]:
+    """A method for each kind of segment."""
+    gradient = DISCRETE_GRADIENT
+    series = (series_steps.steps, series_steps.workspace)
+    by_kind = {
+        ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
+        COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
+        STEADY: Method(ONE_STEP, steady_steps, _constant("auto: closed form, nothing changes the spin"), 1),
+        FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, one exact step without torque"), 1),
+        TURNING_LOADS: Method(
+            ADAPTIVE, taylor_adaptive.steps, _series("the loads turn with the body"), 0, taylor_adaptive.workspace
+        ),
+        ANY_LOADS: Method(ADAPTIVE, series[0], _series("loads that depend on the attitude"), 0, series[1]),
+        SLACK_AT_REST: Method(
+            NOTHING,
+            None,
+            _constant("auto: sleeping, the string is slack and nothing moves"),
+            sleeps=True,
+            on_string=True,
+        ),
+        ON_STRING: Method(ADAPTIVE, series[0], _series("a string of up to {:.3g} rad/s"), 0, series[1], on_string=True),
+        STIFF: Method(
+            ADAPTIVE,
+            stiff_steps.steps,
+            _constant("auto: radau of order 9, stiff damping"),
+            workspace=stiff_steps.workspace,
+        ),
+        ON_STIFF_STRING: Method(
+            *(FIXED_STEPS, gradient.string_kernel or gradient.kernel, _stiff, gradient.evaluations),
+            floor_binds=True,
+            on_string=True,
+        ),
+    }
+    return tuple(by_kind[kind] for kind in range(len(by_kind)))
 
 
 AUTO = Integrator(
@@ -210,5 +232,6 @@ AUTO = Integrator(
     stability_limit=math.inf,
     carries=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
     kernel=None,
-    stepper=_choose,
+    make_methods=_methods,
+    chooses=True,
 )

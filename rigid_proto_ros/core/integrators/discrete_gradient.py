@@ -57,7 +57,7 @@ from .midpoint_spin import (
     newton_correction,
 )
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 _PULL_TRIALS = 100
 """Secant steps on the pull; about 5 are used, more only where the string turns slack or taut."""
@@ -336,6 +336,6 @@ DISCRETE_GRADIENT = Integrator(
     stability_limit=1.0,
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=discrete_gradient_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
     stiff=True,
 )

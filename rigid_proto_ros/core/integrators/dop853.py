@@ -14,7 +14,7 @@ from . import slack
 from .dop853_tableau import STAGES, WEIGHTS
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
 from .runge_kutta import advance, is_good, rates, stages
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,5 +62,5 @@ DOP853 = Integrator(
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=dop853_steps,
     string_kernel=dop853_string_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -14,7 +14,7 @@ from .equations import accelerations
 from .gram_schmidt import columns, orthonormal, quaternion_near, turned
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -73,5 +73,5 @@ EULER = Integrator(
     carries=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
     kernel=euler_steps,
     string_kernel=euler_string_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

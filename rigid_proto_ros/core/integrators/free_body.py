@@ -14,7 +14,7 @@ from ..compilation import njit
 from ..problem import MOMENTS
 from .free_body_step import free_step
 from .integrator import MAX_SPEED, Integrator
-from .stepping import OneStep
+from .stepping import ONE_STEP, Method
 
 
 @njit(cache=True, error_model="numpy")
@@ -30,8 +30,8 @@ def free_body_steps(y, p, h, n):
     return n
 
 
-def _stepper(integrator, problem, variables, step_ns, accuracy):
-    return OneStep(f"{integrator.name}: one exact step", free_body_steps, integrator.evaluations)
+def _methods(integrator: Integrator) -> tuple[Method, ...]:
+    return (Method(ONE_STEP, free_body_steps, lambda p, step_s, accuracy: "free_body: one exact step", 1),)
 
 
 FREE_BODY = Integrator(
@@ -43,5 +43,5 @@ FREE_BODY = Integrator(
     stability_limit=math.inf,
     carries=frozenset(),
     kernel=free_body_steps,
-    stepper=_stepper,
+    make_methods=_methods,
 )

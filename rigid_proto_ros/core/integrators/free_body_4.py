@@ -15,7 +15,7 @@ from .free_body_step import free_step
 from .integrator import LOADS, Integrator
 from .kick import drift_freely, kick, push
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 _B1, _B2, _B3 = 0.0829844064174052, 0.396309801498368, -0.0390563049223486
 _A1, _A2 = 0.245298957184271, 0.604872665711080
@@ -55,5 +55,5 @@ FREE_BODY_4 = Integrator(
     stability_limit=math.inf,
     carries=LOADS,
     kernel=free_body_4_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -16,7 +16,7 @@ from .free_body_step import free_step
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 from .kick import drift_freely, kick, push
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -50,5 +50,5 @@ FREE_BODY_STRANG = Integrator(
     stability_limit=math.inf,
     carries=LOADS | {ANGULAR_DAMPING},
     kernel=free_body_strang_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

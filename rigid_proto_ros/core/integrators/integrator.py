@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..problem import HAS_STRING
 
 if TYPE_CHECKING:
     from ..loads import Load
-    from .stepping import Stepper
+    from .stepping import Method
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
@@ -43,7 +44,8 @@ class Integrator:
     is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h of a
     string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
     kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result isn't
-    finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another. stiff: bounded at any ω_s h. stepper: how a segment is stepped: (problem, variables, step_ns, accuracy).
+    finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another. stiff: bounded at any ω_s h. make_methods:
+    the ways in which segments are stepped; chooses: by what a segment holds (auto), else by whether a string is tied.
     """
 
     name: str
@@ -54,9 +56,20 @@ class Integrator:
     stability_limit: float
     carries: frozenset[str]
     kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None
-    stepper: Callable[[Integrator, np.ndarray, np.ndarray, int, float], Stepper]
+    make_methods: Callable[[Integrator], tuple[Method, ...]]
     string_kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None = None
     stiff: bool = False
+    chooses: bool = False
+
+    @cached_property
+    def methods(self) -> tuple[Method, ...]:
+        """How segments are stepped, in the order of auto's kinds, or without and with a string."""
+        return self.make_methods(self)
+
+    @cached_property
+    def carries_loads(self) -> bool:
+        """Whether it carries every wrench and poke."""
+        return self.carries >= LOADS
 
     def kernel_for(self, problem: np.ndarray):
         """The kernel that steps this problem; only the ones used are ever compiled."""

@@ -29,7 +29,7 @@ from .midpoint_spin import (
     newton_correction,
 )
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -96,5 +96,5 @@ LIE_MIDPOINT = Integrator(
     stability_limit=1.0,
     carries=LOADS | {ANGULAR_DAMPING},
     kernel=lie_midpoint_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

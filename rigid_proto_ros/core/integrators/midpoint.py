@@ -14,7 +14,7 @@ from .equations import accelerations
 from .gram_schmidt import columns, orthonormal, quaternion_near, turned
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -80,5 +80,5 @@ MIDPOINT = Integrator(
     carries=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
     kernel=midpoint_steps,
     string_kernel=midpoint_string_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -19,7 +19,7 @@ from . import slack
 from .equations import added_acceleration, angular_acceleration, torque
 from .integrator import ANGULAR_DAMPING, LOADS, MAX_SPEED, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import advance, is_good, rates, stages
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 TABLEAU = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 WEIGHTS = np.array([1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0])
@@ -188,5 +188,5 @@ RK4 = Integrator(
     carries=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
     kernel=rk4_steps,
     string_kernel=rk4_string_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -15,7 +15,7 @@ from .equations import accelerations
 from .exponential import exponential
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,5 +93,5 @@ RKMK4 = Integrator(
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=rkmk4_steps,
     string_kernel=rkmk4_string_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -15,7 +15,7 @@ from .equations import accelerations
 from .exponential import exponential
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
@@ -75,5 +75,5 @@ SEMI_IMPLICIT_EULER = Integrator(
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=semi_implicit_euler_steps,
     string_kernel=semi_implicit_euler_string_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -25,7 +25,7 @@ from ..problem import (
 from ..simd import arranged, component, filled, joined, load, root, store, width
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 from .runge_kutta import is_good
-from .stepping import FixedSteps
+from .stepping import fixed_steps
 
 DEGREE = 18
 
@@ -210,5 +210,5 @@ TAYLOR = Integrator(
     stability_limit=1.0,
     carries=frozenset({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING}),
     kernel=taylor_steps,
-    stepper=FixedSteps,
+    make_methods=fixed_steps,
 )

@@ -27,11 +27,13 @@ scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed.
 
 _LOG2_START, _LOG2_REST, _LOG2_MOST = math.log2(0.4), math.log2(0.6), math.log2(0.9)
 
+MAX_DEGREE = 26
+
 
 @functools.cache
 def degree_for(accuracy: float) -> int:
     """The degree at which work per time is smallest for this accuracy: measured, a flat minimum (12 at 1e-3, 19 at 1e-9)."""
-    return min(max(round(8.5 - 1.15 * math.log10(accuracy)), 6), 26)
+    return min(max(round(8.5 - 1.15 * math.log10(accuracy)), 6), MAX_DEGREE)
 
 
 @njit(cache=True, error_model="numpy")

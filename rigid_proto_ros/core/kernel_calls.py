@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""Compiled functions as numbers, so that one loop can call whichever kernel a segment needs without compiling the others in.
+
+A kernel's address stands in an array of integers; what is called there is the machine code that numba made of the kernel for
+one fixed signature. Compiling or loading it waits until somebody asks for the address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import boolean, config, float64, int64, types
+from numba.core import cgutils
+from numba.core.types.function_type import CompileResultWAP
+from numba.extending import intrinsic
+
+STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
+"""A kernel (y, p, h, n)."""
+
+ADAPTIVE_STEPS = types.FunctionType(
+    int64(float64[::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], int64, boolean)
+)
+"""A kernel (y, p, control, following, workspace, span_ns, look)."""
+
+_INTERPRETED = bool(getattr(config, "DISABLE_JIT", 0))
+"""NUMBA_DISABLE_JIT=1: kernels are plain functions, for readable tracebacks."""
+
+_kept: dict[int, Any] = {}
+"""What stands at the addresses given away: code must not be collected while an array points at it."""
+
+
+def address_of(kernel: Callable, taken_as: types.FunctionType) -> int:
+    """The address of a compiled function for this signature, compiled or loaded from the cache if it isn't yet."""
+    if _INTERPRETED:
+        found, address = kernel, id(kernel)
+    else:
+        kernel.compile(taken_as.signature)  # type: ignore[attr-defined]
+        found = CompileResultWAP(kernel.get_compile_result(taken_as.signature))  # type: ignore[attr-defined]
+        address = found.__wrapper_address__()
+    _kept[address] = found
+    return address
+
+
+def entry_of(kernel: Callable, signature: types.Type) -> Callable:
+    """The compiled function itself for this signature: called without looking at its arguments' types.
+
+    A call through numba's dispatcher looks them up each time, which costs more than a short kernel takes.
+    """
+    if _INTERPRETED:
+        return kernel
+    kernel.compile(signature)  # type: ignore[attr-defined]
+    return kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]
+
+
+def _function_at(taken_as: types.FunctionType) -> Callable:
+    """The compiled function that turns an address into a function of this signature."""
+
+    @intrinsic
+    def function_at(typing_context, address):
+        def code(context, builder, signature, arguments):
+            function = cgutils.create_struct_proxy(taken_as)(context, builder)
+            nothing = cgutils.get_null_value(cgutils.voidptr_t)
+            function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+            function.py_addr, function.jit_addr = nothing, nothing
+            return function._getvalue()
+
+        return taken_as(int64), code
+
+    return _kept.__getitem__ if _INTERPRETED else function_at
+
+
+steps_at = _function_at(STEPS)
+adaptive_steps_at = _function_at(ADAPTIVE_STEPS)
