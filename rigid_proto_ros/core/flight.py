@@ -18,7 +18,7 @@ from .integrators import control as ctl
 from .integrators.auto import kind_of_segment
 from .integrators.integrator import MAX_SPEED
 from .integrators.stepping import EVALUATIONS as COST
-from .integrators.stepping import SLEEPS, commit, is_provided, reach
+from .integrators.stepping import ADAPTIVE, SLEEPS, WAY, commit, is_provided, reach
 from .loads import LOAD, LOADS_SIZE, apply_impulse, is_zero, share_of
 from .motion import HAND_WORK, HEAT, STORED, to_good_row, to_variables
 
@@ -104,10 +104,14 @@ def begin_variables(f, n, methods):
     p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
     y[:] = 0.0
     to_variables(f[START : START + 13], p, y)
+    before = n[METHOD]
     if n[CHOOSES] != 0:
         n[METHOD] = kind_of_segment(p, y, f[ACCURACY])
     else:
         n[METHOD] = 1 if p[pr.HAS_STRING] != 0.0 and methods.shape[0] > 1 else 0
+    if n[METHOD] != before and methods[n[METHOD], WAY] == ADAPTIVE:
+        # Kernels may count on zeros where they never write, and another method's were here.
+        f[ROOM:] = 0.0
     control = f[CONTROL : CONTROL + ctl.SIZE]
     control[:] = 0.0
     control[ctl.ACCURACY], control[ctl.DEGREE] = f[ACCURACY], f[DEGREE]

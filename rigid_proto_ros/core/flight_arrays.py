@@ -76,6 +76,7 @@ class FlightArrays:
         if len(self.f) < fl.ROOM + room:
             self.f = np.concatenate([self.f[: fl.ROOM], np.zeros(room)])
         f, n = self.f, self.n
+        f[fl.ROOM :] = 0.0
         self.row = f[fl.ROW : fl.ROW + 13]
         f[fl.BODY : fl.BODY + BODY] = setup.body_row
         f[fl.COMMON : fl.COMMON + SIZE] = setup.problem
