@@ -17,8 +17,8 @@ from .compilation import njit
 from .integrators import control as ctl
 from .integrators.auto import kind_of_segment
 from .integrators.integrator import MAX_SPEED
-from .integrators.stepping import EVALUATIONS as COST
 from .integrators.stepping import ADAPTIVE, SLEEPS, WAY, commit, is_provided, reach
+from .integrators.stepping import EVALUATIONS as COST
 from .loads import LOAD, LOADS_SIZE, apply_impulse, is_zero, share_of
 from .motion import HAND_WORK, HEAT, STORED, to_good_row, to_variables
 
