@@ -31,8 +31,8 @@ def test_a_book_thrown_on_a_slack_rope_lands_where_the_reference_has_it(accuracy
     simulation = thrown(accuracy)
     simulation.advance(1)
     segment = simulation._segment
-    y = segment._variables
-    (exact,) = reference_motion(reference_problem(segment._problem), [*y[7:10], *y[0:4], *y[10:13], *y[4:7]], [2.0], 20)
+    y = segment.variables
+    (exact,) = reference_motion(reference_problem(segment.problem), [*y[7:10], *y[0:4], *y[10:13], *y[4:7]], [2.0], 20)
     state = simulation.advance(2 * SECOND)
     assert not simulation.failure
     # Measured 2 to 5e-3 of it.
