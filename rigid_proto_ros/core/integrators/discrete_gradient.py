@@ -13,8 +13,8 @@ free end exact too. Attitude and spin: integrators/midpoint_spin.py.
 Order 2 while ω_s h is small, bounded energy at any ω_s h: a stiff string becomes an inextensible one, its unresolved swing
 along its length wrong in phase. Given μ, what remains is one equation for the mean spin (Newton); μ itself is the root of a
 monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺. Where the spin turns by so much in
-a step that none is found, the step is halved until one is, down to a 4096th: energy allows a solution at any length, not every
-guess leads to it. A string so stiff and so far stretched that the body turns about many times within that ends the flight.
+a step that none is found, or rounding leaves one that doesn't keep the energy, the step is halved until there is one. Where
+that takes too many parts the string is taken as inextensible over the step (integrators/inextensible.py), which always has a solution.
 
 Attitude and displacement carry low words, and everything else about the string is computed as a change (integrators/knot.py):
 otherwise roundings of the knot's place, weighed by the tension, add up to 1e-8 of the energy at 1e5 rad/s.
@@ -46,6 +46,7 @@ from ..problem import (
 from ..rotation import multiply, rotate, rotate_inverse
 from ..string import NO_DIRECTION
 from .equations import torque
+from .inextensible import inextensible_step, kinetic_energy, potential_energy
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
 from .knot import knot_and_stretch, moved_pair, unit_attitude
 from .midpoint_spin import (
@@ -64,6 +65,12 @@ _PULL_TRIALS = 100
 
 _MOST_HALVINGS = 12
 """Of a step for which no solution is found: a string that turns the body about within the step."""
+
+_LOSS = 1e-11
+"""Of the energy, in one step: what differs by more is no solution but a tension that changes by its own size within roundings."""
+
+_MOST_PARTS = 256
+"""Of a step, tried ones included: with 2 µs each a step of 1 ms is made in time."""
 
 # Of the scratch array: mean spin, the force it came to, the vector from free end to knot at the start and its change; its
 # length and stretch at the start.
@@ -228,6 +235,26 @@ def _solve_pull(y, p, h, s):
 
 
 @njit(cache=True, error_model="numpy")
+def _keeps_energy(y, p, h, out, s):
+    """Whether kinetic and potential energy changed by the work of loads and dampers, as a solution's do."""
+    ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
+    F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
+    mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
+    tx, ty, tz = torque(mx, my, mz, mw, ox, oy, oz, p)
+    push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
+    work, weight = h * (ox * tx + oy * ty + oz * tz), 0.0
+    for k in range(3):
+        mean = 0.5 * (y[10 + k] + out[10 + k])
+        work += h * p[MASS] * mean * (push[k] + p[G + k] - c * mean)
+        weight += p[MASS] * abs(p[G + k])
+    before = kinetic_energy(y, p) + potential_energy(s[_STRETCH], p)
+    after = kinetic_energy(out, p) + potential_energy(knot_and_stretch(out, p)[4], p)
+    heat = out[HEAT] - y[HEAT]
+    size = max(before, after) + heat + abs(work) + weight * s[_LENGTH]
+    return abs(after - before + heat - work) <= _LOSS * size + 4.0 * ROUNDING * out[HEAT]
+
+
+@njit(cache=True, error_model="numpy")
 def _step(y, p, h, out, s):
     """One step from y into out; returns whether a solution was found."""
     s[_O], s[_O + 1], s[_O + 2] = y[4], y[5], y[6]
@@ -262,7 +289,7 @@ def _step(y, p, h, out, s):
     out[13], out[14] = y[13], y[14]
     if p[TRANSLATES] != 0.0:
         _translate(y, p, h, out, s)
-    return True
+    return p[HAS_STRING] == 0.0 or _keeps_energy(y, p, h, out, s)
 
 
 @njit(cache=True, error_model="numpy")
@@ -299,21 +326,23 @@ def _translate(y, p, h, out, s):
 
 @njit(cache=True, error_model="numpy")
 def _step_in_parts(y, p, h, out, part, s):
-    """A step as a chain of shorter ones, halved until a solution is found and doubled again where they meet."""
+    """A step as a chain of shorter ones, halved until a solution is found and doubled again where they meet; whether it got through."""
     part[:] = y
     halvings, done, whole = 1, 0, 1 << _MOST_HALVINGS
-    while done < whole:
+    for _ in range(_MOST_PARTS):
         size = whole >> halvings
         if _step(part, p, h * size / whole, out, s) and is_good(out):
             part[:] = out
             done += size
+            if done == whole:
+                return True
             while halvings > 0 and done % (2 * (whole >> halvings)) == 0:
                 halvings -= 1
         else:
             halvings += 1
             if halvings > _MOST_HALVINGS:
                 return False
-    return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
@@ -321,8 +350,13 @@ def discrete_gradient_steps(y, p, h, n):
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new, part, scratch = y.copy(), y.copy(), np.zeros(_SIZE)
     for done in range(n):
-        if not (_step(y, p, h, new, scratch) and is_good(new)) and not _step_in_parts(y, p, h, new, part, scratch):
-            return done
+        found = _step(y, p, h, new, scratch) and is_good(new)
+        if not found and not _step_in_parts(y, p, h, new, part, scratch):
+            if p[HAS_STRING] == 0.0:
+                return done
+            inextensible_step(y, p, h, new)
+            if not is_good(new):
+                return done
         y[:] = new
     return n
 
@@ -332,7 +366,7 @@ DISCRETE_GRADIENT = Integrator(
     order=2,
     evaluations=12,
     source="Gonzalez, J. Nonlinear Sci. 6 (1996) 449, with the midpoint rule of Simo and Wong (1991)",
-    limits="Bounded energy at any stiffness, until the string turns the body about many times within a step: there it stops. A swing along the string that the step doesn't resolve has the wrong phase.",
+    limits="Bounded energy at any stiffness. A swing along the string that the step doesn't resolve has the wrong phase; where the string turns the body about many times within a step, the string counts as inextensible.",
     stability_limit=1.0,
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=discrete_gradient_steps,
