@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Strings that no step resolves, 1e6 to 1e13 rad/s, on bodies of a nanometre to ten metres: every flight goes on, and energy stays bounded."""
 
+import json
+
 import numpy as np
 import pytest
 from flights import SECOND, flight
 
+from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.core.body import make_body
 from rigid_proto_ros.core.rotation import rotate
 from rigid_proto_ros.core.string import StringSettings
@@ -84,3 +87,13 @@ def test_strings_that_no_step_resolves_keep_the_energy_and_never_end_a_flight():
 @pytest.mark.parametrize("first", range(0, STRESS_SCENES, 15))
 def test_more_strings_that_no_step_resolves(first):
     check(range(1000 + first, 1000 + first + 15))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-9])
+def test_a_tiny_body_on_the_default_string_flies_to_the_end(scale, capsys):
+    settings = (f"scale=[{scale}, {scale}, {scale}]", "string.attached=true", "initial.position=[0.3, 0, 1]")
+    command = ["simulate", "book", "--duration", "0.2", "--json"]
+    assert main([*command, *(word for setting in settings for word in ("--set", setting))]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["time_ns"] == SECOND // 5
+    assert "accuracy 1e-09 is not held" in printed.err
