@@ -8,10 +8,12 @@
 | spin, no torque, no force that turns along | one exact step, however long |
 | a body-axes wrench, damping | Taylor series of the spin and what it carries along |
 | loads that depend on the attitude, a string | Taylor series of the whole motion |
+| loads so weak against the spin that many turns pass before they show | free_body_strang, steps as long as the accuracy allows |
 | damping that dies out long before anything else moves | Radau IIA, implicit, steps as long as the accuracy allows |
 | a string too stiff to resolve | discrete_gradient at the fixed step, accuracy not met and said so |
 
-Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's problem and start; steps are functions of what they start from.
+Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's problem and
+start and of the accuracy; steps are functions of what they start from.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ from ..problem import (
     TRANSLATES,
 )
 from ..rotation import multiply, normalize, rotate
-from . import series_steps, stiff_steps, taylor_adaptive
+from . import series_steps, splitting_steps, stiff_steps, taylor_adaptive
 from .discrete_gradient import DISCRETE_GRADIENT
 from .equations import stretch
 from .exponential import exponential
@@ -89,7 +91,8 @@ def steady_steps(y, p, h, n):
     return n
 
 
-ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(10)
+ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, WEAK_LOADS = range(7)
+SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(7, 11)
 """Kinds of segments, as the table above has them; each is one of auto's methods."""
 
 
@@ -155,7 +158,7 @@ def _kind_on_string(p, y):
 
 @njit(cache=True, error_model="numpy")
 def kind_of_segment(p, y, accuracy):
-    """Which of the kinds a segment with problem p from variables y on is."""
+    """Which of the kinds a segment with problem p from variables y on is, at this accuracy."""
     spins = _vector(y, 4)
     turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
     translates = p[TRANSLATES] != 0.0
@@ -171,6 +174,8 @@ def kind_of_segment(p, y, accuracy):
             return STEADY
         if not translates:
             return FREE
+    if spins and splitting_steps.splitting_pays(p, y, accuracy):
+        return WEAK_LOADS
     return ANY_LOADS if p[HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
 
 
@@ -200,6 +205,12 @@ def _methods(integrator: Integrator) -> tuple[Method, ...]:
             ADAPTIVE, taylor_adaptive.steps, _series("the loads turn with the body"), 0, taylor_adaptive.workspace
         ),
         ANY_LOADS: Method(ADAPTIVE, series[0], _series("loads that depend on the attitude"), 0, series[1]),
+        WEAK_LOADS: Method(
+            ADAPTIVE,
+            splitting_steps.steps,
+            _constant("auto: free_body_strang, loads weak against the spin"),
+            workspace=splitting_steps.workspace,
+        ),
         SLACK_AT_REST: Method(
             NOTHING,
             None,
