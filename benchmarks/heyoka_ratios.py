@@ -25,7 +25,10 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
+from rigid_proto_ros.core import flight as fl
 from rigid_proto_ros.core.integrators import control as ctl
+from rigid_proto_ros.core.integrators.stepping import ADAPTIVE
+from rigid_proto_ros.core.kernel_calls import ADAPTIVE_STEPS, entry_of
 from rigid_proto_ros.core.motion import new_variables, to_row
 from work_precision_ours import prepare_simulation, simulation_of
 from work_precision_ratios import time_at_error
@@ -42,22 +45,24 @@ def kernel_runs(problem: Problem, accuracy: float):
         return None
     simulation = simulation_of(problem, "auto", 1e-3, accuracy)
     simulation.advance(1)
-    segment = simulation._segment
-    stepper, p = segment.stepper, segment._problem
-    if not hasattr(stepper, "_control"):
+    arrays, p = simulation._arrays, simulation._segment.problem
+    method = arrays.method
+    if method.way != ADAPTIVE:
         return None
-    start, fresh = new_variables(segment.start.row, p), np.zeros_like(stepper._control)
-    fresh[ctl.ACCURACY], fresh[ctl.DEGREE] = accuracy, stepper._control[ctl.DEGREE]
-    y, control, kernel = start.copy(), fresh.copy(), stepper._kernel
+    degree = int(arrays.f[fl.DEGREE])
+    start, fresh = new_variables(simulation._segment.start.row, p), ctl.new_control(accuracy, degree)
+    y, following, control = start.copy(), start.copy(), fresh.copy()
+    workspace = method.workspace(degree)
+    kernel = entry_of(method.kernel, ADAPTIVE_STEPS.signature)
     end_ns = round(problem.duration * 1e9)
 
     def restart():
         y[:], control[:] = start, fresh
 
     def run():
-        came = kernel(y, p, control, stepper._following, stepper._workspace, end_ns, False)
+        came = kernel(y, p, control, following, workspace, end_ns, False)
         if came < end_ns:
-            kernel(y, p, control, stepper._following, stepper._workspace, end_ns - came, True)
+            kernel(y, p, control, following, workspace, end_ns - came, True)
 
     def row():
         out = np.zeros(13)
