@@ -4,7 +4,7 @@
 Written from docs/physics.md alone: position, attitude, velocity and angular momentum in world axes, an explicit Runge-Kutta
 method of order 8 at steps far below every time scale of the flight, summed with compensation, and a search of its own for slack and taut:
 a step in which the string's law changes, or in which the cubic through its ends says that it does, is taken once more up to
-there. Checked against mpmath in test_reference_motion.py.
+there.
 
 A flight can be disturbed all along by errors of a given rate, always in the same direction for a while: what comes of
 them at the end is the flight's condition.

@@ -26,17 +26,19 @@ def thrown(accuracy=1e-9, **changes):
     return flight(bundled_body("book"), integrator="auto", accuracy=accuracy, **{**values, **changes})
 
 
-@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9, 1e-12])
-def test_a_book_thrown_on_a_slack_rope_lands_where_the_reference_has_it(accuracy):
-    simulation = thrown(accuracy)
+def test_a_book_thrown_on_a_slack_rope_lands_where_the_reference_has_it():
+    simulation = thrown()
     simulation.advance(1)
     segment = simulation._segment
     y = segment.variables
     (exact,) = reference_motion(reference_problem(segment.problem), [*y[7:10], *y[0:4], *y[10:13], *y[4:7]], [2.0], 20)
-    state = simulation.advance(2 * SECOND)
-    assert not simulation.failure
-    # Measured 2 to 5e-3 of it.
-    assert np.abs(state.position - np.array(exact[0:3], float)).max() <= 2.0 * accuracy
+    for accuracy in (1e-3, 1e-6, 1e-9, 1e-12):
+        simulation = thrown(accuracy)
+        simulation.advance(1)
+        state = simulation.advance(2 * SECOND)
+        assert not simulation.failure
+        # Measured 6e-4 to 1.6e-3 of it.
+        assert np.abs(state.position - np.array(exact[0:3], float)).max() <= 2.0 * accuracy
 
 
 def test_a_ball_that_leaves_its_own_target_bounces_between_both_ends_of_its_rope():
@@ -53,7 +55,7 @@ def test_a_ball_that_leaves_its_own_target_bounces_between_both_ends_of_its_rope
         away = since * speed - rest_length
         if since > 2.0 * there:
             away = rest_length + speed / rate * math.sin(rate * (since - 2.0 * there))
-        # Measured 3e-13.
+        # Measured 2.3e-10.
         assert abs(x - away * (-1.0) ** bounces) <= 1e-9, time
 
 
@@ -101,9 +103,9 @@ def test_the_first_rise_of_a_polynomial_is_never_a_later_one(roots, first):
         assert abs(found - first) <= 1e-9
 
 
-def test_the_first_rise_is_that_of_ten_thousand_polynomials_with_known_roots():
+def test_the_first_rise_is_that_of_thousands_of_polynomials_with_known_roots():
     rng = np.random.default_rng(7)
-    for _ in range(10_000):
+    for _ in range(2_000):
         roots = np.sort(rng.uniform(-0.5, 1.5, rng.integers(1, 9)))
         if np.diff(roots, append=9.0).min() < 1e-3:
             continue
@@ -113,3 +115,20 @@ def test_the_first_rise_is_that_of_ten_thousand_polynomials_with_known_roots():
         inside = roots[(roots > 0.0) & (roots < 1.0)]
         found = first_rise(g, len(g) - 1)
         assert abs(found - (inside[0] if inside.size else NONE)) <= 1e-9
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "dop853"])
+def test_a_fixed_step_finds_the_spell_in_which_a_ball_thrown_through_its_target_is_held(integrator):
+    """Both ends of the one step lie near the free end, which the ball first nears; in between its rope is stretched for 0.3 s."""
+    rope = StringSettings(attached=True, rest_length=0.2, stiffness=8.0, damping_ratio=0.0, timeout_ns=0)
+    row = [0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.8, 0.0, 0.0, 0.0]
+    gravity = np.array([0.0, 0.0, -9.81])
+    held, exact = (
+        flight(BALL, integrator=name, step_s=0.5, accuracy=1e-12, initial=row, string=rope, gravity=gravity)
+        for name in (integrator, "auto")
+    )
+    z = exact.advance(SECOND // 2).position[2]
+    falls = -0.1 + 2.8 * 0.5 - 0.5 * 9.81 * 0.25
+    assert falls - z > 0.01
+    # Measured 3e-5 (rk4), 2e-10 (dop853).
+    assert abs(held.advance(SECOND // 2).position[2] - z) <= 1e-4

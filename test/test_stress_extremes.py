@@ -147,5 +147,5 @@ def test_a_spin_whose_series_squared_would_overflow_is_flown_in_steps_as_long_as
     simulation.submit(wrench(frame, (1.0, 2.0, 3.0)), 0)
     simulation.advance(20_000)
     assert not simulation.failure
-    # Measured 0.67 to 0.77 rad a step; the shortest step is a nanosecond.
+    # Measured 1.37 to 1.48 rad a step; the shortest step is a nanosecond.
     assert spin * 20e-6 / simulation.steps > 0.3

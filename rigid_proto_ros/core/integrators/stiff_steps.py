@@ -21,7 +21,7 @@ from .equations import accelerations, knot, stretch, tension_margin
 from .error_measure import FLOOR, scales, size
 from .radau import HALVES, STAGES, radau_step, stage_variables
 from .runge_kutta import is_good
-from .slack import extremum
+from .slack import first_spell, knot_of
 
 SAFETY = 0.8
 """Part of the step length that the error estimate would allow."""
@@ -112,8 +112,7 @@ def _first_sample(y, p, h, taut, first, second, middle, at):
     """Time in (0, h] of the first stage of the two halves at which the string's law is the other one, or at which it is hidden between
     two; 0 for none. at: scratch (STORED,).
     """
-    x0, rate0 = stretch(y, p)
-    before = 0.0
+    x0, place0, before = stretch(y, p)[0], knot_of(y, p), 0.0
     for half in range(2):
         start, V = (y, first) if half == 0 else (middle, second)
         for i in range(STAGES):
@@ -121,11 +120,12 @@ def _first_sample(y, p, h, taut, first, second, middle, at):
             x1, rate1 = stretch(at, p)
             if (tension_margin(x1, rate1, p) > 0.0) != taut:
                 return t
+            place1 = knot_of(at, p)
             if not taut and x0 < 0.0 and x1 < 0.0:
-                hidden = extremum(x0, rate0, x1, rate1, t - before, taut)
+                hidden, _ = first_spell(place0, place1, t - before, x0, p, taut)
                 if hidden > 0.0:
                     return before + hidden
-            before, x0, rate0 = t, x1, rate1
+            before, x0, place0 = t, x1, place1
     return 0.0
 
 
