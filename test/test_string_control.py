@@ -9,9 +9,13 @@ import trimesh
 from flights import SECOND
 
 from rigid_proto_ros.command_codec import string_attach, string_target
+from rigid_proto_ros.core.body import make_body
 from rigid_proto_ros.core.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
 from rigid_proto_ros.core.errors import CommandRefused
+from rigid_proto_ros.core.rotation import rotate
 from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.core.state import State
+from rigid_proto_ros.core.string import StringSettings, tie
 from rigid_proto_ros.scenario import make_scenario
 
 SCENE = {
@@ -289,3 +293,16 @@ def test_a_target_that_would_pull_beyond_every_measure_is_refused_when_it_takes_
     assert simulation.refused == {"magnitude": 1}
     untouched, _ = simulated()
     assert (end.row == untouched.advance(SECOND).row).all()
+
+
+def test_a_span_that_is_rounding_alone_gives_the_effective_mass_no_direction():
+    body, arm = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04])), np.array([0.1, 0.15, 0.2])
+    inverse = sum(1.0 / effective_mass(body, arm, n) for n in np.eye(3)) / 3.0
+    rng = np.random.default_rng(4)
+    for far in (0.0, 1.0, 1e3):
+        for _ in range(20):
+            q, target = rng.normal(size=4), far * rng.normal(size=3)
+            q /= np.linalg.norm(q)
+            state = State(0, np.array([*(target - rotate(*q, *arm)), *q, *np.zeros(6)]))
+            string = tie(StringSettings(attached=True), arm, target, body, state, 0)
+            assert string.effective_mass == pytest.approx(1.0 / inverse, rel=1e-12)

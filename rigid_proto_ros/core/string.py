@@ -28,6 +28,9 @@ RAMP_NS = 100_000_000
 NO_DIRECTION = 1e-12
 """Rest lengths from the free end within which the string doesn't pull."""
 
+ROUNDINGS = 4.0
+"""Of position and arm, that a span of zero may come to when it is computed."""
+
 
 @dataclass(frozen=True)
 class StringSettings:
@@ -140,7 +143,8 @@ class Tied:
     def settled(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> Tied:
         """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the effective
         mass of the body as it is."""
-        mass = mass or effective_mass(body, self.arm(body), state, self.span(body, state))
+        least = NO_DIRECTION * settings.rest_length
+        mass = mass or effective_mass(body, self.arm(body), state, self.span(body, state), least)
         stiffness = mass * settings.frequency**2 if settings.frequency > 0.0 else settings.stiffness
         return replace(
             self,
@@ -178,10 +182,12 @@ def tie(settings: StringSettings, attach, target, body: Body, state: State, time
     return tied.settled(settings, body, state, mass)
 
 
-def effective_mass(body: Body, arm, state: State, span) -> float:
-    """m_eff [kg] of the point ``arm`` (3,) [m, body] along ``span`` (3,) [world]; over all directions when span is 0."""
+def effective_mass(body: Body, arm, state: State, span, least: float) -> float:
+    """m_eff [kg] of the point ``arm`` (3,) [m, body] along ``span`` (3,) [world]; over all directions when the span is none: shorter
+    than ``least`` [m] or what rounding of the places that it lies between makes of zero.
+    """
     length = _length(span)
-    if length > 0.0:
+    if length > max(least, ROUNDINGS * 2.0**-52 * (_length(state.position) + _length(np.asarray(arm)))):
         R = state.rotation
         direction = R[0] * span[0] + R[1] * span[1] + R[2] * span[2]
         directions, weight = [direction / length], 1.0
