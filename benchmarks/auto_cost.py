@@ -64,10 +64,13 @@ def _difference(y, exact, p, elapsed):
 
 
 def starts_of(simulation, until_ns: int, count: int) -> list[tuple]:
-    """(problem, variables, time in the segment [s], time left in it [s]) at random times of a flight."""
+    """(problem, variables, time in the segment [s]) at a flight's start, where what dies out fast is still there, and at
+    random times of it.
+    """
     rng = np.random.default_rng(1)
-    found = []
-    for at_ns in np.sort(rng.integers(1, until_ns, count)):
+    simulation.advance(1)
+    found = [(simulation._segment.problem.copy(), simulation._segment.variables.copy(), 0.0)]
+    for at_ns in np.sort(rng.integers(2, until_ns, count)):
         simulation.advance(int(at_ns))
         segment = simulation._segment
         if simulation._segment.start.time_ns == at_ns:
