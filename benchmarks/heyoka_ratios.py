@@ -3,7 +3,8 @@
 
 For each problem both are flown over a range of accuracies and tolerances, and the times at an error are read off the two
 curves (log-log). `kernel` is the compiled loop over steps, called from Python as heyoka's propagate_until is; `simulation` is
-Simulation.advance with its commands and segments. What heyoka compiles, one system and tolerance at a time, isn't counted.
+Simulation.advance with its commands and segments; `sweep` is a row of a sweep's compiled block, its body and end state
+included, on one core. What heyoka compiles, one system and tolerance at a time, isn't counted.
 
     python benchmarks/heyoka_ratios.py [--only P2,damped,...] [--seconds 2]
 """
@@ -25,17 +26,26 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
+from rigid_proto_ros.core import batch_body as bb
 from rigid_proto_ros.core import flight as fl
+from rigid_proto_ros.core import loads as ld
+from rigid_proto_ros.core.batch import Variants, fly_variants
+from rigid_proto_ros.core.flight_measures import MEASURE
+from rigid_proto_ros.core.integrators import INTEGRATORS
 from rigid_proto_ros.core.integrators import control as ctl
 from rigid_proto_ros.core.integrators.stepping import ADAPTIVE
+from rigid_proto_ros.core.integrators.taylor_adaptive import degree_for
 from rigid_proto_ros.core.kernel_calls import ADAPTIVE_STEPS, entry_of
 from rigid_proto_ros.core.motion import new_variables, to_row
+from rigid_proto_ros.core.rotation import matrix_from_quaternion
 from work_precision_ours import prepare_simulation, simulation_of
 from work_precision_ratios import time_at_error
 
 TARGETS = (1e-6, 1e-8, 1e-10)
 KNOBS = [10.0 ** (-k / 2) for k in range(4, 29)]
-FLIGHTS, IN_A_ROW = 8, 10
+FLIGHTS, ROWS, IN_A_ROW = 8, 1024, 10
+SHARES = {"heyoka batch": FLIGHTS, "sweep": ROWS}
+"""Flights in a run."""
 COLUMNS = ("problem", "what", "error_rad", "us", "heyoka_us", "ratio")
 
 
@@ -104,7 +114,45 @@ def batch_runs(problem: Problem, tolerance: float):
     return run, lambda: peers_heyoka.row_of(integrator.state[:, 0], axes), restart
 
 
+def sweep_runs(problem: Problem, accuracy: float):
+    """ROWS rows by a sweep's compiled block, of which the first is the problem's and the others nearly so."""
+    if problem.spring is not None:
+        return None
+    settings = np.zeros((ROWS, bb.SETTINGS))
+    settings[:, bb.SCALE : bb.SCALE + 3] = 1.0
+    settings[:, bb.GIVEN_MASS] = problem.mass
+    settings[:, bb.GIVEN_TENSOR : bb.GIVEN_TENSOR + 6] = np.array(problem.inertia)[np.triu_indices(3)]
+    settings[:, bb.GRAVITY : bb.GRAVITY + 3] = problem.gravity
+    settings[:, bb.LINEAR_DAMPING], settings[:, bb.ANGULAR_DAMPING] = problem.linear_damping, problem.angular_damping
+    row = np.array(problem.row)
+    settings[:, bb.POSITION : bb.ANGULAR_VELOCITY] = row[:10]
+    settings[:, bb.ANGULAR_VELOCITY : bb.ANGULAR_VELOCITY + 3] = matrix_from_quaternion(row[3:7]) @ row[10:]
+    settings[:, bb.ANGULAR_VELOCITY : bb.ANGULAR_VELOCITY + 3] *= 1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS
+    settings[:, bb.ACCURACY] = accuracy
+    times, constants = np.zeros((1, bb.TIMES), np.int64), np.zeros(bb.CONSTANTS)
+    times[0, bb.STEP_NS], times[0, bb.POKE_NS], times[0, bb.DEGREE] = 1_000_000, 50_000_000, degree_for(accuracy)
+    constants[bb.GYROSCOPIC] = 1.0
+    commands = np.zeros((1, len(problem.wrenches), 3), np.int64)
+    rows = np.zeros((1, len(problem.wrenches), ld.LOAD))
+    for command, row, w in zip(commands[0], rows[0], problem.wrenches, strict=True):
+        kind = fl.IMPULSE if w.impulse else fl.HELD_WRENCH if w.end is None else fl.PULSE
+        lasts = -1 if w.end is None else round(w.end * 1e9) - round(w.begin * 1e9)
+        command[:] = round(w.begin * 1e9), lasts, kind
+        row[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
+        row[ld.HAS_POINT], row[ld.POINT : ld.POINT + 3] = 1.0, w.point
+        row[ld.FORCE : ld.FORCE + 3], row[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque
+    variants = Variants(settings, times, np.zeros((1, 0, 4)), constants, INTEGRATORS["auto"], commands, rows)
+    looks = np.array([round(problem.duration * 1e9)]), np.ones(1, bool), np.zeros((0, 3)), np.zeros((0, MEASURE))
+    found = {}
+
+    def run():
+        found["results"] = fly_variants(variants, None, *looks)
+
+    return run, lambda: found["results"].states[0], lambda: None
+
+
 CURVES = {
+    "sweep": sweep_runs,
     "heyoka": whole(peers_heyoka.prepare),
     "heyoka batch": batch_runs,
     "kernel": kernel_runs,
@@ -126,16 +174,16 @@ def curves(problem: Problem, seconds: float) -> dict[str, list[dict]]:
             known.append((what, run, errors(problem, row(), reference)["attitude_error_rad"], restart, []))
     until = time.perf_counter() + seconds
     while time.perf_counter() < until or len(known[0][-1]) < 5:
-        for _, run, _, restart, times in known:
+        for what, run, _, restart, times in known:
             # Several in a row: code and data are then where they are while one tool is used.
-            for _ in range(IN_A_ROW):
+            for _ in range(1 if what == "sweep" else IN_A_ROW):
                 restart()
                 begin = time.perf_counter()
                 run()
                 times.append(time.perf_counter() - begin)
     found: dict[str, list[dict]] = {what: [] for what in CURVES}
     for what, _, error, _, times in known:
-        share = FLIGHTS if what == "heyoka batch" else 1
+        share = SHARES.get(what, 1)
         found[what].append({"median_s": min(times) / share, "attitude_error_rad": error})
     return {what: sorted(rows, key=lambda r: r["median_s"]) for what, rows in found.items() if rows}
 
