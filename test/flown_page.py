@@ -289,9 +289,6 @@ class FlownPage:
         place = state.position + state.rotation @ body.point(tuple(mesh_point))
         drawn = (place - view.origin) / view.unit
         self.do(lambda: self.page.pointer.grab(1, drawn, drawn))
-        drag = self.page.pointer._drag
-        grabbed_s = drag.last_target_s
-        self.until(lambda: drag.last_target_s > grabbed_s, "first target, which follows the knot")
         return place
 
     def pull(self, place) -> None:

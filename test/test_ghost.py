@@ -6,8 +6,12 @@ from __future__ import annotations
 import pytest
 from flights import SECOND
 
+from rigid_proto_ros.core.commands import WrenchCommand
 from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.core.frames import parse_frame
 from rigid_proto_ros.core.observer import BodySnapshot, Observer
+from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.ghost import ghost_of
 from rigid_proto_ros.scenario import make_scenario
 
 MOVING = {
@@ -24,6 +28,10 @@ class Watcher(Observer):
         self.began: list[int] = []
         self.body: dict[int, list[float]] = {}
         self.ghost: dict[int, list[float]] = {}
+        self.refusals: list[tuple[str, str]] = []
+
+    def refused(self, time_ns: int, reason: str, message: str) -> None:
+        self.refusals.append((reason, message))
 
     def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
         self.began.append(time_ns)
@@ -41,6 +49,31 @@ def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():
     scenario = make_scenario({"string.attached": True})
     with pytest.raises(InputError, match=r"ghost\.integrator"):
         scenario.with_changes({"ghost.integrator": "free_body"})
+
+
+def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset():
+    watcher = Watcher()
+    scenario = make_scenario({"ghost.integrator": "free_body"})
+    simulation = Simulation(scenario.setup, watcher)
+    ghost = ghost_of(scenario, simulation, watcher)
+    push = WrenchCommand(False, parse_frame("world@com", frozenset()), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0, "", b"")
+
+    def fly() -> None:
+        simulation.submit(push)
+        simulation.submit(push, simulation.time_ns + 1_000_000)
+        end_ns = simulation.time_ns + SECOND // 10
+        simulation.advance(end_ns)
+        ghost.advance(end_ns)
+
+    fly()
+    fly()
+    ((reason, text),) = watcher.refusals
+    assert reason == "ghost" and "the ghost goes on without" in text and "free_body" in text
+    assert not simulation.refused  # the body itself carries it
+    simulation.reset()
+    ghost.reset(scenario)
+    fly()
+    assert len(watcher.refusals) == 2
 
 
 def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():

@@ -26,7 +26,7 @@ class Hand:
     """A pointer on a body of the link's own simulation."""
 
     def __init__(self, paused: bool) -> None:
-        self.link = FlownLink("/rigid_body", lambda *_: None, lambda text: None, lambda values: None)
+        self.link = FlownLink("/rigid_body", lambda function, *arguments: function(*arguments), lambda text: None, lambda values: None)
         self.page = SimpleNamespace(scenario=self.link.scenario, paused=paused)
         self.hand = HandCommands(self.link, lambda: self.page.paused)
         state = self.link.simulation.state
@@ -80,12 +80,47 @@ def test_what_is_done_together_in_flight_is_one_message_and_waits_for_nothing() 
     hand.pointer._tools.at_com = True
     hand.pointer.knot_moved()
     asyncio.run(grab())
-    assert hand.link.received == 3
+    assert hand.link.received == 4
     hand.link.fly(0.01)
-    (frequency, aside, knot) = (decode_event(line, 1)[2] for line in hand.link._log.lines)
+    (frequency, aside, knot, target) = (decode_event(line, 1)[2] for line in hand.link._log.lines)
+    assert hand.kinds() == ["set", "set", "set", "string_target"] and target["point"] == [0.0, 0.0, 0.1]
     assert frequency == {"string.frequency": 8.0}
     assert knot["string.attach"] == hand.link.scenario.values["string.attach"] != aside["string.attach"]
     assert hand.pointer.dragging
+
+
+def test_parameters_set_while_paused_act_between_what_is_done_by_hand_before_and_after() -> None:
+    hand = Hand(paused=True)
+    answers: list[bool] = []
+
+    def set_mass(kilograms: float) -> None:
+        hand.hand.set_parameters({"mass": kilograms}, lambda successful, reason: answers.append(successful))
+
+    eye, direction = np.array([1.0, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+
+    def click() -> None:
+        assert hand.pointer.click(eye, direction, hand.seen, push=False)
+
+    click()
+    set_mass(1.0)
+    set_mass(2.0)  # the slider goes on
+    click()
+    set_mass(-1.0)
+    set_mass(3.0)
+    # Seen at once, as the node has them; nothing else has acted.
+    assert hand.link.scenario.values["mass"] == 3.0 and not hand.kinds()
+    assert answers == [True, True, False, True]
+    hand.hand.go_on()
+    hand.link.fly(0.001)
+    acted = [decode_event(line, 1)[1:] for line in hand.link._log.lines]
+    in_order = [("poke", None), ("set", 2.0), ("poke", None), ("set", 3.0)]
+    assert [(kind, content.get("mass")) for kind, content in acted][:4] == in_order
+    assert hand.link.scenario.values["mass"] == hand.link.simulation.setup.body.mass == 3.0
+    # Nothing done by hand: the service alone.
+    set_mass(4.0)
+    received = hand.link.received
+    hand.hand.go_on()
+    assert hand.link.received == received and hand.link.scenario.values["mass"] == 4.0
 
 
 def test_what_was_done_before_a_reset_is_forgotten_with_it() -> None:

@@ -84,10 +84,10 @@ def test_keys_pause_step_look_back_reset_and_are_listed(desk, browser_page) -> N
     pressed(desk, page, "Backspace", lambda: desk.page.looking_at == 2_000_000_000)
     pressed(desk, page, "ArrowLeft", lambda: desk.page.looking_at == 1_990_000_000)
     pressed(desk, page, "ArrowRight", lambda: desk.page.looking_at == 2_000_000_000)
-    pressed(desk, page, "Space", lambda: desk.page.looking_at is None)
+    pressed(desk, page, "n", lambda: desk.page.looking_at is None and told[-1] == ("pause", False))
     for key in ("Shift+?", "h"):
         desk.said.clear()
-        pressed(desk, page, key, lambda: any("Backspace: look 1 s back" in text for text in desk.said))
+        pressed(desk, page, key, lambda: any("Backspace: rewind 1 s" in text for text in desk.said))
 
 
 def test_letters_typed_into_an_input_are_no_keys(desk, browser_page) -> None:

@@ -3,7 +3,8 @@
 
 Single messages of one instant act by their kind and bytes, those of a list in its order. What is done together goes as a list;
 and while simulated time stands still, where all is done in one instant, everything is kept and goes as one list right before time
-goes on.
+goes on. Parameters that are set meanwhile are the node's at once, so that they are seen, and stand in the list again: their own
+changes act after all lists, and then change nothing any more.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..command_codec import ScriptCommand, outgoing
+from ..parameters import LIVE, parameter_named
+from ..ros.scheduling import SLOW
+from .rewind import KEPT
 from .ros_link import RosLink
 
 
@@ -21,6 +25,7 @@ class HandCommands:
         self._link = link
         self._paused = paused
         self._kept: list[ScriptCommand] = []
+        self._beside: list[ScriptCommand] = []
 
     @property
     def paused(self) -> bool:
@@ -33,12 +38,47 @@ class HandCommands:
         if not self.paused:
             self.go_on()
 
+    def set_parameters(self, changes: dict[str, object], done: Callable[[bool, str], None]) -> None:
+        """As RosLink.set_parameters, in the order of what is done by hand. A change of mesh, tensor or integrator isn't: a list that
+        has one waits until it is worked out, and with it what is done by hand; it acts after the list.
+        """
+        if not self.paused or not all(map(_is_ordered, changes)):
+            self._link.set_parameters(changes, done)
+            return
+        command = ScriptCommand(0, "set", changes=dict(changes))
+        last = self._kept[-1] if self._kept else None
+        if last is not None and any(last is beside for beside in self._beside) and _same_names(last, command):
+            self._drop(last)  # a slider on its way
+        self._kept.append(command)
+        self._beside.append(command)
+
+        def answered(successful: bool, reason: str) -> None:
+            if not successful:
+                self._drop(command)
+            done(successful, reason)
+
+        self._link.set_parameters(changes, answered)
+
     def go_on(self) -> None:
         """Send what was kept: to be called before simulated time goes on, or when that is heard."""
-        kept, self._kept = self._kept, []
-        for message in outgoing(kept):
-            self._link.send(message.topic, message.data)
+        kept, beside = self._kept, self._beside
+        self.forget()
+        if len(kept) > len(beside):
+            for message in outgoing(kept):
+                self._link.send(message.topic, message.data)
 
     def forget(self) -> None:
         """A reset has dropped what was to come."""
-        self._kept.clear()
+        self._kept, self._beside = [], []
+
+    def _drop(self, command: ScriptCommand) -> None:
+        self._kept = [kept for kept in self._kept if kept is not command]
+        self._beside = [beside for beside in self._beside if beside is not command]
+
+
+def _is_ordered(name: str) -> bool:
+    return parameter_named(name).changes == LIVE and name not in SLOW | KEPT
+
+
+def _same_names(first: ScriptCommand, second: ScriptCommand) -> bool:
+    return (first.changes or {}).keys() == (second.changes or {}).keys()

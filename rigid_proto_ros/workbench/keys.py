@@ -32,7 +32,7 @@ class Key:
 
 async def _pause(page: Page) -> None:
     if page.looking_at is not None:
-        page.resume_after_looking()
+        await page.go_on_from_here()
     else:
         page.pause(not page.paused)
 
@@ -54,8 +54,8 @@ async def _back(page: Page) -> None:
     page.look_by(BACK_S)
 
 
-async def _go_on(page: Page) -> None:
-    await page.go_on_from_here()
+async def _now(page: Page) -> None:
+    page.resume_after_looking()
 
 
 async def _reset(page: Page) -> None:
@@ -71,11 +71,11 @@ async def _list(page: Page) -> None:
 
 
 KEYS = (
-    Key("Space", "space", "pause or resume", _pause),
+    Key("Space", "space", "pause or resume; after rewinding, continue from there", _pause),
     Key("→", "arrowright", "one step forward; pauses first", _step),
-    Key("←", "arrowleft", "look one step back", _back_a_step),
-    Key("Backspace", "backspace", f"look {BACK_S:g} s back", _back),
-    Key("G", "G", "continue from the time shown", _go_on),
+    Key("←", "arrowleft", "one step back", _back_a_step),
+    Key("Backspace", "backspace", f"rewind {BACK_S:g} s", _back),
+    Key("N", "N", "return to now after rewinding", _now),
     Key("R", "R", "reset", _reset),
     Key("C", "C", "centre on the body", _centre),
     Key("?", "?", "list the keys", _list, "shift"),

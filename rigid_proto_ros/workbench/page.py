@@ -88,7 +88,7 @@ class Page:
         self.shadow = Shadow(self._ghost_refuses)
         self.hand = HandCommands(self.link, lambda: self.paused)
         self.pointer = Pointer(self.hand, self, self.sightings, self.tools)
-        self._setter = ParameterSetter(self.link.set_parameters, self._refused)
+        self._setter = ParameterSetter(self.hand.set_parameters, self._refused)
         self._controls = Controls(server.gui, self._setter.set, lambda text: self.say(text))
         self._readouts = ReadoutPanel(server)
         self._status = server.gui.add_markdown("")
@@ -191,6 +191,8 @@ class Page:
 
     def call(self, service: str, data: bool | None = None) -> None:
         """Call a service; a failure is said on the page."""
+        if service == "reset":
+            self.resume_after_looking()
         if service == "step" or (service == "pause" and not data):
             self.hand.go_on()
         self.link.call(service, data, lambda successful, message: None if successful else self.say(message))
@@ -287,8 +289,12 @@ class Page:
         self._session.look_by(seconds)
 
     async def go_on_from_here(self) -> None:
-        """Take the node to the moment that is looked at."""
+        """Take the node to the moment that is looked at, and let time go on from there."""
         await self._session.go_on_from_here()
+
+    def run_after_looking(self) -> None:
+        """Time goes on after this look back, though it stood still before."""
+        self._paused_before_looking = False
 
     def resume_after_looking(self) -> None:
         """Back to now, running or paused as it was."""
@@ -423,6 +429,8 @@ class Page:
             self._set_paused(bool(event["content"].get("data")))
         elif kind == "string_attach":
             self.pointer.knot_moved()
+        elif kind == "set" and isinstance(event["content"], dict):
+            self._scenes.string_changed(event["content"])
         if self.state is not None:
             try:
                 self._act(kind, event["content"], event["time_ns"])
@@ -475,7 +483,7 @@ class Page:
             self.side_by_side.show(now_s, self.scenario, state, ghost, self.history.ghost is not None)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else self.acting.string_energy(setup, state)
-        self._readouts.show(now_s, self.scenario, state, stretched, scales)
+        self._readouts.show(now_s, self.scenario, state, stretched, scales, self.side_by_side.angle)
 
     def _ghost_row(self, looking: bool) -> tuple[np.ndarray | None, np.ndarray]:
         """The ghost's state, and its COM in scaled mesh coordinates: the future that was left, or the scene's own ghost."""

@@ -83,7 +83,11 @@ class Panel:
         @buttons.on_click
         async def _(event) -> None:
             pressed = buttons.value
-            if pressed in (PAUSE, GO_ON):
+            if page.looking_at is not None and pressed == GO_ON:
+                await page.go_on_from_here()
+            elif page.looking_at is not None and pressed == STEP:
+                page.look_by(-page.step_s)
+            elif pressed in (PAUSE, GO_ON):
                 page.pause(pressed == PAUSE)
             else:
                 page.call(pressed.lower())
@@ -95,6 +99,8 @@ class Panel:
 
     def _start_folder(self) -> None:
         with self._gui.add_folder("Start, at the next reset"):
+            self._controls.vector("initial.position", "Initial position [m]", 3)
+            self._controls.vector("initial.orientation_xyzw", "Initial attitude x y z w", 4)
             self._controls.vector("initial.angular_velocity", "Initial spin [rad/s]", 3)
             self._controls.vector("initial.linear_velocity", "Initial velocity [m/s]", 3)
 

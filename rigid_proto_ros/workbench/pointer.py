@@ -15,9 +15,6 @@ from ..scenario import Scenario
 from .hand_commands import HandCommands
 from .sighting import DrawnPose, Sightings
 
-KNOT_LEAD_S = 0.01
-"""The first target follows the knot by this much: what pulls is settled by then, here as in the node."""
-
 HOLD_S = 0.2
 """A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that is
 short."""
@@ -166,11 +163,7 @@ class Pointer:
             commands.append(ScriptCommand(0, "string_attach", MESH_FRAME, point=_three(point)))
             self._knot_by_message = True
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
-        if self._hand.paused:
-            self._hand.do(*commands, self._target())
-        else:
-            self._hand.do(*commands)
-            asyncio.get_running_loop().call_later(KNOT_LEAD_S, self._send_target)
+        self._hand.do(*commands, self._target())
 
     def _tie_to(self, point, aside) -> list[ScriptCommand]:
         """The knot at a point that isn't on the surface: only the parameter can say so."""

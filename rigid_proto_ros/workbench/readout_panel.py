@@ -16,6 +16,8 @@ from ..appearance import (
     ENERGY_SERIES,
     ENERGY_TITLE,
     ENERGY_UNIT,
+    GHOST_ANGLE_TITLE,
+    GHOST_COLOUR,
     MOMENTUM_ANGLE_SERIES,
     MOMENTUM_ANGLE_TITLE,
     MOMENTUM_UNIT,
@@ -101,6 +103,11 @@ class Plot:
                 self._handle.title = title
         self._handle.data = (times_s, *(values / 10.0**suited.exponent).T)
 
+    def switch(self, shown: bool) -> None:
+        """Show or hide it."""
+        if self._handle.visible != shown:
+            self._handle.visible = shown
+
 
 class ReadoutPanel:
     """Follows one flight; ``restart`` at every reset."""
@@ -110,6 +117,9 @@ class ReadoutPanel:
         panel = gui.add_panel()
         with panel.add_tab("Readouts"):
             self._numbers = gui.add_html("waiting for the node …")
+            ghost_angle = (("angle", GHOST_COLOUR),)
+            self._ghost_plot = Plot(gui, GHOST_ANGLE_TITLE, ANGLE_UNIT, ghost_angle, least=FLAT_ANGLE)
+            self._ghost_plot.switch(False)
             self._plots = (
                 Plot(gui, ENERGY_TITLE, ENERGY_UNIT, (*ENERGY_SERIES, *STRING_ENERGY_SERIES, *TOTAL_ENERGY_SERIES)),
                 Plot(gui, OMEGA_TITLE, OMEGA_UNIT, OMEGA_SERIES),
@@ -118,18 +128,28 @@ class ReadoutPanel:
         # One column beside the picture, which keeps most of the window's width.
         panel.dock_below(gui.main_panel)
         self._samples: deque[tuple[float, ...]] = deque()
+        self._ghost_angles: deque[tuple[float, float]] = deque()
         self._start: np.ndarray | None = None
         self._numbers_due_s = self._plots_due_s = self._sample_due_s = 0.0
 
     def restart(self) -> None:
         """The flight began anew."""
         self._samples.clear()
+        self._ghost_angles.clear()
         self._start = None
 
     def show(
-        self, now_s: float, scenario: Scenario, state: State, string_energy: float, scales: Mapping[str, str]
+        self,
+        now_s: float,
+        scenario: Scenario,
+        state: State,
+        string_energy: float,
+        scales: Mapping[str, str],
+        ghost_angle: float | None,
     ) -> None:
-        """Take a state; draw where that is due. scales: of the picture's arrows, by their names."""
+        """Take a state; draw where that is due. scales: of the picture's arrows, by their names. ghost_angle [rad] between body and
+        ghost, None without one.
+        """
         if now_s < self._sample_due_s and now_s < self._numbers_due_s:
             return
         body = scenario.setup.body
@@ -150,8 +170,11 @@ class ReadoutPanel:
             if not self._samples or time_s > self._samples[-1][0]:
                 energies = (translational, rotational, gravity, string_energy, total)
                 self._samples.append((time_s, *energies, *w.tolist(), angle))
-            while self._samples and self._samples[0][0] < time_s - PLOTTED_S:
-                self._samples.popleft()
+                if ghost_angle is not None:
+                    self._ghost_angles.append((time_s, float(np.degrees(ghost_angle))))
+            for samples in (self._samples, self._ghost_angles):
+                while samples and samples[0][0] < time_s - PLOTTED_S:
+                    samples.popleft()
         if now_s >= self._numbers_due_s:
             self._numbers_due_s = now_s + NUMBERS_S
             spin = float(np.linalg.norm(state.angular_velocity_body))
@@ -170,6 +193,10 @@ class ReadoutPanel:
             self._numbers.content = table(rows)
         if now_s >= self._plots_due_s and len(self._samples) > 1:
             self._plots_due_s = now_s + PLOTS_S
+            self._ghost_plot.switch(ghost_angle is not None and len(self._ghost_angles) > 1)
+            if len(self._ghost_angles) > 1:
+                angles = np.array(self._ghost_angles)
+                self._ghost_plot.show(angles[:, 0], angles[:, 1:])
             samples = np.array(self._samples)
             first = 1
             for plot in self._plots:

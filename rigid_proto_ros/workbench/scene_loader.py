@@ -42,6 +42,22 @@ class SceneLoader:
         if self._loading is None:
             self._loading = self._loop.create_task(self._load())
 
+    def string_changed(self, changes: Mapping[str, object]) -> None:
+        """Take on parameters of the string as their event says them, before their text comes: what is tied next, in the same
+        instant, is settled by them.
+        """
+        present = self.scenario
+        if present is None or self.busy or not all(name.startswith("string.") for name in changes):
+            return
+        if all(present.values.get(name) == value for name, value in changes.items()):
+            return
+        try:
+            self.scenario = present.with_changes(changes)
+        except InputError:
+            return  # it isn't this scene's; the text says what is in force
+        self._newest = self._loaded = self.scenario.text
+        self._take_on(present, self.scenario)
+
     def forget(self) -> None:
         """Take on the next text even if it says what the last one did."""
         self._newest = self._loaded = ""

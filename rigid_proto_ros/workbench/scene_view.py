@@ -8,7 +8,7 @@ the page alike and single precision is enough anywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,7 @@ SWITCHES = {
     "Ghost": True,
     COM_TRAIL: False,
     POINT_TRAIL: False,
+    "Contacts": True,
     "Grid": True,
 }
 """What can be shown beside the body, and whether it is at first."""
@@ -112,6 +113,9 @@ class SceneView:
             for whose in ("body", "ghost")
         ]
         self._tip = np.zeros(3)
+        self._contacts: dict[str, tuple] = {}
+        self._mesh = self._contacts_mesh = ""
+        self._contact_labels: dict[str, Any] = {}
         self._surroundings = Surroundings(scene)
         self._shadow = SoftShadow(scene, "/grid/shadow")
         # Length 1 is the picture's unit; the body's own are scaled to it.
@@ -199,7 +203,27 @@ class SceneView:
             self._drawn_body = drawn
             self._tip = farthest_point(surface, body) if surface is not None else np.zeros(3)
             self._draw_inertia(scenario, box, ellipsoid, corners)
+        self._place_contacts(str(scenario.values["mesh"]))
         return replaced
+
+    def label_contacts(self, contacts: Mapping[str, Sequence[float]], mesh: str) -> None:
+        """Write names at points (3,) [mesh coordinates] of the body, while it is this mesh."""
+        for label in self._contact_labels.values():
+            label.remove()
+        self._contacts = {name: tuple(point) for name, point in contacts.items()}
+        self._contacts_mesh = mesh
+        self._contact_labels = {
+            name: self._scene.add_label(f"/body/contact_{name}", name, visible=False, anchor="bottom-left")
+            for name in contacts
+        }
+        self._place_contacts(self._mesh)
+
+    def _place_contacts(self, mesh: str) -> None:
+        self._mesh = mesh
+        self._handles["Contacts"] = shown = list(self._contact_labels.values()) if mesh == self._contacts_mesh else []
+        for name, label in self._contact_labels.items():
+            label.position = (np.array(self._contacts[name]) * self._scale - self._center_of_mass) / self.unit
+            _set_visible(label, label in shown and self._shown["Contacts"])
 
     def _make_body(self, surface) -> None:
         """The nodes of body and ghost: mesh coordinates about the middle of the box, to be scaled by the node itself.

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import asyncio
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..bundled import example_path
 from ..core.errors import InputError
 from ..lessons import Lesson, lessons
+from ..scene_file import read_scene_text
 from .link import decode, encode
 from .rewind import Rewind
 from .situation import Situation, situation_of
@@ -22,6 +24,9 @@ NO_LESSON = "–"
 
 MAX_QUERY = 7000
 """Characters of a link that a server reads from an address; a longer one is pasted."""
+
+SPEED_WITH = {"thrown_hammer": 0.1}
+"""Simulated seconds per second of a lesson that is over too soon to be seen."""
 
 SHOWN_WITH = {"thrown_hammer": (COM_TRAIL, POINT_TRAIL)}
 """Names of scene_view.SWITCHES that a lesson needs and that are off otherwise."""
@@ -38,6 +43,8 @@ class SessionTab:
         self._gui = page.server.gui
         self._lessons: dict[str, Lesson] = {lesson.title: lesson for lesson in lessons()}
         self._shown_for_lesson: tuple[str, ...] = ()
+        self._speed_before_lesson: float | None = None
+        self._going_back = False
         with play_tab:
             self._lesson_folder()
         with tabs.add_tab("Session"):
@@ -75,6 +82,9 @@ class SessionTab:
         changes = {name: name in shown for name in {*shown, *self._shown_for_lesson}}
         self._shown_for_lesson = shown
         self._page.show_tab.show(changes)
+        values = read_scene_text(lesson.path.read_text("utf-8")).values if lesson is not None else {}
+        contacts = {n.removeprefix("contacts."): v for n, v in values.items() if n.startswith("contacts.")}
+        self._page.view.label_contacts(contacts, str(values.get("mesh", "")))
         if lesson is None:
             self._text.content = ""
         else:
@@ -99,8 +109,21 @@ class SessionTab:
     async def _bring(self, scene: str, script: str) -> None:
         page = self._page
         await page.known()
-        await page.bring_about(situation_of(scene, script, page.scenario.values))
+        situation = situation_of(scene, script, page.scenario.values)
+        await page.bring_about(replace(situation, changes={**situation.changes, **self._speed()}))
         page.new_body()
+
+    def _speed(self) -> dict[str, object]:
+        """What the lesson needs for a speed, and after it what was before."""
+        lesson = self._lessons.get(self._choice.value)
+        present = float(self._page.scenario.values["real_time_factor"])
+        speed = None if lesson is None else SPEED_WITH.get(lesson.name)
+        if speed is not None:
+            if self._speed_before_lesson is None:
+                self._speed_before_lesson = present
+            return {"real_time_factor": speed}
+        before, self._speed_before_lesson = self._speed_before_lesson, None
+        return {} if before is None or present not in SPEED_WITH.values() else {"real_time_factor": before}
 
     # Rewind
 
@@ -155,8 +178,15 @@ class SessionTab:
             self._back.value = min(back_s, self._back.max)
 
     async def go_on_from_here(self) -> None:
-        """Take the node to the moment that is looked at."""
-        await self._page.doing("going back", self._rewind())
+        """Take the node to the moment that is looked at, and let time go on from there; once, however often it is asked for."""
+        if self._going_back:
+            return
+        self._going_back = True
+        try:
+            self._page.run_after_looking()
+            await self._page.doing("going back", self._rewind())
+        finally:
+            self._going_back = False
 
     def show_now(self) -> None:
         """Nobody looks back any more."""

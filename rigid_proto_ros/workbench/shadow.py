@@ -12,22 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.commands import Change, Command
-from ..core.observer import Observer
 from ..core.setup import Setup
 from ..core.simulation import Simulation
 from ..core.state import State
+from ..ghost import Refusals
 from ..scenario import Scenario
 
 PORTION_NS = 1_000_000_000
 """[ns] That it is carried at most between two pictures: whoever draws waits for it."""
-
-
-class _Refusals(Observer):
-    def __init__(self, on_refusal: Callable[[str], None]) -> None:
-        self._on_refusal = on_refusal
-
-    def refused(self, time_ns: int, reason: str, text: str) -> None:
-        self._on_refusal(text)
 
 
 class Shadow:
@@ -35,7 +27,7 @@ class Shadow:
     refused when it came to act."""
 
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
-        self._refusals = _Refusals(on_refusal)
+        self._refusals = Refusals(on_refusal)
         self._simulation: Simulation | None = None
         self._setup: Setup | None = None
         self._offset_ns = 0
