@@ -144,7 +144,7 @@ def test_on_a_phone_the_body_is_seen_above_the_panel_and_the_readouts_are_at_its
     # Reached without scrolling, and its numbers with one tap.
     until(lambda: readouts.bounding_box()["y"] < _sheet(page)["y"] + 0.25 * PHONE["height"], "readouts at the top")
     readouts.click()
-    time_row = page.get_by_text("drift of L's direction")
+    time_row = page.get_by_text("drift of L's direction", exact=True)
     until(lambda: time_row.count() and time_row.bounding_box()["y"] < PHONE["height"], "numbers in sight")
 
 
