@@ -14,6 +14,7 @@ from rigid_proto_ros import appearance  # noqa: E402
 from rigid_proto_ros.cli.main import main  # noqa: E402
 from rigid_proto_ros.offline import read_scene  # noqa: E402
 from rigid_proto_ros.rerun_view import entities as e  # noqa: E402
+from rigid_proto_ros.rerun_view.inertia_shapes import skewed  # noqa: E402
 from rigid_proto_ros.rerun_view.layout import Subject, layout  # noqa: E402
 from rigid_proto_ros.rerun_view.plots import Ranges  # noqa: E402
 from rigid_proto_ros.rerun_view.reader import record_batches  # noqa: E402
@@ -32,6 +33,15 @@ from rigid_proto_ros.rerun_view.reader import record_batches  # noqa: E402
 def test_what_tells_most_of_a_flight_is_in_the_tab_in_front(subject: Subject, told_by: str) -> None:
     # Every plot is among those for debugging; one that is made twice is in the lesson too.
     assert len(layout(1.0, "lesson", subject).plots[told_by]) == 2
+
+
+def test_the_box_is_shown_around_a_body_whose_principal_axes_are_not_those_of_its_drawing() -> None:
+    assert skewed(np.asarray(read_scene("l_bracket", {}).setup.body.inertia))
+    for straight in ("book", "t_handle", "hollow_box", "spinning_top"):
+        assert not skewed(np.asarray(read_scene(straight, {}).setup.body.inertia)), straight
+    hidden = f"- /{e.BOUNDING_BOX}/**"
+    shown = {k: str(layout(1.0, "lesson", Subject(skewed=k)).flights[0].contents) for k in (False, True)}
+    assert hidden in shown[False] and hidden not in shown[True]
 
 
 def test_no_curve_lies_on_the_edge_of_its_plot() -> None:

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scene_stand_in import SceneStandIn
@@ -12,11 +15,18 @@ pytest.importorskip("viser", reason="viser is not installed: no interactive page
 from rigid_proto_ros.core.simulation import Simulation  # noqa: E402
 from rigid_proto_ros.offline import read_scene  # noqa: E402
 from rigid_proto_ros.plot_range import plot_range  # noqa: E402
+from rigid_proto_ros.workbench.keys import KEYS  # noqa: E402
 from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text  # noqa: E402
 from rigid_proto_ros.workbench.poke_mark import PokeMark  # noqa: E402
 from rigid_proto_ros.workbench.soft_shadow import CELLS, sampled, shadow_picture  # noqa: E402
 from rigid_proto_ros.workbench.surroundings import CELL, SECTION, Surroundings  # noqa: E402
 from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point  # noqa: E402
+
+
+def test_every_key_stands_in_the_docs() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "workbench.md").read_text("utf-8")
+    written = {name for cell in re.findall(r"^\| ([^|]+) \| [^|]+ \|$", page, re.MULTILINE) for name in cell.split()}
+    assert {key.shown for key in KEYS} <= written
 
 
 def flown_trails(scene: str, seconds: float, scene_stand_in: SceneStandIn | None = None):

@@ -26,7 +26,9 @@ class Hand:
     """A pointer on a body of the link's own simulation."""
 
     def __init__(self, paused: bool) -> None:
-        self.link = FlownLink("/rigid_body", lambda function, *arguments: function(*arguments), lambda text: None, lambda values: None)
+        self.link = FlownLink(
+            "/rigid_body", lambda function, *arguments: function(*arguments), lambda text: None, lambda values: None
+        )
         self.page = SimpleNamespace(scenario=self.link.scenario, paused=paused)
         self.hand = HandCommands(self.link, lambda: self.page.paused)
         state = self.link.simulation.state

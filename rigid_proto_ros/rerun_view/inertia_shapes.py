@@ -41,6 +41,16 @@ class PrincipalFrame:
         return np.sqrt(2.5 * self.second_moments / mass)
 
 
+SKEWED = 0.1
+"""Least product of inertia of a skewed body, against the largest difference of two moments: axes some 6° off."""
+
+
+def skewed(inertia: np.ndarray) -> bool:
+    """Whether the principal axes of a tensor (3, 3) are clearly others than its own axes, so that products of inertia tell."""
+    products = np.abs(inertia - np.diag(np.diag(inertia))).max()
+    return bool(products > SKEWED * max(np.ptp(np.linalg.eigvalsh(inertia)), 1e-300))
+
+
 def bounding_box(vertices: np.ndarray, scale: np.ndarray, center_of_mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Centre (3,) and half sizes (3,) [m, body axes from the COM] of the box along the mesh axes around the mesh."""
     scaled = vertices * scale

@@ -30,12 +30,14 @@ PATH_SIZES = 4.5
 @dataclass(frozen=True)
 class Subject:
     """What a flight is about, so what is shown of it first. ghost: another body beside it. falls: under gravity, on no string.
-    tied: to a string from the start. dropped_term: its motion lacks ω × Iω."""
+    tied: to a string from the start. dropped_term: its motion lacks ω × Iω. skewed: its principal axes aren't those of its drawing,
+    as the box around it shows."""
 
     ghost: bool = False
     falls: bool = False
     tied: bool = False
     dropped_term: bool = False
+    skewed: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ TITLES = {
 def layout(size: float, initial_view: str, subject: Subject) -> Layout:
     """For a body of this size [m]: three tabs, ``initial_view`` in front."""
     plots = PlotViews()
-    lesson_hides = tuple(entity for entity in LESSON if not (subject.ghost and entity == e.BOUNDING_BOX))
+    boxed = subject.ghost or subject.skewed
+    lesson_hides = tuple(entity for entity in LESSON if not (boxed and entity == e.BOUNDING_BOX))
     flights = (
         flight_view(size, "Flight", lesson_hides, subject),
         flight_view(size, "All shapes", DEBUGGING, subject),

@@ -20,6 +20,7 @@ from .arrows import ArrowScale, arrow_length
 from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
+from .inertia_shapes import skewed
 from .lanes import Lanes
 from .layout import Subject
 from .load_arrows import LoadArrows
@@ -293,7 +294,9 @@ class SceneWriter:
             except InputError:
                 pass  # a scene of another program's, in a test or a recording: its flight is shown all the same
         falls = body is not None and bool(np.any(body.gravity)) and not tied
-        return Subject(self._ghost_body is not None, falls, tied, body is not None and not body.gyroscopic)
+        dropped_term = body is not None and not body.gyroscopic
+        is_skewed = body is not None and skewed(np.asarray(body.inertia))
+        return Subject(self._ghost_body is not None, falls, tied, dropped_term, is_skewed)
 
     def fit_axes(self, stream: Stream) -> None:
         """Tell a stream that nobody watches yet how large its plotted values have been."""
