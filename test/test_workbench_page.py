@@ -7,6 +7,7 @@ One node, one page server and one browser for all tests; each begins with the te
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ from rigid_proto_ros.poke_script import parse_script
 from rigid_proto_ros.scene_file import read_scene_text
 from rigid_proto_ros.workbench.link import decode, encode
 from rigid_proto_ros.workbench.save_as_script import kept_scene
+from rigid_proto_ros.workbench.side_by_side import START
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser to drive")
@@ -225,6 +227,7 @@ def last_target(ear: Ear) -> list[float] | None:
     return targets[-1] if targets else None
 
 
+@pytest.mark.stress
 def test_with_the_switch_at_the_centre_of_mass_a_drag_ties_the_string_there(page, ear) -> None:
     page.choose("Pull at", "Centre of mass")
     before = len(ear.events())
@@ -377,6 +380,17 @@ def drag_message(phase: str, start: tuple, end: tuple) -> bytes:
         "end_screen_pos": (0.5, 0.5),
     }
     return msgspec.msgpack.encode({**message, **places, "button": "left", "modifier": None, "owner": ""})
+
+
+def test_one_click_shows_a_lesson_with_body_and_ghost_and_the_angle_between_them(page, ear) -> None:
+    before = ear.values()
+    page.button(START)
+    ear.until_value("ghost.inertia_model", lambda model: model == "bounding_box")
+    page.until(lambda: re.search(r"[1-9]\d*° apart", page.text), "the angle between body and ghost")
+    now = ear.values()
+    restore = {name: value for name, value in before.items() if now[name] != value}
+    assert ear.set_named(restore, atomically=True)[0][0]
+    ear.until_value("mesh", lambda mesh: mesh == "teapot")
 
 
 def test_a_killed_node_is_said_on_the_page_which_goes_on_with_the_next_one(page, bench) -> None:

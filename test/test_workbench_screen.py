@@ -109,6 +109,7 @@ def halo(page) -> np.ndarray:
     return (pixels[..., :2].min(axis=2) > 200) & (pixels[..., 2] < 185)
 
 
+@pytest.mark.stress
 def test_the_outline_under_the_pointer_is_whole_and_ends_when_the_body_leaves(desk, browser_page) -> None:
     from scipy import ndimage
 
