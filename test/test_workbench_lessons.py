@@ -359,7 +359,7 @@ def handle_dragged(user: User) -> None:
     before = user.momentum[-1]
     place = user.grab((0.0, 0.045, 0.0))
     for k in range(8):
-        user.pull(place + 0.1 * np.array([np.cos(0.8 * k), np.sin(0.8 * k), 0.05 * k]))
+        user.pull(place + 0.25 * np.array([np.cos(0.8 * k), np.sin(0.8 * k), 0.1 * k]))
         user.fly(0.1)
     assert user.link.simulation.string is not None
     user.let_go()

@@ -73,8 +73,13 @@ def draw_pull(page: Page, picture: Path) -> None:
     # Slow, so that the picture is taken before the body has followed and the string is long.
     page.drag(x, y, -150.0, -60.0, steps=2)
     time.sleep(0.8)
+    # A browser draws moved nodes before lines that are made anew: at rest all is where it belongs.
+    page.page.keyboard.press("Space")
+    page.until(lambda: "The simulation is paused" in page.text, "a pause")
+    time.sleep(2.0)
     page.page.screenshot(path=picture)
     page.release()
+    page.page.keyboard.press("Space")
 
 
 if __name__ == "__main__":
