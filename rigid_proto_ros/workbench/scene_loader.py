@@ -29,6 +29,7 @@ class SceneLoader:
         self._take_on = take_on
         self._refused = refused
         self._newest = self._loaded = ""
+        self._ahead: Scenario | None = None
         self._loading: asyncio.Task | None = None
 
     @property
@@ -47,7 +48,7 @@ class SceneLoader:
         instant, is settled by them.
         """
         present = self.scenario
-        if present is None or self.busy or not all(name.startswith("string.") for name in changes):
+        if present is None or not all(name.startswith("string.") for name in changes):
             return
         if all(present.values.get(name) == value for name, value in changes.items()):
             return
@@ -55,12 +56,15 @@ class SceneLoader:
             self.scenario = present.with_changes(changes)
         except InputError:
             return  # it isn't this scene's; the text says what is in force
-        self._newest = self._loaded = self.scenario.text
+        self._ahead = self.scenario
+        if not self.busy:
+            self._newest = self._loaded = self.scenario.text
         self._take_on(present, self.scenario)
 
     def forget(self) -> None:
         """Take on the next text even if it says what the last one did."""
         self._newest = self._loaded = ""
+        self._ahead = None
 
     async def _load(self) -> None:
         try:
@@ -71,6 +75,12 @@ class SceneLoader:
                 except InputError as error:
                     self._refused(error)
                     continue
+                if (
+                    self.scenario is not None
+                    and self.scenario is self._ahead
+                    and scenario.values == self.scenario.values
+                ):
+                    continue  # its event came first
                 before, self.scenario = self.scenario, scenario
                 self._take_on(before, scenario)
         finally:
