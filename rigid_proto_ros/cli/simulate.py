@@ -87,6 +87,8 @@ def run(args: argparse.Namespace) -> int:
         _print_summary(result, recordings)
     if floor := flight.simulation.accuracy_floor:
         _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held at the end: {floor}")
+    if slow := flight.simulation.too_slow:
+        _warn(slow)
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1

@@ -15,6 +15,9 @@ from .state import State
 from .string import Tied
 from .string_control import StringControl
 
+FEWEST_STEPS, MOST_STEPS_A_SECOND = 20_000, 1e6
+"""From how many steps of a segment on their number is judged, and how many of them, 1 to 10 µs each, the clock leaves time for."""
+
 
 class Readings:
     """The readings of a Simulation at the time it was last advanced to; none of them changes it."""
@@ -76,6 +79,17 @@ class Readings:
         if swing > limit and not setup.integrator.stiff:
             return f"{setup.integrator.name}: string frequency times step = {swing:.3g}, good up to {limit:g}"
         return ""
+
+    @property
+    def too_slow(self) -> str:
+        """Why the motion can hardly keep up with the clock, its present segment having taken a million steps a second; else empty."""
+        segment = self._segment
+        elapsed = (self.state.time_ns - segment.start.time_ns) * 1e-9
+        steps = segment.steps
+        # The first tiny steps of a transient say nothing about those after it.
+        if steps < FEWEST_STEPS or steps < MOST_STEPS_A_SECOND * elapsed:
+            return ""
+        return f"{self.choice}: {steps / elapsed:.2g} steps for a second of the motion, slower than real time"
 
     @property
     def string(self) -> Tied | None:

@@ -252,7 +252,7 @@ class RigidBodyNode(Node):
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
             "recording": "" if getattr(self._recorder, "error", "not recording") else flight.scenario.values["record"],
-            "warning": simulation.failure or self._namesake() or simulation.too_coarse,
+            "warning": simulation.failure or self._namesake() or simulation.too_coarse or simulation.too_slow,
         }
 
     def _namesake(self) -> str:

@@ -29,7 +29,6 @@ from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
     ATTACH,
-    BILATERAL,
     DAMPING_ANGULAR,
     DAMPING_LINEAR,
     GYROSCOPIC,
@@ -37,14 +36,11 @@ from ..problem import (
     HAS_STRING,
     HAS_WORLD_TORQUE,
     MASS,
-    MOMENT,
     MOMENTS,
     REFERENCE_ACCELERATION,
     REFERENCE_VELOCITY,
     STIFFNESS,
-    STRING_DAMPING,
     TORQUE_BODY,
-    TORQUE_WORLD,
     TRANSLATES,
 )
 from ..rotation import multiply, normalize, rotate
@@ -56,16 +52,8 @@ from .free_body import free_body_steps
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import is_good
 from .stepping import ADAPTIVE, FIXED_STEPS, NOTHING, ONE_STEP, Method
+from .stiff_steps import damping_is_stiff
 from .taylor_adaptive import degree_for
-
-STIFF_RATE = 2e4
-"""/s; slower damping leaves explicit steps of 75 µs and more, so that even they are far faster than the clock."""
-
-STIFF_RATIO = 100.0
-"""Of a damping's rate to those of the motion beside it: the cost of an implicit step over an explicit one's, by their lengths."""
-
-OVERDAMPED = 4.0
-"""Of a string's damping rate c/m to its swing √(k/m): twice the damping ratio, 2 being critical."""
 
 FASTEST_STRING = 1e6
 """rad/s; above it resolving the string's swing would take millions of steps a second."""
@@ -103,42 +91,6 @@ def _vector(p, at):
 
 
 @njit(cache=True, error_model="numpy")
-def damping_is_stiff(p, y):
-    """Whether some damping of a segment with problem p from variables y on is so much faster than the motion beside it that it, and
-    not the motion, would set the length of explicit steps.
-
-    An explicit step is about 1.5/λ long; an implicit one is some tenths of a radian of the motion, and costs some hundred times as much.
-    """
-    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
-    smallest = p[MOMENTS]
-    angular, fastest, motion = p[DAMPING_ANGULAR], 0.0, spin
-    if angular > 0.0:
-        torque = 0.0
-        for k in range(3):
-            torque += abs(p[TORQUE_BODY + k]) + abs(p[TORQUE_WORLD + k])
-        for k in range(9):
-            torque += abs(p[MOMENT + k])
-        # Where damping is stiff the spin is soon what the torque keeps up.
-        motion += torque / angular
-        if spin > 0.0 or torque > 0.0 or p[HAS_STRING] != 0.0:
-            fastest = angular / smallest
-    if p[TRANSLATES] != 0.0:
-        fastest = max(fastest, p[DAMPING_LINEAR])
-    if p[HAS_STRING] != 0.0:
-        if p[BILATERAL] == 0.0:
-            return False
-        arm = p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2
-        lightness = 1.0 / p[MASS] + arm / smallest
-        swing, damping = math.sqrt(p[STIFFNESS] * lightness), p[STRING_DAMPING] * lightness
-        if damping > OVERDAMPED * swing:
-            fastest = max(fastest, damping)
-            motion += p[STIFFNESS] / p[STRING_DAMPING]
-        else:
-            motion += swing
-    return fastest > max(STIFF_RATE, STIFF_RATIO * motion)
-
-
-@njit(cache=True, error_model="numpy")
 def fastest_swing(p):
     """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against the
     smallest moment.
@@ -153,6 +105,8 @@ def _kind_on_string(p, y):
     accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
     if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
         return SLACK_AT_REST
+    if damping_is_stiff(p, y, True):
+        return STIFF
     return ON_STIFF_STRING if fastest_swing(p) > FASTEST_STRING else ON_STRING
 
 
@@ -162,10 +116,10 @@ def kind_of_segment(p, y, accuracy):
     spins = _vector(y, 4)
     turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
     translates = p[TRANSLATES] != 0.0
-    if damping_is_stiff(p, y):
-        return STIFF
     if p[HAS_STRING] != 0.0:
         return _kind_on_string(p, y)
+    if damping_is_stiff(p, y, False):
+        return STIFF
     if not turned:
         if not spins and not translates:
             moves = _vector(p, REFERENCE_VELOCITY) or _vector(p, REFERENCE_ACCELERATION)

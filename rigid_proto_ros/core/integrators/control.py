@@ -27,7 +27,9 @@ SWITCH = 11  # time after which the last series holds and no more the first [s];
 LAST_START = 12  # where the last series starts [s]
 LAST_LAW = 13  # the law of the last series
 NEXT = 14  # length proposed for the next step [s], by those methods that reject steps; 0 at a segment's start
-SIZE = 15
+EXCESS = 15  # what committed steps have erred above the accuracy's share, by those methods that estimate errors
+PENDING_EXCESS = 16  # of the step that waits
+SIZE = 17
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""

@@ -26,6 +26,7 @@ from ..problem import (
     GYROSCOPIC,
     HAS_STRING,
     HAS_WORLD_TORQUE,
+    LENGTH,
     MASS,
     MOMENT,
     MOMENTS,
@@ -68,6 +69,8 @@ def _integral_to(poly: list[Fraction], x: Fraction) -> float:
 _POLYNOMIALS = [_lagrange(j) for j in range(STAGES)]
 A = np.array([[_integral_to(poly, Fraction(c)) for poly in _POLYNOMIALS] for c in NODES])
 """aᵢⱼ, the integral of the j-th Lagrange polynomial up to node i."""
+_POWERS = np.array([[float(a) for a in poly] for poly in _POLYNOMIALS])
+"""Coefficients of the Lagrange polynomials, constant first."""
 HALVES = np.array([[[_at(poly, (Fraction(c) + k) / 2) for poly in _POLYNOMIALS] for c in NODES] for k in (0, 1)])
 """A stage polynomial at the nodes of the step's first and second half, from its values at the nodes."""
 
@@ -356,8 +359,8 @@ def radau_step(y, p, h, taut, V, out):
         if not _solve(M, x, size):
             return 0
         change = 0.0
-        # Beside a spin's or speed's own size an error below 1 rad/s, and p's length a second, is measured absolutely.
-        spin, speed = max(spin, 1.0), max(speed, 1e-300)
+        # Changes are measured as errors are (error_measure.scales): a speed that a medium stops is beside the spin's but rounding.
+        spin, speed = max(spin, 1.0), max(speed, p[LENGTH])
         for i in range(STAGES):
             for a in range(3):
                 turned = R[i, 0, a] * x[i * n] + R[i, 1, a] * x[i * n + 1] + R[i, 2, a] * x[i * n + 2]
@@ -402,17 +405,31 @@ def radau_step(y, p, h, taut, V, out):
 
 
 @njit(cache=True, error_model="numpy")
-def stage_variables(y, p, h, V, i, out):
-    """Variables at stage i of a step of h seconds from y with velocities V at its stages, into out; returns the stage's time [s]."""
-    theta, rates = np.zeros((STAGES, 3)), np.zeros((STAGES, 3))
-    _turns(V, h, theta, rates)
-    rx, ry, rz, less = _half_turn(theta[i, 0], theta[i, 1], theta[i, 2])
-    a, b, c, e = multiply(y[0], y[1], y[2], y[3], rx, ry, rz, 1.0 + less)
+def stage_rates(V, h, rates):
+    """Rates (5, 3) of the rotation vector at the stages of a step of h seconds with velocities V there, for ``within``."""
+    _turns(V, h, np.zeros((STAGES, 3)), rates)
+
+
+@njit(cache=True, error_model="numpy")
+def within(y, h, V, rates, s, out):
+    """Variables at the part s of a step of h seconds from y, by its own polynomials, into out: order 5, at its end 9.
+
+    V (5, 6): velocities at the stages; rates: ``stage_rates``. Work and heat are left out.
+    """
+    tx, ty, tz, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     out[:] = 0.0
+    for j in range(STAGES):
+        value, integral = 0.0, 0.0
+        for k in range(STAGES - 1, -1, -1):
+            value = value * s + _POWERS[j, k]
+            integral = integral * s + _POWERS[j, k] / (k + 1)
+        integral *= s * h
+        tx, ty, tz = tx + integral * rates[j, 0], ty + integral * rates[j, 1], tz + integral * rates[j, 2]
+        dx, dy, dz = dx + integral * V[j, 3], dy + integral * V[j, 4], dz + integral * V[j, 5]
+        for k in range(3):
+            out[4 + k] += value * V[j, k]
+            out[10 + k] += value * V[j, 3 + k]
+    rx, ry, rz, less = _half_turn(tx, ty, tz)
+    a, b, c, e = multiply(y[0], y[1], y[2], y[3], rx, ry, rz, 1.0 + less)
     out[0], out[1], out[2], out[3] = normalize(a, b, c, e)
-    for k in range(3):
-        total = 0.0
-        for j in range(STAGES):
-            total += A[i, j] * V[j, 3 + k]
-        out[4 + k], out[7 + k], out[10 + k] = V[i, k], y[7 + k] + h * total, V[i, 3 + k]
-    return NODES[i] * h
+    out[7], out[8], out[9] = y[7] + dx, y[8] + dy, y[9] + dz

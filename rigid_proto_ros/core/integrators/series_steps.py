@@ -44,7 +44,7 @@ def workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def _growth(c, degree, weights):
+def growth_of(c, degree, weights):
     """σ from the last three coefficients: the largest k-th root of their measure."""
     attitude, spin, place, speed = weights
     growth = 0.0
@@ -75,7 +75,7 @@ def _lay_out(y, p, control, weights, c):
         parts += 1
         # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much better.
         allowance = part if law == PULLS else part / (1.0 + jerk_of_place)
-        h = step_length(_growth(series, degree, weights), accuracy, degree, allowance)
+        h = step_length(growth_of(series, degree, weights), accuracy, degree, allowance)
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
             return 0
         if not is_one_sided(p) or parts >= _MAX_PARTS:

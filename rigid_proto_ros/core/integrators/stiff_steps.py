@@ -15,13 +15,32 @@ import numpy as np
 
 from ..compilation import njit
 from ..motion import HEAT, STORED
-from ..problem import ATTACH, BILATERAL, HAS_STRING, REST_LENGTH, STIFFNESS
+from ..problem import (
+    ATTACH,
+    DAMPING_ANGULAR,
+    DAMPING_LINEAR,
+    HAS_STRING,
+    MASS,
+    MOMENT,
+    MOMENTS,
+    STIFFNESS,
+    STRING_DAMPING,
+    TORQUE_BODY,
+    TORQUE_WORLD,
+    TRANSLATES,
+)
+from ..simd import aligned
 from . import control as ctl
-from .equations import accelerations, knot, stretch, tension_margin
+from .equations import stretch, tension_margin
 from .error_measure import FLOOR, scales, size
-from .radau import HALVES, STAGES, radau_step, stage_variables
+from .first_root import NONE
+from .motion_series import COLUMNS, motion_at, motion_series
+from .radau import HALVES, STAGES, radau_step, stage_rates, within
 from .runge_kutta import is_good
+from .series_steps import PART_ON_A_STRING, growth_of
 from .slack import first_spell, knot_of
+from .string_law import PULLS, SHORTENS, is_one_sided, law_of, next_law
+from .taylor_adaptive import step_length
 
 SAFETY = 0.8
 """Part of the step length that the error estimate would allow."""
@@ -38,13 +57,60 @@ _NOISE = 2.0**-40
 _MOST_PARTS = 400
 """In one nanosecond; more is chatter, and the rest of it is taken with one law."""
 
-STAGE_ROWS = 3 * STAGES + 2
-"""Of the workspace: velocities at the stages of a whole step and of its halves, and variables between."""
+STIFF_RATE = 2e4
+"""/s; slower damping leaves explicit steps of 75 µs and more, so that even they are far faster than the clock."""
 
-_MOST_TRIALS = 60
+STIFF_RATIO = 100.0
+"""Of a damping's rate to those of the motion beside it: the cost of an implicit step over an explicit one's, by their lengths."""
+
+OVERDAMPED = 4.0
+"""Of a string's damping rate c/m to its swing √(k/m): twice the damping ratio, 2 being critical."""
+
+SERIES_ROW = STAGE_ROWS = 3 * STAGES + 2
+"""Of the workspace: velocities at the stages of a whole step and of its halves, and variables between; then a series."""
+
+_LOOKS = 8
+"""At the string's law within half a step."""
+
+_PART_OF_FLOOR = 0.1
+"""Of what the accuracy allows a segment: steps that err more than their share by so much together are reported."""
 
 _SHORTEST = 1e-24
 """Of any part [s]: a fastest rate of 1e24 /s."""
+
+
+@njit(cache=True, error_model="numpy")
+def damping_is_stiff(p, y, taut):
+    """Whether some damping of a segment with problem p from variables y on is so much faster than the motion beside it that it, and
+    not the motion, would set the length of explicit steps. taut: the string counts.
+
+    An explicit step is about 1.5/λ long; an implicit one is some tenths of a radian of the motion, and costs some hundred times as much.
+    """
+    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
+    smallest = p[MOMENTS]
+    angular, fastest, motion = p[DAMPING_ANGULAR], 0.0, spin
+    if angular > 0.0:
+        torque = 0.0
+        for k in range(3):
+            torque += abs(p[TORQUE_BODY + k]) + abs(p[TORQUE_WORLD + k])
+        for k in range(9):
+            torque += abs(p[MOMENT + k])
+        # Where damping is stiff the spin is soon what the torque keeps up.
+        motion += torque / angular
+        if spin > 0.0 or torque > 0.0 or p[HAS_STRING] != 0.0:
+            fastest = angular / smallest
+    if p[TRANSLATES] != 0.0:
+        fastest = max(fastest, p[DAMPING_LINEAR])
+    if taut and p[HAS_STRING] != 0.0:
+        arm = p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2
+        lightness = 1.0 / p[MASS] + arm / smallest
+        swing, damping = math.sqrt(p[STIFFNESS] * lightness), p[STRING_DAMPING] * lightness
+        if damping > OVERDAMPED * swing:
+            fastest = max(fastest, damping)
+            motion += p[STIFFNESS] / p[STRING_DAMPING]
+        else:
+            motion += swing
+    return fastest > max(STIFF_RATE, STIFF_RATIO * motion)
 
 
 @njit(cache=True, error_model="numpy")
@@ -102,81 +168,47 @@ def _judged(y, p, h, taut, elapsed, whole, first, second, middle, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _pulls(y, p):
+def _margin(y, p, taut):
+    """What changes its sign where the string's law ends: positive while it pulls; and the stretch."""
     x, rate = stretch(y, p)
-    return tension_margin(x, rate, p) > 0.0
+    # A string that has just come taut has no stretch but for rounding: only its tension says whether it still pulls.
+    return (p[STIFFNESS] * x + p[STRING_DAMPING] * rate if taut else tension_margin(x, rate, p)), x
 
 
 @njit(cache=True, error_model="numpy")
-def _first_sample(y, p, h, taut, first, second, middle, at):
-    """Time in (0, h] of the first stage of the two halves at which the string's law is the other one, or at which it is hidden between
-    two; 0 for none. at: scratch (STORED,).
-    """
-    x0, place0, before = stretch(y, p)[0], knot_of(y, p), 0.0
-    for half in range(2):
-        start, V = (y, first) if half == 0 else (middle, second)
-        for i in range(STAGES):
-            t = stage_variables(start, p, 0.5 * h, V, i, at) + 0.5 * h * half
-            x1, rate1 = stretch(at, p)
-            if (tension_margin(x1, rate1, p) > 0.0) != taut:
-                return t
-            place1 = knot_of(at, p)
-            if not taut and x0 < 0.0 and x1 < 0.0:
-                hidden, _ = first_spell(place0, place1, t - before, x0, p, taut)
-                if hidden > 0.0:
-                    return before + hidden
-            before, x0, place0 = t, x1, place1
-    return 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _locate(y, p, high, taut, first, second, middle, out):
-    """The earliest known time in (0, high] at which the law is the other one, with out there; 0 when it isn't at ``high`` itself."""
-    spent = _plain(y, p, high, taut, first, second, middle, out)
-    if spent == 0 or _pulls(out, p) == taut:
-        return 0.0
-    x, rate = stretch(out, p)
-    low, margin_high = 0.0, tension_margin(x, rate, p)
-    x, rate = stretch(y, p)
-    margin_low = tension_margin(x, rate, p)
-    for trial in range(_MOST_TRIALS):
-        if high - low <= 1e-12 * high + 1e-16:
-            break
-        # Regula falsi, Illinois variant; what it hasn't found after a while is halved.
-        t = high - margin_high * (high - low) / (margin_high - margin_low) if trial < 20 else 0.5 * (low + high)
-        if not low < t < high:
-            t = 0.5 * (low + high)
-        edge = 0.05 * 1e-12 * high
-        t = min(max(t, low + edge), high - edge)
-        spent = _plain(y, p, t, taut, first, second, middle, out)
-        if spent == 0:
-            break
-        x, rate = stretch(out, p)
-        margin = tension_margin(x, rate, p)
-        if (margin > 0.0) != taut:
-            high, margin_high = t, margin
-            margin_low *= 0.5
-        else:
-            low, margin_low = t, margin
-            margin_high *= 0.5
-    _plain(y, p, high, taut, first, second, middle, out)
-    return high
-
-
-@njit(cache=True, error_model="numpy")
-def _longest_free(y, p):
-    """A time [s] in which a slack string's knot can't come and go unseen: what it needs to reach the end of its string, or a tenth of it."""
-    x, _ = stretch(y, p)
-    _, _, _, vx, vy, vz = knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
-    ex, ey, ez, ax, ay, az, _, _ = accelerations(
-        *(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12]), p, False
-    )
-    arm = math.sqrt(p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2)
-    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
-    speed = math.sqrt(vx * vx + vy * vy + vz * vz) + spin * arm
-    gain = math.sqrt(ax * ax + ay * ay + az * az) + arm * math.sqrt(ex * ex + ey * ey + ez * ez)
-    way = max(-x, 0.1 * p[REST_LENGTH])
-    return min(way / max(speed, 1e-100), math.sqrt(way / max(gain, 1e-100)))
+def _switch_in_half(y, p, h, taut, V, at):
+    """Time in (0, h] at which the law ends along one step's polynomials, NONE for never. at: scratch (STORED,)."""
+    rates = np.zeros((STAGES, 3))
+    stage_rates(V, h, rates)
+    before, x0, place0 = 0.0, stretch(y, p)[0], knot_of(y, p)
+    for i in range(1, _LOOKS + 1):
+        s = i / _LOOKS
+        within(y, h, V, rates, s, at)
+        margin, x = _margin(at, p, taut)
+        place = knot_of(at, p)
+        if (margin > 0.0) == taut:
+            hidden = 0.0
+            if not taut and x0 < 0.0 and x < 0.0:
+                hidden = first_spell(place0, place, (s - before) * h, x0, p, False)[0] / h
+            before_, x0, place0 = before, x, place
+            before = s
+            if hidden <= 0.0:
+                continue
+            s = before_ + hidden
+            within(y, h, V, rates, s, at)
+            if _margin(at, p, taut)[0] <= 0.0:
+                continue
+            before = before_
+        low, high = before, s
+        while high - low > 2.0**-40 * high:
+            middle = 0.5 * (low + high)
+            within(y, h, V, rates, middle, at)
+            if (_margin(at, p, taut)[0] > 0.0) == taut:
+                low = middle
+            else:
+                high = middle
+        return high * h
+    return NONE
 
 
 @njit(cache=True, error_model="numpy")
@@ -188,14 +220,14 @@ def _heat_of_slack(y, p, one_sided, taut, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _trial(y, p, control, h, whole_ns, taut, one_sided, elapsed, scratch, out):
-    """The longest step of at most h seconds from y into out that the accuracy allows, 0 when none was found, and the time of a switch
-    of the string's law within it (out is there then), or 0. Leaves in control what the next step may be.
+def _implicit(y, p, control, h, whole_ns, taut, elapsed, room, out):
+    """The longest step of at most h seconds from y into out that the accuracy allows, 0 when none was found, and the time within it at which
+    the string's law ends, or NONE. Leaves in control what the next step may be, and what this one errs above its share.
 
     whole_ns: of a whole number of nanoseconds.
     """
-    whole, first, second = scratch[0:5, 0:6], scratch[5:10, 0:6], scratch[10:15, 0:6]
-    middle, at = scratch[15], scratch[16]
+    whole, first, second = room[0:5, 0:6], room[5:10, 0:6], room[10:15, 0:6]
+    middle, at = room[15][:STORED], room[16][:STORED]
     accuracy = control[ctl.ACCURACY]
     last = math.inf
     while True:
@@ -212,71 +244,99 @@ def _trial(y, p, control, h, whole_ns, taut, one_sided, elapsed, scratch, out):
             h = math.floor(h * 1e9) * 1e-9
         if not h > _SHORTEST:
             control[ctl.NEXT] = 1e-10
-            return 0.0, 0.0
-    if error > allowed or accuracy * h < FLOOR:
-        control[ctl.FLOOR_BINDS] = 1.0
+            return 0.0, NONE
+    control[ctl.PENDING_EXCESS] += max(error - accuracy * h, 0.0)
     # What is estimated below a quarter of the floor is rounding, and says nothing about a longer step.
     clear = error > 0.25 * FLOOR
     growth = SAFETY * math.exp(math.log(allowed / error) * _EXPONENT) if clear else _MOST_GROWTH
     control[ctl.NEXT] = min(h * min(max(growth, 0.2), _MOST_GROWTH), ctl.LONGEST)
-    if one_sided:
-        sample = _first_sample(y, p, h, taut, first, second, middle, at)
-        if sample > 0.0:
-            keep = out.copy()
-            switch = _locate(y, p, sample, taut, first, second, middle, out)
-            if switch > 0.0:
-                return h, switch
-            out[:] = keep
-    return h, 0.0
+    switch = NONE
+    if is_one_sided(p):
+        switch = _switch_in_half(y, p, 0.5 * h, taut, first, at)
+        if switch == NONE:
+            switch = _switch_in_half(middle, p, 0.5 * h, taut, second, at)
+            switch = switch if switch == NONE else 0.5 * h + switch
+    return h, switch
 
 
 @njit(cache=True, error_model="numpy")
-def _through_nanosecond(y, p, control, span, elapsed, scratch, out):
+def _explicit(y, p, control, h, law, elapsed, c):
+    """Series c of a string that doesn't pull; how far it may be followed, at most h, when the law ends within that, or NONE, and which follows."""
+    degree = int(control[ctl.DEGREE])
+    weights = scales(y, p, elapsed)
+    motion_series(y, p, degree, False, c)
+    control[ctl.PENDING] += 1.0
+    longest = step_length(growth_of(c, degree, weights), control[ctl.ACCURACY], degree, PART_ON_A_STRING)
+    switch, after, known = next_law(c, p, degree, min(h, longest), law, control[ctl.ACCURACY])
+    return known, switch, after
+
+
+@njit(cache=True, error_model="numpy")
+def _through_nanosecond(y, p, control, span, elapsed, room, out):
     """From y ``span`` seconds on into out, in as many parts as it takes; whether that was possible."""
-    one_sided = p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
-    taut = not one_sided or _pulls(y, p)
+    one_sided, degree = is_one_sided(p), int(control[ctl.DEGREE])
+    law = law_of(y, p)
     here = y.copy()
-    gone, h = 0.0, min(max(control[ctl.NEXT], 1e-6 * span), span)
-    for part in range(_MOST_PARTS):
-        h = min(h, span - gone)
-        watching = one_sided and part < _MOST_PARTS // 2
-        step, switch = _trial(here, p, control, h, False, taut, watching, elapsed + gone, scratch, out)
-        if step == 0.0:
-            return False
-        if switch > 0.0:
-            step = switch
-        _heat_of_slack(here, p, one_sided, taut, out)
+    gone, trial = 0.0, min(max(control[ctl.NEXT], 1e-6 * span), span)
+    for _ in range(_MOST_PARTS):
+        rest = span - gone
+        if law != PULLS and not damping_is_stiff(p, here, False):
+            step, switch, after = _explicit(here, p, control, rest, law, elapsed + gone, room[SERIES_ROW:])
+            step = switch if switch != NONE else step
+            out[:] = here
+            motion_at(room[SERIES_ROW:], p, degree, step, out)
+            trial = rest
+        else:
+            step, switch = _implicit(here, p, control, min(trial, rest), False, law == PULLS, elapsed + gone, room, out)
+            if step == 0.0:
+                return False
+            trial, after = max(control[ctl.NEXT], 1e-6 * span), SHORTENS if law == PULLS else PULLS
+            if switch != NONE:
+                step = switch
+                if _plain(here, p, step, law == PULLS, room[0:5, 0:6], room[5:10, 0:6], room[15][:STORED], out) == 0:
+                    return False
+        _heat_of_slack(here, p, one_sided, law == PULLS, out)
+        if switch != NONE:
+            law = after
         gone += step
         here[:] = out
-        if switch > 0.0:
-            taut = not taut
         if gone >= span * (1.0 - 1e-12):
-            return True
-        h = max(control[ctl.NEXT], 1e-6 * span)
+            return is_good(out)
     return False
 
 
 @njit(cache=True, error_model="numpy")
-def _accept(y, p, control, scratch, out):
+def _accept(y, p, control, room, out):
     """One step from y into out; its length [ns], 0 when there is none."""
-    one_sided = p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
-    taut = not one_sided or _pulls(y, p)
     elapsed = control[ctl.ELAPSED_NS] * 1e-9
-    h = control[ctl.NEXT] if control[ctl.NEXT] > 0.0 else first_length(y, p)
-    if not taut:
-        h = min(h, _longest_free(y, p))
-    length, watching = math.floor(h * 1e9), one_sided
-    while length >= 1.0:
-        step, switch = _trial(y, p, control, length * 1e-9, True, taut, watching, elapsed, scratch, out)
-        if step == 0.0:
-            break
-        length = float(round(step * 1e9))
-        if switch == 0.0:
-            _heat_of_slack(y, p, one_sided, taut, out)
-            return length
-        # Once more up to the last whole nanosecond before the switch, where rounding may show either law.
-        length, watching = min(math.floor(switch * 1e9), length - 1.0), False
-    return 1.0 if _through_nanosecond(y, p, control, 1e-9, elapsed, scratch, out) else 0.0
+    control[ctl.PENDING_EXCESS] = 0.0
+    law = law_of(y, p)
+    control[ctl.LAW] = law
+    control[ctl.SERIES] = 0.0
+    if law != PULLS and not damping_is_stiff(p, y, False):
+        h, switch, _ = _explicit(y, p, control, ctl.LONGEST, law, elapsed, room[SERIES_ROW:])
+        length = math.floor((h if switch == NONE else switch) * 1e9)
+        control[ctl.NEXT] = first_length(y, p)
+        if length >= 1.0:
+            control[ctl.SERIES] = 1.0
+            out[:] = y
+            motion_at(room[SERIES_ROW:], p, int(control[ctl.DEGREE]), length * 1e-9, out)
+            _heat_of_slack(y, p, True, False, out)
+            return length if is_good(out) else 0.0
+    else:
+        h = control[ctl.NEXT] if control[ctl.NEXT] > 0.0 else first_length(y, p)
+        length = math.floor(h * 1e9)
+        while length >= 1.0:
+            step, switch = _implicit(y, p, control, length * 1e-9, True, law == PULLS, elapsed, room, out)
+            if step == 0.0:
+                break
+            length = float(round(step * 1e9))
+            if switch == NONE or switch > step * (1.0 - 1e-12):
+                _heat_of_slack(y, p, is_one_sided(p), law == PULLS, out)
+                return length
+            # Once more up to the last whole nanosecond before the switch.
+            length = min(math.floor(switch * 1e9), length - 1.0)
+    return 1.0 if _through_nanosecond(y, p, control, 1e-9, elapsed, room, out) else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -287,8 +347,8 @@ def first_length(y, p):
 
 
 def workspace(degree: int) -> np.ndarray:
-    """Room for the stages of a whole step and its halves; the degree has no bearing."""
-    return np.zeros((STAGE_ROWS, STORED))
+    """Room for the stages of a whole step and its halves, and for a series."""
+    return aligned((SERIES_ROW + degree + 2, COLUMNS))
 
 
 @njit(cache=True, error_model="numpy")
@@ -298,14 +358,16 @@ def steps(y, p, control, following, c, span_ns, look):
     look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
     """
     if look:
-        one_sided = p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
-        taut = not one_sided or _pulls(y, p)
         out = np.empty(STORED)
-        if _plain(y, p, span_ns * 1e-9, taut, c[0:5, 0:6], c[5:10, 0:6], c[15], out) == 0:
+        taut = control[ctl.LAW] == PULLS
+        if control[ctl.SERIES] != 0.0:
+            out[:] = y
+            motion_at(c[SERIES_ROW:], p, int(control[ctl.DEGREE]), span_ns * 1e-9, out)
+        elif _plain(y, p, span_ns * 1e-9, taut, c[0:5, 0:6], c[5:10, 0:6], c[15][:STORED], out) == 0:
             return 0
-        _heat_of_slack(y, p, one_sided, taut, out)
+        _heat_of_slack(y, p, is_one_sided(p), taut, out)
         y[:] = out
-        return span_ns
+        return span_ns if is_good(out) else 0
     advanced = 0
     while True:
         if control[ctl.ACCEPTED_NS] == 0.0:
@@ -319,3 +381,7 @@ def steps(y, p, control, following, c, span_ns, look):
         y[:] = following
         advanced += length
         ctl.commit(control)
+        # What tiny steps of a transient err above their shares is soon lost in the segment's.
+        control[ctl.EXCESS] += control[ctl.PENDING_EXCESS]
+        share = control[ctl.ACCURACY] * control[ctl.ELAPSED_NS] * 1e-9
+        control[ctl.FLOOR_BINDS] = 1.0 if control[ctl.EXCESS] > _PART_OF_FLOOR * share else 0.0
