@@ -15,8 +15,10 @@ from .state import State
 from .string import Tied
 from .string_control import StringControl
 
-FEWEST_STEPS, MOST_STEPS_A_SECOND = 20_000, 1e6
-"""From how many steps of a segment on their number is judged, and how many of them, 1 to 10 µs each, the clock leaves time for."""
+FEWEST_EVALUATIONS = 20_000
+"""In a segment, from which on they are judged: the first tiny steps of a transient say nothing about those after it."""
+MOST_EVALUATIONS_A_SECOND = {True: 2e5, False: 5e6}
+"""That the clock leaves time for: for methods that choose their steps, a series or an implicit stage each, and for fixed steps."""
 
 
 class Readings:
@@ -82,14 +84,14 @@ class Readings:
 
     @property
     def too_slow(self) -> str:
-        """Why the motion can hardly keep up with the clock, its present segment having taken a million steps a second; else empty."""
+        """That the present segment takes more computing than the clock leaves time for; empty when it doesn't."""
         segment = self._segment
         elapsed = (self.state.time_ns - segment.start.time_ns) * 1e-9
-        steps = segment.steps
-        # The first tiny steps of a transient say nothing about those after it.
-        if steps < FEWEST_STEPS or steps < MOST_STEPS_A_SECOND * elapsed:
+        evaluations = segment.evaluations
+        most = MOST_EVALUATIONS_A_SECOND[self.setup.integrator.chooses]
+        if evaluations < FEWEST_EVALUATIONS or evaluations < most * elapsed:
             return ""
-        return f"{self.choice}: {steps / elapsed:.2g} steps for a second of the motion, slower than real time"
+        return f"{self.choice}: {segment.steps / elapsed:.2g} steps for a second of the motion, slower than real time"
 
     @property
     def string(self) -> Tied | None:

@@ -61,6 +61,11 @@ class Segment:
         return int(fl.steps_of_segment(self._arrays.f, self._arrays.n))
 
     @property
+    def evaluations(self) -> int:
+        """Evaluations of the equations of motion in them."""
+        return int(fl.evaluations_of_segment(self._arrays.f, self._arrays.n, self._arrays.methods))
+
+    @property
     def evaluates_once(self) -> bool:
         """Whether the segment is one exact step, however long, of a body that turns."""
         method = self._arrays.method

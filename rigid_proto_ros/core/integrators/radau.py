@@ -369,11 +369,15 @@ def radau_step(y, p, h, taut, V, out):
             for a in range(3, n):
                 V[i, a] += x[i * n + a]
                 change = max(change, abs(x[i * n + a]) / speed)
-        if not math.isfinite(change) or (evaluations > 4 * STAGES and change > before):
-            return 0 if not change < 1e-12 else evaluations
+        if not math.isfinite(change):
+            return 0
+        # Changes that no longer fall are rounding, or there is nothing to be found.
+        stalls = evaluations > 4 * STAGES and change > before
+        if stalls and not change < 1e-12:
+            return 0
         # Convergence is quadratic: what remains is about change²; where rounding stands in its way, change stays.
         found = change <= 1e-15 or (math.isfinite(before) and change * min(change / before, 1.0) < 1e-17)
-        found = found or (change < 1e-13 and change > 0.25 * before)
+        found = found or stalls or (change < 1e-13 and change > 0.25 * before)
         before = change
     if not found or not _turns(V, h, theta, rates):
         return 0

@@ -352,22 +352,37 @@ def workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
+def _look(y, p, control, room, span):
+    """Take y ``span`` seconds on, less than the step that waits: one step mostly, but judged as that was; whether it was possible."""
+    law, one_sided, out = control[ctl.LAW], is_one_sided(p), np.empty(STORED)
+    if control[ctl.SERIES] != 0.0:
+        out[:] = y
+        motion_at(room[SERIES_ROW:], p, int(control[ctl.DEGREE]), span, out)
+        _heat_of_slack(y, p, one_sided, False, out)
+        y[:] = out
+        return is_good(y)
+    own = control.copy()
+    elapsed, gone = control[ctl.ELAPSED_NS] * 1e-9, 0.0
+    for _ in range(_MOST_PARTS):
+        step, _switch = _implicit(y, p, own, span - gone, False, law == PULLS, elapsed + gone, room, out)
+        if step == 0.0:
+            return False
+        _heat_of_slack(y, p, one_sided, law == PULLS, out)
+        y[:] = out
+        gone += step
+        if gone >= span * (1.0 - 1e-15):
+            return is_good(y)
+    return False
+
+
+@njit(cache=True, error_model="numpy")
 def steps(y, p, control, following, c, span_ns, look):
     """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
 
     look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
     """
     if look:
-        out = np.empty(STORED)
-        taut = control[ctl.LAW] == PULLS
-        if control[ctl.SERIES] != 0.0:
-            out[:] = y
-            motion_at(c[SERIES_ROW:], p, int(control[ctl.DEGREE]), span_ns * 1e-9, out)
-        elif _plain(y, p, span_ns * 1e-9, taut, c[0:5, 0:6], c[5:10, 0:6], c[15][:STORED], out) == 0:
-            return 0
-        _heat_of_slack(y, p, is_one_sided(p), taut, out)
-        y[:] = out
-        return span_ns if is_good(out) else 0
+        return span_ns if _look(y, p, control, c, span_ns * 1e-9) else 0
     advanced = 0
     while True:
         if control[ctl.ACCEPTED_NS] == 0.0:

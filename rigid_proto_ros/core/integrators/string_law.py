@@ -150,4 +150,5 @@ def _converges(c, p, degree, t, tolerance):
         terms += abs(slope) + abs(spring)
     x, rate = stretch_at(c, p, degree, t)
     wrong = abs(stiffness * x + damping * rate - tension)
-    return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE]
+    speed = abs(c[1, A_KNOT]) + abs(c[1, A_KNOT + 1]) + abs(c[1, A_KNOT + 2])
+    return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed
