@@ -3,8 +3,9 @@
 
 Damping of rate λ bounds an explicit series to steps of about 1/λ though nothing moves that fast once the first transient has gone. Here a
 step is taken whole and in two halves, the halves are kept, and their difference, which the whole step's error dominates, must stay below the
-accuracy. A step is accepted or rejected at full length; one that turns a pull-only string slack or taut is shortened to the last whole
-nanosecond before that, and the nanosecond with the switch in it is walked through in parts that may be of any length.
+accuracy. A step is accepted or rejected at full length; one in which a pull-only string's law ends is shortened to the last whole
+nanosecond before that, and the nanosecond with the switch in it is walked through in parts that may be of any length. While the string
+doesn't pull and no other damping is stiff, the steps are those of the motion's series.
 """
 
 from __future__ import annotations
