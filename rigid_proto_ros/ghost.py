@@ -52,7 +52,7 @@ class Ghost:
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
         # A change before it in its list may allow what the present setup doesn't: then it is judged when it acts.
-        judged = None if listed is None else (None, self.simulation.setup)
+        judged = None if listed is None else (b"", self.simulation.setup)
         try:
             self.simulation.submit(command, when_ns, listed, judged)
         except InputError as error:

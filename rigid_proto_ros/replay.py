@@ -104,7 +104,7 @@ class Resimulation:
             if isinstance(command, Change):
                 self._changes_ns = time_ns
             # What acts under a change of its own instant can't be judged before that acts.
-            judged = (None, self.simulation.setup) if self._changes_ns == time_ns else None
+            judged = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
             # What acted at one instant acts in the order of the log, whatever rule made it.
             self.simulation.submit(command, time_ns, (b"", number), judged)
 

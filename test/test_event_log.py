@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The chain of events is the same whether somebody reads its lines as they happen or asks for its hash at the end."""
 
+import hashlib
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from flights import SECOND, flight, wrench
 
@@ -63,3 +66,22 @@ def test_no_line_is_written_for_nobody(monkeypatch):
     simulation = commanded(20)
     simulation.advance(SECOND)
     assert simulation.events.count == 20
+
+
+def noted_hash(command) -> str:
+    log = EventLog()
+    log.note([(12_345, command)])
+    return log.sha256
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        replace(wrench("body@com"), frame_id='"é\\', force=(0.1, -0.0, 1e-300), torque=(1e22, 5e-324, 3.0)),
+        wrench("world", (1, 2.5, 0), (0, 0, 1)),
+        wrench("world", np.array([0.1, 1e16, 2.0]), np.float64([1.0, 0.0, 1e-7])),
+    ],
+)
+def test_a_line_chained_later_is_what_json_writes(command):
+    content = {"time_ns": 12_345, "kind": command.kind, "content": command.content}
+    assert noted_hash(command) == hashlib.sha256((json.dumps(content) + "\n").encode()).hexdigest()

@@ -15,7 +15,7 @@ from enum import IntEnum
 from .errors import CommandRefused
 from .flight import CLEAR
 from .frames import Frame
-from .loads import Load
+from .loads import Load, load_of_bytes
 from .setup import Setup
 
 FARTHEST = 1e100
@@ -65,6 +65,12 @@ class WrenchCommand:
             "force": list(self.force),
             "torque": list(self.torque),
         }
+
+    @property
+    def duration_ns(self) -> int:
+        """Of a poke that says how long it lasts, else −1."""
+        seconds = self.frame.duration_s
+        return -1 if seconds is None else round(seconds * 1e9)
 
     def __post_init__(self) -> None:
         if self.held and (self.frame.impulse or self.frame.duration_s is not None):
@@ -180,15 +186,19 @@ Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | Releas
 
 @dataclass(slots=True)
 class Pending:
-    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row (bytes) as the flight's tables hold them, its load where that
-    was settled already, and under which setup.
+    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row as the flight's
+    tables hold them, the row empty until its load is settled, and the setup under which that was.
     """
 
     time_ns: int
     command: Command
     listed: Listed | None = None
-    load: Load | None = None
     settled_for: Setup | None = None
     kind: int = CLEAR
     duration_ns: int = -1
     row: bytes = b""
+
+    @property
+    def load(self) -> Load | None:
+        """The load, where it is settled."""
+        return load_of_bytes(self.row) if self.row else None

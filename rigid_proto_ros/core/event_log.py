@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import lru_cache
 
-from .commands import Command
+from .commands import Command, WrenchCommand
 
-MOST_NOTED = 1000
-"""Events that may wait to be chained."""
+MOST_NOTED = 10_000
+"""Events that may wait to be chained: some megabytes."""
 
 
 class EventLog:
@@ -37,23 +38,42 @@ class EventLog:
     def append(self, time_ns: int, kind: str, content: dict) -> str:
         """Add an event and return its line."""
         self._chain_noted()
-        line = self._chain(time_ns, kind, content)
+        line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
+        self._hash.update((line + "\n").encode())
         self.count += 1
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, time_ns: int, command: Command) -> None:
-        """Add a command as an event whose line nobody wants now."""
-        self._noted.append((time_ns, command))
-        self.count += 1
+    def note(self, acted: list[tuple[int, Command]]) -> None:
+        """Add commands by the times at which they acted, as events whose lines nobody wants now."""
+        self._noted += acted
+        self.count += len(acted)
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
 
-    def _chain(self, time_ns: int, kind: str, content: dict) -> str:
-        line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
-        self._hash.update((line + "\n").encode())
-        return line
-
     def _chain_noted(self) -> None:
-        noted, self._noted = self._noted, []
-        for time_ns, command in noted:
-            self._chain(time_ns, command.kind, command.content)
+        if self._noted:
+            noted, self._noted = self._noted, []
+            self._hash.update("".join([_line(time_ns, command) for time_ns, command in noted]).encode())
+
+
+_quoted = lru_cache(maxsize=256)(json.dumps)
+"""Frames come again and again."""
+
+
+def _line(time_ns: int, command: Command) -> str:
+    """The line of a command, as ``json.dumps`` writes it."""
+    if isinstance(command, WrenchCommand):
+        try:
+            force, torque = ", ".join(map(_written, command.force)), ", ".join(map(_written, command.torque))
+        except TypeError:
+            pass  # not all of them floats
+        else:
+            return (
+                f'{{"time_ns": {time_ns}, "kind": "{command.kind}", "content": {{"stamp_ns": {command.stamp_ns}, '
+                f'"frame_id": {_quoted(command.frame_id)}, "force": [{force}], "torque": [{torque}]}}}}\n'
+            )
+    return json.dumps({"time_ns": time_ns, "kind": command.kind, "content": command.content}) + "\n"
+
+
+_written = float.__repr__
+"""Of a finite float what JSON writes too; no other command acts."""

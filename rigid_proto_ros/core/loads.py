@@ -222,7 +222,12 @@ class Load(NamedTuple):
 
 def load_of_row(row: np.ndarray) -> Load:
     """The load whose row (LOAD,) this is."""
-    axes, has_point, *numbers = row.tolist()
+    return load_of_bytes(row.tobytes())
+
+
+def load_of_bytes(row: bytes) -> Load:
+    """The load whose row these are."""
+    axes, has_point, *numbers = _ROW.unpack(row)
     point, force, torque, normal = (tuple(numbers[k : k + 3]) for k in range(0, 12, 3))
     named = _AXES[int(axes)]
     return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
@@ -241,6 +246,34 @@ class LoadSum:
         self.torque_world = self.values[TORQUE_WORLD : TORQUE_WORLD + 3]
         self.torque_body = self.values[TORQUE_BODY : TORQUE_BODY + 3]
         self.moment = self.values[MOMENT:].reshape(3, 3)
+
+
+def light_amount(body: Body) -> float:
+    """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh coordinates."""
+    largest = max(*map(abs, body.scale.tolist()), *map(abs, body.center_of_mass.tolist()))
+    return 0.1 * MAX_ACCELERATION * min(body.mass, float(body.principal_moments[0]) / (1.0 + 3.0 * largest))
+
+
+def light_row(frame: Frame, force, torque, most: float) -> bytes:
+    """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its amount no more
+    than ``most`` (of ``light_amount``). Empty for any other: ``settle`` says what it is, or what is wrong with it.
+    """
+    word, axes = frame.point[0], frame.axes
+    fx, fy, fz = force
+    tx, ty, tz = torque
+    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
+    if axes == "normal":
+        return b""
+    if word == "com":
+        has_point, x, y, z = 0.0, 0.0, 0.0, 0.0
+    elif word == "point":
+        has_point, (x, y, z) = 1.0, frame.point[1]
+    else:
+        return b""
+    # Of what isn't finite this doesn't hold.
+    if amount * (1.0 + abs(x) + abs(y) + abs(z)) <= most:
+        return _ROW.pack(_AXES_NUMBERS[axes], has_point, x, y, z, fx, fy, fz, tx, ty, tz, 0.0, 0.0, 0.0)
+    return b""
 
 
 def settle(

@@ -11,6 +11,7 @@ import numpy as np
 
 from .body import LENGTH, Body
 from .integrators.integrator import Integrator
+from .loads import light_amount
 from .problem import SIZE, begin_body
 from .string import StringSettings
 from .surface import Surface
@@ -58,6 +59,11 @@ class Setup:
         row = self.body.row.copy()
         row[LENGTH] = self.length
         return row
+
+    @cached_property
+    def light_amount(self) -> float:
+        """Of a load that is far from too strong for the body (core/loads.py)."""
+        return light_amount(self.body)
 
     @cached_property
     def problem(self) -> np.ndarray:

@@ -30,7 +30,7 @@ from .event_log import EventLog
 from .flight_arrays import FlightArrays
 from .integrators import check_carried
 from .integrators.integrator import ANGULAR_DAMPING, MAX_SPEED, NO_GYROSCOPIC_TERM, STRING, needs_of_load
-from .loads import Load, cross, settle
+from .loads import Load, cross, light_row, settle
 from .narrator import Narrator, snapshot
 from .observer import BodySnapshot, Observer
 from .readings import Readings
@@ -100,7 +100,7 @@ class Simulation(Readings):
         command: Command,
         at_ns: int | None = None,
         listed: Listed | None = None,
-        judged: tuple[Load | None, Setup] | None = None,
+        judged: tuple[bytes, Setup] | None = None,
     ) -> int:
         """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
 
@@ -109,10 +109,10 @@ class Simulation(Readings):
         CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
-        load, setup = (judge(command, self.setup), self.setup) if judged is None else judged
+        row, setup = (judge(command, self.setup), self.setup) if judged is None else judged
         pending = Pending(when_ns, command, listed)
-        if load is not None and command.frame.point[0] != "ray":
-            _settle(pending, load, setup)
+        if row:
+            _settle(pending, row, setup)
         self._push(pending)
         if self.follower is not None:
             self.follower.submit(command, when_ns, listed)
@@ -178,10 +178,11 @@ class Simulation(Readings):
         due: list[Pending] = []
         if not pending or pending[0][0] >= until_ns:
             return until_ns, due
-        taken = []
+        taken, setup = [], self.setup
         while pending and pending[0][0] < until_ns:
-            if not self._is_ready(pending[0][-1]):
-                until_ns = pending[0][0]
+            first = pending[0][-1]
+            if first.settled_for is not setup and not self._is_ready(first):
+                until_ns = first.time_ns
                 break
             taken.append(heapq.heappop(pending))
         # All commands of one instant act together.
@@ -193,8 +194,6 @@ class Simulation(Readings):
 
     def _is_ready(self, pending: Pending) -> bool:
         """Whether nothing but arithmetic is left to do when the command acts."""
-        if pending.settled_for is self.setup:
-            return True
         if not isinstance(pending.command, WrenchCommand):
             return isinstance(pending.command, ClearWrench)
         try:
@@ -221,8 +220,7 @@ class Simulation(Readings):
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, narrator = self.observer, self._narrator
         if not (narrator.hears_loads or observer.hears_events()):
-            for pending in due:
-                self.events.note(pending.time_ns, pending.command)
+            self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
         for now_ns, what, load_id, row in self._arrays.last_events():
@@ -231,10 +229,12 @@ class Simulation(Readings):
                 observer.load_ended(now_ns, load_id)
                 continue
             pending = due[row - first]
-            command, load = pending.command, pending.load
+            command = pending.command
             if what == fl.DONE:
                 self._log_command(command)
-            elif load is not None and what == fl.APPLIED:
+                continue
+            load = pending.load
+            if load is not None and what == fl.APPLIED:
                 observer.applied(now_ns, command, load, self.setup.body)
             elif load is not None:
                 kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
@@ -245,7 +245,7 @@ class Simulation(Readings):
         if self.observer.hears_events() or isinstance(command, Change):
             self.log(command.kind, command.content)
         else:
-            self.events.note(self.time_ns, command)
+            self.events.note([(self.time_ns, command)])
 
     # What happens at an event that takes more than arithmetic
 
@@ -302,9 +302,10 @@ class Simulation(Readings):
             return True
         if before is None or before.surface is not setup.surface:
             return False
+        load = pending.load
         if before.body is not setup.body:
-            pending.load.check_magnitude(setup.body)
-        _check_load_carried(pending.command, pending.load, setup)
+            load.check_magnitude(setup.body)
+        _check_load_carried(pending.command, load, setup)
         pending.settled_for = setup
         return True
 
@@ -347,35 +348,41 @@ class Simulation(Readings):
         return self.state
 
 
-def judge(command: Command, setup: Setup) -> Load | None:
-    """The load of a command as far as it can be settled before it acts, None for what is none; raises CommandRefused for what a
+def judge(command: Command, setup: Setup) -> bytes:
+    """The row of a command's load, empty for what is none or can't be settled before it acts; raises CommandRefused for what a
     body of this setup can't take.
     """
     if isinstance(command, WrenchCommand):
-        return _settled(command, setup, None)
+        row = _settled(command, setup, None)
+        return b"" if command.frame.point[0] == "ray" else row
     if isinstance(command, MoveString):
         check_carried(setup.integrator, frozenset({STRING}))
-    return None
+    return b""
 
 
-def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> Load:
-    load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
+def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
+    """The row of the load, which body and integrator can take."""
+    frame, force, torque = command.frame, command.force, command.torque
+    if setup.integrator.carries_loads or frame.impulse:
+        row = light_row(frame, force, torque, setup.light_amount)
+        if row:
+            return row
+    load = settle(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
     load.check_magnitude(setup.body)
     _check_load_carried(command, load, setup)
-    return load
+    return load.packed
 
 
-def _settle(pending: Pending, load: Load, setup: Setup) -> None:
+def _settle(pending: Pending, row: bytes, setup: Setup) -> None:
     """The load, as the tables of a flight take it, was settled under this setup."""
-    frame = pending.command.frame
-    pending.load, pending.settled_for, pending.row = load, setup, load.packed
-    if pending.command.held:
+    command = pending.command
+    pending.settled_for, pending.row = setup, row
+    if command.held:
         pending.kind = fl.HELD_WRENCH
-    elif frame.impulse:
+    elif command.frame.impulse:
         pending.kind = fl.IMPULSE
     else:
-        pending.kind = fl.PULSE
-        pending.duration_ns = -1 if frame.duration_s is None else round(frame.duration_s * 1e9)
+        pending.kind, pending.duration_ns = fl.PULSE, command.duration_ns
 
 
 def _check_load_carried(command: WrenchCommand, load: Load, setup: Setup) -> None:

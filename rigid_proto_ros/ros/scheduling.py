@@ -18,7 +18,6 @@ from typing import Any
 from ..command_codec import ScriptCommand, core_command
 from ..core.commands import Command, Listed
 from ..core.errors import CommandRefused, InputError
-from ..core.loads import Load
 from ..core.setup import Setup
 from ..core.simulation import judge
 from ..poke_script import expand_schedule, read_schedule, with_contacts
@@ -45,7 +44,7 @@ class Entry:
     t_ns: int
     number: int
     listed: Listed | None
-    judged: tuple[Load | None, Setup]
+    judged: tuple[bytes, Setup]
 
 
 @dataclass
