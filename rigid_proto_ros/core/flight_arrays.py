@@ -9,14 +9,15 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64
+from numba import int64
 
 from . import flight as fl
+from .arrays_at import address_of_array, doubles_at, integers_at
 from .body import BODY
 from .commands import Pending
 from .compilation import njit
-from .integrators.stepping import COLUMNS, ROWS, Method, method_table, provide_kernel
-from .integrators.taylor_adaptive import degree_for
+from .flight_start import FlightStart
+from .integrators.stepping import METHOD, Method, provide_kernel
 from .kernel_calls import entry_of
 from .loads import LOAD, LOADS_SIZE, Load, load_of_row, share_of
 from .problem import SIZE, STRING
@@ -30,7 +31,17 @@ FIRST_ROWS = 8
 _TIMES = struct.Struct("=5q")
 _LOAD_BYTES = 8 * fl.LOAD_ROW
 
-_F, _N, _TABLE, _ROWS = float64[::1], int64[::1], int64[:, ::1], float64[:, ::1]
+# Behind the integers of a flight: how many doubles there are, and where the tables are and of what size.
+DOUBLES, TABLES_AT, TABLE_ROWS, METHODS_AT, METHODS = range(fl.INTEGERS, fl.INTEGERS + 5)
+INTEGERS = fl.INTEGERS + 5
+
+_LINE = 8
+"""Doubles of a line of the processor's cache."""
+
+
+def _sizes(rows: int) -> tuple[int, int, int]:
+    """Numbers in the tables of times, loads and events, which stand one behind the other."""
+    return fl.TIMES * rows, fl.LOAD_ROW * rows, fl.EVENT * (4 * rows + 4)
 
 
 class Acting(NamedTuple):
@@ -44,61 +55,92 @@ class Acting(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _share_anew(f, n, loads):
+def _arrays(at):
+    """f, n, times, loads, events and methods of the flight whose integers are at this address, with its doubles behind them."""
+    n = integers_at(at, (INTEGERS,))
+    f = doubles_at(at + 8 * INTEGERS, (n[DOUBLES],))
+    rows, times_at = n[TABLE_ROWS], n[TABLES_AT]
+    loads_at = times_at + 8 * fl.TIMES * rows
+    events_at = loads_at + 8 * fl.LOAD_ROW * rows
+    times, loads = integers_at(times_at, (rows, fl.TIMES)), doubles_at(loads_at, (rows, fl.LOAD_ROW))
+    events, methods = integers_at(events_at, (4 * rows + 4, fl.EVENT)), integers_at(n[METHODS_AT], (n[METHODS], METHOD))
+    return f, n, times, loads, events, methods
+
+
+@njit(cache=True, error_model="numpy")
+def _fly_at(at, until_ns):
+    f, n, times, loads, events, methods = _arrays(at)
+    return fl.fly(f, n, times, loads, events, methods, until_ns)
+
+
+@njit(cache=True, error_model="numpy")
+def _begin_at(at):
+    f, n, _, loads, _, methods = _arrays(at)
+    fl.begin_segment(f, n, loads, methods)
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def _share_anew(at):
     """What the loads that act add to the sums, for another body."""
+    f, n, times, loads, _, _ = _arrays(at)
     for row in range(n[fl.ACTING]):
         share_of(loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], loads[row, fl.SHARE :])
+    if n[fl.HELD] != fl.NOBODY:
+        times[n[fl.HELD], fl.END_NS] = fl.end_of_held(n, times[n[fl.HELD], fl.AT_NS])
+    return 0
 
 
 @functools.cache
-def _fly() -> Callable:
-    return entry_of(fl.fly, int64(_F, _N, _TABLE, _ROWS, _TABLE, _TABLE, int64))
+def _entries() -> tuple[Callable, Callable]:
+    return entry_of(_fly_at, int64(int64, int64)), entry_of(_begin_at, int64(int64))
 
 
 class FlightArrays:
     """f, n, times, loads, events: as core/flight.py lays them out. What isn't a matter of arrays is the simulation's."""
 
     def __init__(self, setup: Setup) -> None:
-        self.f = np.zeros(fl.ROOM)
-        self.n = np.zeros(fl.INTEGERS, np.int64)
-        self.n[fl.HELD] = fl.NOBODY
         self.first_due = 0
+        self._fly, self._begin = _entries()
+        start = setup.flight_start
+        self._make_room(start.room)
         self._make_tables(FIRST_ROWS)
-        self._call = _fly()
-        self.take(setup)
+        self._take_methods(setup, start)
+
+    def _take_methods(self, setup: Setup, start: FlightStart) -> None:
+        self.integrator, self.methods = setup.integrator, start.methods
+        if len(self.f) < fl.ROOM + start.room:
+            f, n, head = self.f[: fl.ROOM].copy(), self.n.copy(), self._head
+            table = head[TABLES_AT], head[TABLE_ROWS]
+            self._make_room(start.room)
+            self.f[: fl.ROOM], self.n[:] = f, n
+            self._head[TABLES_AT], self._head[TABLE_ROWS] = table
+        self._head[METHODS_AT], self._head[METHODS] = start.methods_at, len(start.methods)
 
     def take(self, setup: Setup) -> None:
         """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
-        degree = degree_for(setup.accuracy)
-        self.integrator = setup.integrator
-        self.methods = method_table(setup.integrator, degree)
-        room = int((self.methods[:, ROWS] * self.methods[:, COLUMNS]).max())
-        if len(self.f) < fl.ROOM + room:
-            self.f = np.concatenate([self.f[: fl.ROOM], np.zeros(room)])
+        start = setup.flight_start
+        self._take_methods(setup, start)
         f, n = self.f, self.n
         f[fl.ROOM :] = 0.0
-        self.row = f[fl.ROW : fl.ROW + 13]
-        f[fl.BODY : fl.BODY + BODY] = setup.body_row
-        f[fl.COMMON : fl.COMMON + SIZE] = setup.problem
-        f[fl.ACCURACY], f[fl.DEGREE] = setup.accuracy, degree
-        n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = setup.step_ns, setup.wrench_timeout_ns, setup.poke_duration_ns
-        n[fl.CHOOSES] = setup.integrator.chooses
-        _share_anew(f, n, self.loads)
-        if n[fl.HELD] != fl.NOBODY:
-            held = self.times[n[fl.HELD]]
-            held[fl.END_NS] = fl.end_of_held(n, held[fl.AT_NS])
+        f[fl.BODY : fl.BODY + BODY] = start.f[fl.BODY : fl.BODY + BODY]
+        f[fl.COMMON : fl.COMMON + SIZE] = start.f[fl.COMMON : fl.COMMON + SIZE]
+        f[fl.ACCURACY], f[fl.DEGREE] = start.f[fl.ACCURACY], start.f[fl.DEGREE]
+        for setting in (fl.STEP_NS, fl.TIMEOUT_NS, fl.POKE_NS, fl.CHOOSES):
+            n[setting] = start.n[setting]
+        _share_anew(self._at)
 
     def start_over(self, setup: Setup, tied: Tied | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
-        load_ids = self.n[fl.LOAD_IDS]
-        self.n[:] = 0
-        self.n[fl.LOAD_IDS], self.n[fl.HELD] = load_ids, fl.NOBODY
-        self.f[fl.WORK_BEFORE] = self.f[fl.LOST_BEFORE] = 0.0
-        self.take(setup)
-        self.row[:] = setup.initial
-        self.f[fl.START : fl.START + 13] = setup.initial
-        self.tie(tied)
-        fl.begin_segment(self.f, self.n, self.loads, self.methods)
+        start, load_ids = setup.flight_start, self._head[fl.LOAD_IDS]
+        self._take_methods(setup, start)
+        self.f[: fl.ROOM] = start.f
+        self.f[fl.ROOM :] = 0.0
+        self.n[:] = start.n
+        self._head[fl.LOAD_IDS] = load_ids
+        if tied is not None:
+            self.tie(tied)
+        self._begin(self._at)
 
     def tie(self, tied: Tied | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""
@@ -111,27 +153,29 @@ class FlightArrays:
 
     def put(self, due: list[Pending]) -> None:
         """Put commands into the tables, behind the loads that act, as those that act next."""
-        first = self.first_due = int(self.n[fl.ACTING])
+        head = self._head
+        first = self.first_due = head[fl.ACTING]
         last = first + len(due)
-        if last > len(self.times):
+        if last > head[TABLE_ROWS]:
             self._make_tables(2 * last)
-        times, loads = self._times_bytes, self._loads_bytes
+        tables, pack = self._table_bytes, _TIMES.pack_into
+        at = 8 * fl.TIMES * head[TABLE_ROWS] + _LOAD_BYTES * first
         for row, pending in enumerate(due, first):
-            at_ns, kind, bytes_of_load = pending.time_ns, pending.kind, pending.row
-            _TIMES.pack_into(times, _TIMES.size * row, at_ns, pending.duration_ns, kind, 0, 0)
-            loads[row * _LOAD_BYTES : row * _LOAD_BYTES + len(bytes_of_load)] = bytes_of_load
-        self.n[fl.DUE], self.n[fl.DUE_END] = first, last
+            bytes_of_load = pending.row
+            pack(tables, _TIMES.size * row, pending.time_ns, pending.duration_ns, pending.kind, 0, 0)
+            tables[at : at + len(bytes_of_load)] = bytes_of_load
+            at += _LOAD_BYTES
+        head[fl.DUE], head[fl.DUE_END] = first, last
 
     @property
     def waiting(self) -> int:
         """How many of the commands put last haven't acted yet."""
-        return int(self.n[fl.DUE_END] - self.n[fl.DUE])
+        return self._head[fl.DUE_END] - self._head[fl.DUE]
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
-        call, f, n = self._call, self.f, self.n
-        while (came := call(f, n, self.times, self.loads, self.events, self.methods, until_ns)) == fl.NO_KERNEL:
-            provide_kernel(self.integrator, self.methods, int(n[fl.METHOD]))
+        while (came := self._fly(self._at, until_ns)) == fl.NO_KERNEL:
+            provide_kernel(self.integrator, self.methods, self._head[fl.METHOD])
         return came == fl.REACHED
 
     def apply(self) -> None:
@@ -148,8 +192,9 @@ class FlightArrays:
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
-        self.n[fl.EVENTS] = 0
-        fl.end_all(self.n, self.times, self.events)
+        self._head[fl.EVENTS] = 0
+        if self._head[fl.ACTING]:
+            fl.end_all(self.n, self.times, self.events)
 
     def last_events(self) -> list[list[int]]:
         """What the last call began and ended: rows (EVENT,)."""
@@ -169,17 +214,17 @@ class FlightArrays:
 
     @property
     def time_ns(self) -> int:
-        return int(self.n[fl.NOW_NS])
+        return self._head[fl.NOW_NS]
 
     @property
     def state(self) -> State:
         """The state now."""
-        return State(int(self.n[fl.NOW_NS]), self.row.copy())
+        return State(self._head[fl.NOW_NS], self.row.copy())
 
     @property
     def acts(self) -> bool:
         """Whether any load acts."""
-        return bool(self.n[fl.ACTING])
+        return bool(self._head[fl.ACTING])
 
     def acting(self) -> Iterator[Acting]:
         """The loads that act, in the order in which they began."""
@@ -217,11 +262,46 @@ class FlightArrays:
         """How the segment is stepped."""
         return self.integrator.methods[int(self.n[fl.METHOD])]
 
+    # Memory
+
+    def _make_room(self, room: int) -> None:
+        """Integers and doubles, with so much workspace that begins a line of the processor's cache."""
+        doubles = fl.ROOM + room
+        whole = np.zeros(INTEGERS + doubles + _LINE)
+        at = address_of_array(whole)
+        first = -(at // 8 + INTEGERS + fl.ROOM) % _LINE
+        self._at = at + 8 * first
+        integers = whole[first : first + INTEGERS].view(np.int64)
+        self._head = memoryview(integers)
+        self._head[DOUBLES] = doubles
+        self.n = integers[: fl.INTEGERS]
+        self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
+        self.row = self.f[fl.ROW : fl.ROW + 13]
+
     def _make_tables(self, rows: int) -> None:
-        times, loads = np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW))
-        events = np.zeros((4 * rows + 4, fl.EVENT), np.int64)
-        kept = self.n[fl.ACTING]
-        if kept:
-            times[:kept], loads[:kept] = self.times[:kept], self.loads[:kept]
-        self.times, self.loads, self.events = times, loads, events
-        self._times_bytes, self._loads_bytes = memoryview(times).cast("B"), memoryview(loads).cast("B")
+        """Tables of so many rows; what acts goes on."""
+        kept = self._head[fl.ACTING]
+        before = (self.times[:kept], self.loads[:kept]) if kept else None
+        self._tables = np.zeros(sum(_sizes(rows)), np.int64)
+        self._table_bytes = memoryview(self._tables).cast("B")
+        self._head[TABLES_AT], self._head[TABLE_ROWS] = address_of_array(self._tables), rows
+        if before is not None:
+            self.times[:kept], self.loads[:kept] = before
+
+    @property
+    def times(self) -> np.ndarray:
+        """(rows, TIMES)"""
+        times, _, _ = _sizes(self._head[TABLE_ROWS])
+        return self._tables[:times].reshape(-1, fl.TIMES)
+
+    @property
+    def loads(self) -> np.ndarray:
+        """(rows, LOAD_ROW)"""
+        times, loads, _ = _sizes(self._head[TABLE_ROWS])
+        return self._tables[times : times + loads].view(np.float64).reshape(-1, fl.LOAD_ROW)
+
+    @property
+    def events(self) -> np.ndarray:
+        """(4 rows + 4, EVENT)"""
+        times, loads, _ = _sizes(self._head[TABLE_ROWS])
+        return self._tables[times + loads :].reshape(-1, fl.EVENT)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from .body import LENGTH, Body
+from .flight_start import FlightStart, flight_start
 from .integrators.integrator import Integrator
 from .loads import light_amount
 from .problem import SIZE, begin_body
@@ -59,6 +60,11 @@ class Setup:
         row = self.body.row.copy()
         row[LENGTH] = self.length
         return row
+
+    @cached_property
+    def flight_start(self) -> FlightStart:
+        """What flights begin with (core/flight_start.py)."""
+        return flight_start(self)
 
     @cached_property
     def light_amount(self) -> float:
