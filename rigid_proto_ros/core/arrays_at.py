@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Arrays found by their addresses: a compiled function that is handed arrays looks into each of them first, at more cost than a
+"""Arrays found by their addresses, which costs a call less than being handed them.
+
+A compiled function that is handed arrays looks into each of them first, at more cost than a
 short flight has. Whoever gives an address away keeps the array.
 """
 

@@ -10,11 +10,19 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import lru_cache
+from typing import NamedTuple
 
 from .commands import Command, WrenchCommand
 
 MOST_NOTED = 10_000
 """Events that may wait to be chained: some megabytes."""
+
+
+class Noted(NamedTuple):
+    """An event that is no command, or not any more."""
+
+    kind: str
+    content: dict
 
 
 class EventLog:
@@ -27,7 +35,7 @@ class EventLog:
         """Start a new chain."""
         self.count = 0
         self._hash = hashlib.sha256()
-        self._noted: list[tuple[int, Command]] = []
+        self._noted: list[tuple[int, Command | Noted]] = []
 
     @property
     def sha256(self) -> str:
@@ -43,8 +51,8 @@ class EventLog:
         self.count += 1
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, acted: list[tuple[int, Command]]) -> None:
-        """Add commands by the times at which they acted, as events whose lines nobody wants now."""
+    def note(self, acted: list[tuple[int, Command | Noted]]) -> None:
+        """Add what acted, by its times, as events whose lines nobody wants now."""
         self._noted += acted
         self.count += len(acted)
         if len(self._noted) >= MOST_NOTED:
@@ -60,7 +68,7 @@ _quoted = lru_cache(maxsize=256)(json.dumps)
 """Frames come again and again."""
 
 
-def _line(time_ns: int, command: Command) -> str:
+def _line(time_ns: int, command: Command | Noted) -> str:
     """The line of a command, as ``json.dumps`` writes it."""
     if isinstance(command, WrenchCommand):
         try:

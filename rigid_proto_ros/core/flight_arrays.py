@@ -135,7 +135,6 @@ class FlightArrays:
         start, load_ids = setup.flight_start, self._head[fl.LOAD_IDS]
         self._take_methods(setup, start)
         self.f[: fl.ROOM] = start.f
-        self.f[fl.ROOM :] = 0.0
         self.n[:] = start.n
         self._head[fl.LOAD_IDS] = load_ids
         if tied is not None:
@@ -267,13 +266,13 @@ class FlightArrays:
     def _make_room(self, room: int) -> None:
         """Integers and doubles, with so much workspace that begins a line of the processor's cache."""
         doubles = fl.ROOM + room
-        whole = np.zeros(INTEGERS + doubles + _LINE)
+        whole = np.empty(INTEGERS + doubles + _LINE)
         at = address_of_array(whole)
         first = -(at // 8 + INTEGERS + fl.ROOM) % _LINE
         self._at = at + 8 * first
         integers = whole[first : first + INTEGERS].view(np.int64)
         self._head = memoryview(integers)
-        self._head[DOUBLES] = doubles
+        self._head[DOUBLES], self._head[fl.ACTING] = doubles, 0
         self.n = integers[: fl.INTEGERS]
         self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
         self.row = self.f[fl.ROW : fl.ROW + 13]

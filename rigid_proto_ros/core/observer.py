@@ -7,6 +7,7 @@ The producer calls these methods from the thread that steps the body; an impleme
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,7 +153,13 @@ class Observers(Observer):
 
 def listens(observer: Observer, method: str) -> bool:
     """Whether the observer does anything with a method of the interface."""
-    return method in vars(observer) or getattr(type(observer), method) is not getattr(Observer, method)
+    return method in vars(observer) or method in _methods_of(type(observer))
+
+
+@functools.cache
+def _methods_of(kind: type) -> frozenset[str]:
+    """The methods of the interface that a kind of observer has of its own."""
+    return frozenset(name for name in _METHODS if getattr(kind, name) is not getattr(Observer, name))
 
 
 def _in_turn(methods):

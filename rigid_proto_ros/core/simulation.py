@@ -26,7 +26,7 @@ from .commands import (
     order_key,
 )
 from .errors import CommandRefused, InputError
-from .event_log import EventLog
+from .event_log import EventLog, Noted
 from .flight_arrays import FlightArrays
 from .integrators import check_carried
 from .integrators.integrator import ANGULAR_DAMPING, MAX_SPEED, NO_GYROSCOPIC_TERM, STRING, needs_of_load
@@ -91,7 +91,10 @@ class Simulation(Readings):
 
     def log(self, kind: str, content: dict) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever brings it about."""
-        self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
+        if self.observer.hears_events():
+            self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
+        else:
+            self.events.note([(self.time_ns, Noted(kind, content))])
 
     # The way of a command
 
@@ -241,7 +244,7 @@ class Simulation(Readings):
                 narrator.load_began(self, load_id, kind, load)
 
     def _log_command(self, command: Command) -> None:
-        # A change is told at once: waiting in a queue it would keep its whole setup, mesh included.
+        # A change that waited in a queue would keep its whole setup, mesh included.
         if self.observer.hears_events() or isinstance(command, Change):
             self.log(command.kind, command.content)
         else:
