@@ -41,10 +41,10 @@ def rows(count: int, seed: int = 7) -> np.ndarray:
     return made
 
 
-def fly(observer: Observer, states: np.ndarray) -> None:
+def fly(observer: Observer, states: np.ndarray, body: BodySnapshot = BODY) -> None:
     """A run of ``states``: a poke from 200 to 400 ms, a wrench from 305 ms to the end, a refusal at 500 ms."""
     observer.started(SCENE, VERTICES, TRIANGLES, SHA256)
-    observer.body_changed(0, BODY)
+    observer.body_changed(0, body)
     for k, row in enumerate(states):
         time_ns = k * PERIOD_NS
         observer.state(time_ns, row)

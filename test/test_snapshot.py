@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import io
 
 import numpy as np
@@ -45,8 +46,13 @@ def take(*words: str) -> None:
         raise
 
 
-def test_the_body_is_in_the_middle_of_the_flight_view(recording, tmp_path):
+def test_the_body_is_in_the_middle_of_the_flight_view(tmp_path):
     picture = tmp_path / "flight.png"
+    recording = tmp_path / "session.rrd"
+    observer = RerunObserver(record=str(recording))
+    # Without gravity: of a body that falls the path is shown, and the body where it has come to.
+    flight.fly(observer, flight.rows(60), dataclasses.replace(flight.BODY, gravity=np.zeros(3)))
+    observer.close()
     take(str(recording), "--at", "0.3", "-o", str(picture), "--view", "flight")
     with Image.open(picture) as image:
         pixels = np.asarray(image.convert("RGB"), dtype=float)

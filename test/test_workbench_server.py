@@ -79,7 +79,7 @@ def test_an_address_or_a_link_that_leads_nowhere_is_refused_before_anything_star
     monkeypatch.setattr(Processes, "start", lambda self, command: pytest.fail(f"started {command}"))
     assert main(["workbench", *arguments]) == 2
     told = capsys.readouterr()
-    assert told.out == "" and told.err.count("\n") == 1 and f"{named}: got" in told.err
+    assert told.out == "" and told.err.count("\n") == 1 and f" {named}: " in told.err
 
 
 def status(server, path: str = "/", **headers: str) -> int:
