@@ -28,10 +28,10 @@ from random_scenes import DURATION_S, log_uniform, random_body, random_scene
 
 from problems import PROBLEMS
 from result_table import ResultTable
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.integrators import INTEGRATORS
-from rigid_proto_ros.core.integrators.error_measure import FLOOR, scales, size
-from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators.error_measure import FLOOR, scales, size
+from rigid_proto_ros.simulation.simulation import Simulation
 from work_precision_ours import simulation_of
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)

@@ -26,18 +26,18 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
-from rigid_proto_ros.core import batch_body as bb
-from rigid_proto_ros.core import flight as fl
-from rigid_proto_ros.core import loads as ld
-from rigid_proto_ros.core.batch import Variants, fly_variants
-from rigid_proto_ros.core.flight_measures import MEASURE
-from rigid_proto_ros.core.integrators import INTEGRATORS
-from rigid_proto_ros.core.integrators import control as ctl
-from rigid_proto_ros.core.integrators.stepping import ADAPTIVE
-from rigid_proto_ros.core.integrators.taylor_adaptive import degree_for
-from rigid_proto_ros.core.kernel_calls import ADAPTIVE_STEPS, entry_of
-from rigid_proto_ros.core.motion import new_variables, to_row
-from rigid_proto_ros.core.rotation import matrix_from_quaternion
+from rigid_proto_ros.base.kernel_calls import ADAPTIVE_STEPS, entry_of
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.motion import loads as ld
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators import control as ctl
+from rigid_proto_ros.motion.integrators.stepping import ADAPTIVE
+from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
+from rigid_proto_ros.motion.variables import new_variables, to_row
+from rigid_proto_ros.simulation import batch_body as bb
+from rigid_proto_ros.simulation import flight as fl
+from rigid_proto_ros.simulation.batch import Variants, fly_variants
+from rigid_proto_ros.simulation.flight_measures import MEASURE
 from work_precision_ours import prepare_simulation, simulation_of
 from work_precision_ratios import time_at_error
 

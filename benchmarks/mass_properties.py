@@ -33,9 +33,9 @@ from mass_solids import box, moved, sphere  # noqa: E402
 
 from result_table import ResultTable  # noqa: E402
 from rigid_proto_ros import __version__  # noqa: E402
-from rigid_proto_ros.core.exact_moments import exact_solid_moments, relative_errors  # noqa: E402
-from rigid_proto_ros.core.mass_properties import MeshMoments  # noqa: E402
-from rigid_proto_ros.core.moments import solid_moments  # noqa: E402
+from rigid_proto_ros.mass.exact_moments import exact_solid_moments, relative_errors  # noqa: E402
+from rigid_proto_ros.mass.moments import solid_moments  # noqa: E402
+from rigid_proto_ros.mass.properties import MeshMoments  # noqa: E402
 
 COLUMNS = (
     *(
@@ -308,7 +308,7 @@ def load(table: ResultTable, name: str, vertices, triangles) -> None:
     """Reading an .obj file with six decimals: ours parsing, ours from the cache, trimesh."""
     import os
 
-    from rigid_proto_ros.mesh_io import load_mesh
+    from rigid_proto_ros.mesh.reading import load_mesh
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mesh.obj"

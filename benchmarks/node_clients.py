@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from rigid_proto_ros import cdr
+from rigid_proto_ros.messages import cdr
 
 SPIN = (0.05, 0.1, 12.0)
 
@@ -203,8 +203,8 @@ def plain_node(engine: str, rate: str) -> None:
 
 
 def _our_step(period: float):
-    from rigid_proto_ros.core.simulation import Simulation
-    from rigid_proto_ros.scenario import make_scenario
+    from rigid_proto_ros.scene.scenario import make_scenario
+    from rigid_proto_ros.simulation.simulation import Simulation
 
     simulation = Simulation(make_scenario({"initial.angular_velocity": list(SPIN)}).setup)
 
@@ -219,7 +219,7 @@ def _our_step(period: float):
 def _mujoco_step(period: float):
     import mujoco
 
-    from rigid_proto_ros.scenario import make_scenario
+    from rigid_proto_ros.scene.scenario import make_scenario
 
     body = make_scenario({}).setup.body
     moments = " ".join(repr(float(m)) for m in body.principal_moments)

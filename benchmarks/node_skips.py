@@ -52,7 +52,7 @@ def in_process() -> Iterator[tuple[str, str, float, float]]:
 
 def setup(integrator: str, spin: float = 12.0, **values):
     """The T-handle's Setup."""
-    from rigid_proto_ros.scenario import make_scenario
+    from rigid_proto_ros.scene.scenario import make_scenario
 
     given = {
         "mesh": "t_handle",
@@ -69,7 +69,7 @@ def body(name: str):
 
 def flown(integrator: str, spin: float = 12.0) -> float:
     """Time of 100 s of flight without commands [µs]."""
-    from rigid_proto_ros.core.simulation import Simulation
+    from rigid_proto_ros.simulation.simulation import Simulation
 
     given = setup(integrator, spin)
     return median_us(lambda: Simulation(given).advance(100_000_000_000), 9)
@@ -80,7 +80,7 @@ def packing() -> tuple[float, float]:
     from geometry_msgs.msg import PoseStamped, TwistStamped
     from rclpy.serialization import serialize_message
 
-    from rigid_proto_ros import cdr
+    from rigid_proto_ros.messages import cdr
 
     row = setup("auto").initial.tolist()
     pose_template, twist_template = cdr.StampedTemplate("world", 7), cdr.StampedTemplate("world", 6)
@@ -119,8 +119,8 @@ def frames() -> tuple[float, float]:
 
 def rescaling() -> tuple[float, float]:
     """The teapot's mass properties at another scale: a second pass, and from its moments [µs]."""
-    from rigid_proto_ros.core.moments import solid_moments
-    from rigid_proto_ros.mesh_body import mesh_body
+    from rigid_proto_ros.mass.from_mesh import mesh_body
+    from rigid_proto_ros.mass.moments import solid_moments
 
     mesh = mesh_body("teapot")
     vertices, triangles, moments = mesh.vertices, mesh.triangles, mesh.moments

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The problems that integrators are judged on, as plain data: each is solved by us, by peers and by the reference.
 
-All quantities SI, quaternions xyzw. Attitudes and rows follow rigid_proto_ros.core.state: x, q (body to world), v (world), ω (body).
+All quantities SI, quaternions xyzw. Attitudes and rows follow rigid_proto_ros.motion.state: x, q (body to world), v (world), ω (body).
 """
 
 from __future__ import annotations

@@ -24,12 +24,12 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
 from result_table import ResultTable
-from rigid_proto_ros.bundled import example_path
-from rigid_proto_ros.core.observer import Observer
-from rigid_proto_ros.offline import OfflineRun, read_scene
-from rigid_proto_ros.poke_script import read_script
+from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.rerun_view import RerunObserver
-from rigid_proto_ros.session_observer import McapObserver
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.script import read_script
+from rigid_proto_ros.session.mcap_observer import McapObserver
+from rigid_proto_ros.simulation.observer import Observer
 
 REPEATS = 5
 SECOND = 10**9

@@ -25,9 +25,9 @@ import peers
 from motion_measures import energy, sane
 from problems import Problem, rotation, tuples
 from result_table import ResultTable
-from rigid_proto_ros.core.body import make_body
-from rigid_proto_ros.core.mass_properties import MeshMoments
-from rigid_proto_ros.mesh_io import load_mesh
+from rigid_proto_ros.mass.properties import MeshMoments
+from rigid_proto_ros.mesh.reading import load_mesh
+from rigid_proto_ros.motion.body import make_body
 
 DURATION, SAMPLES = 20.0, 160
 SHORTER = 4.0

@@ -19,15 +19,15 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from peers import Contestant, Run
 from problems import Problem, Wrench
-from rigid_proto_ros.core.body import make_body
-from rigid_proto_ros.core.commands import WrenchCommand
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.frames import parse_frame
-from rigid_proto_ros.core.integrators import INTEGRATORS
-from rigid_proto_ros.core.motion import to_row
-from rigid_proto_ros.core.setup import Setup
-from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.core.string import StringSettings
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.motion.variables import to_row
+from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.setup import Setup
+from rigid_proto_ros.simulation.simulation import Simulation
 
 ADAPTIVE = ("auto",)
 """Integrators that take an accuracy instead of a step."""

@@ -36,8 +36,8 @@ def generate_launch_description() -> LaunchDescription:
 def nodes(context) -> list[Node]:
     """The body's node, and a poke client where a script is named."""
     # Only here: a launch file is listed on machines on which the package isn't on the path.
-    from rigid_proto_ros.bundled import example_path
-    from rigid_proto_ros.offline import scene_file
+    from rigid_proto_ros.base.bundled import example_path
+    from rigid_proto_ros.scene.offline import scene_file
 
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
     parameters = {"viewer": given["viewer"], "use_sim_time": given["use_sim_time"].lower() in ("true", "1", "yes")}
@@ -65,6 +65,6 @@ def _for_node(scene: str, target: str) -> list:
     """The scene as launch takes it: as the file, or as its values where a node of another name wouldn't find its section."""
     if target == "/rigid_body":
         return [scene]
-    from rigid_proto_ros.scene_file import read_scene_file
+    from rigid_proto_ros.scene.scene_file import read_scene_file
 
     return [read_scene_file(scene).values]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ros_process import READY_S, RosProcess
 
-from rigid_proto_ros.core.rotation import rotate
+from rigid_proto_ros.base.rotation import rotate
 
 TEST_FOLDER = Path(__file__).parent
 TYPES = {

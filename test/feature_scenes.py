@@ -13,11 +13,11 @@ from flights import SECOND, flight_setup, wrench
 from random_scenes import log_uniform, random_turn
 from reference_flights import DIRECTIONS, error, fly, numbers
 
-from rigid_proto_ros.core.body import Body, make_body
-from rigid_proto_ros.core.commands import MoveString
-from rigid_proto_ros.core.setup import Setup
-from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.core.string import StringSettings
+from rigid_proto_ros.motion.body import Body, make_body
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.simulation.commands import MoveString
+from rigid_proto_ros.simulation.setup import Setup
+from rigid_proto_ros.simulation.simulation import Simulation
 
 END_S = 2.0
 MOVE_S = (0.3, 0.4)

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core.body import Body, make_body
-from rigid_proto_ros.core.commands import WrenchCommand
-from rigid_proto_ros.core.frames import parse_frame
-from rigid_proto_ros.core.integrators import integrator_named
-from rigid_proto_ros.core.mass_properties import MeshMoments
-from rigid_proto_ros.core.setup import Setup
-from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.mesh_io import load_mesh
+from rigid_proto_ros.mass.properties import MeshMoments
+from rigid_proto_ros.mesh.reading import load_mesh
+from rigid_proto_ros.motion.body import Body, make_body
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.motion.integrators import integrator_named
+from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.setup import Setup
+from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
 AT_REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

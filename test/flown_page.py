@@ -12,17 +12,22 @@ import numpy as np
 from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
-from rigid_proto_ros.cdr import wrench_stamped
-from rigid_proto_ros.command_codec import core_command, of_message, string_attach, string_target
-from rigid_proto_ros.core.commands import Change, WrenchCommand
-from rigid_proto_ros.core.errors import InputError
-from rigid_proto_ros.core.frames import parse_frame
-from rigid_proto_ros.core.observer import Observer
-from rigid_proto_ros.core.rotation import rotate
-from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.poke_script import expand_schedule, expand_script, read_schedule, script_entries
-from rigid_proto_ros.scenario import Scenario, make_scenario, nanoseconds
-from rigid_proto_ros.session_messages import read_text
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.rotation import rotate
+from rigid_proto_ros.messages.cdr import wrench_stamped
+from rigid_proto_ros.messages.session_messages import read_text
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.scene.command_codec import core_command, of_message, string_attach, string_target
+from rigid_proto_ros.scene.scenario import Scenario, make_scenario, nanoseconds
+from rigid_proto_ros.scene.script import (
+    expand_schedule,
+    expand_script,
+    read_schedule,
+    script_entries,
+)
+from rigid_proto_ros.simulation.commands import Change, WrenchCommand
+from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench.ros_link import Heard
 from rigid_proto_ros.workbench.sighting import DrawnPose
 

@@ -11,9 +11,9 @@ from flights import SECOND
 from one_segment import OneSegment, make_problem
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
-from rigid_proto_ros.core.body import make_body
-from rigid_proto_ros.core.integrators import INTEGRATORS
-from rigid_proto_ros.core.integrators.integrator import (
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators.integrator import (
     ANGULAR_DAMPING,
     BODY_FORCE,
     BODY_TORQUE,
@@ -22,9 +22,9 @@ from rigid_proto_ros.core.integrators.integrator import (
     WORLD_TORQUE,
     Integrator,
 )
-from rigid_proto_ros.core.loads import LoadSum, cross
-from rigid_proto_ros.core.state import State
-from rigid_proto_ros.core.string import StringSettings, Tied, tie
+from rigid_proto_ros.motion.loads import LoadSum, cross
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.motion.string import StringSettings, Tied, tie
 
 TENSOR = ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9))
 MASS = 2.0

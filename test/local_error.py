@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Steps as an integrator committed them, each judged against the exact flow from its own start.
 
-The flow is that of the segment's own variables (core/motion.py), so nothing is lost by converting to world coordinates.
+The flow is that of the segment's own variables (motion/variables.py), so nothing is lost by converting to world coordinates.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from mpmath import mp, mpf
 from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
-from rigid_proto_ros.core import problem as of
-from rigid_proto_ros.core.motion import LOW
-from rigid_proto_ros.core.simulation import Simulation
+from rigid_proto_ros.motion import problem as of
+from rigid_proto_ros.motion.variables import LOW
+from rigid_proto_ros.simulation.simulation import Simulation
 
 FLOOR = 32.0 * 2.0**-52
 """What rounding is allowed in one step, whatever its length."""

@@ -17,7 +17,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from rigid_proto_ros import cdr
+from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.ros.node import RigidBodyNode
 from rigid_proto_ros.ros.physics_thread import PhysicsThread
 from rigid_proto_ros.ros.warm_up import warm_up

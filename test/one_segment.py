@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core import flight as fl
-from rigid_proto_ros.core.body import LENGTH, Body
-from rigid_proto_ros.core.integrators.integrator import Integrator
-from rigid_proto_ros.core.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
-from rigid_proto_ros.core.integrators.taylor_adaptive import degree_for
-from rigid_proto_ros.core.loads import LoadSum
-from rigid_proto_ros.core.problem import SIZE, begin_body, begin_problem, begin_string
-from rigid_proto_ros.core.state import State
-from rigid_proto_ros.core.string import Tied
+from rigid_proto_ros.motion.body import LENGTH, Body
+from rigid_proto_ros.motion.integrators.integrator import Integrator
+from rigid_proto_ros.motion.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
+from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
+from rigid_proto_ros.motion.loads import LoadSum
+from rigid_proto_ros.motion.problem import SIZE, begin_body, begin_problem, begin_string
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.motion.string import Tied
+from rigid_proto_ros.simulation import flight as fl
 
 
 def make_problem(

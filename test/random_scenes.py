@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from flights import SECOND, flight_setup, wrench
 
-from rigid_proto_ros.core.body import Body, make_body
-from rigid_proto_ros.core.simulation import Simulation
-from rigid_proto_ros.core.string import StringSettings
+from rigid_proto_ros.motion.body import Body, make_body
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.simulation.simulation import Simulation
 
 DURATION_S = 2.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.core.observer import BodySnapshot, Observer, ShownLoad
+from rigid_proto_ros.simulation.observer import BodySnapshot, Observer, ShownLoad
 
 VERTICES = np.array(
     [[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.2) for z in (0.0, 0.1)],

@@ -25,7 +25,7 @@ HEUN = '''
 """heun: two evaluations a step, order 2."""
 import numpy as np
 
-from ..compilation import njit
+from ...base.compilation import njit
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
 from .runge_kutta import advance, is_good, rates, stages
 from .stepping import fixed_steps
@@ -63,10 +63,11 @@ HEUN = Integrator(
 FLY = """
 import json
 import numpy as np
-from rigid_proto_ros import docs_tables, parameters
-from rigid_proto_ros.core.errors import CommandRefused
-from rigid_proto_ros.offline import OfflineRun
-from rigid_proto_ros.scenario import make_scenario
+import docs_tables
+from rigid_proto_ros.scene import parameters
+from rigid_proto_ros.base.errors import CommandRefused
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario
 
 body = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]}
 
@@ -94,7 +95,7 @@ def named_files() -> list[str]:
 
 
 def test_every_named_file_exists() -> None:
-    existing = {path.name for path in [*ROOT.rglob("*.py"), *ROOT.parent.glob("test/*.py")]}
+    existing = {path.name for path in [*ROOT.rglob("*.py"), *ROOT.parent.glob("test/**/*.py"), *ROOT.parent.glob("tools/*.py")]}
     for pattern in named_files():
         assert fnmatch.filter(existing, pattern), pattern
 
@@ -102,7 +103,7 @@ def test_every_named_file_exists() -> None:
 @pytest.mark.slow
 def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     shutil.copytree(ROOT, tmp_path / ROOT.name, ignore=shutil.ignore_patterns("__pycache__"))
-    folder = tmp_path / ROOT.name / "core" / "integrators"
+    folder = tmp_path / ROOT.name / "motion" / "integrators"
     (folder / "heun.py").write_text(HEUN, "utf-8")
     # Its line, and its place among the others.
     listing = (folder / "__init__.py").read_text("utf-8")
@@ -125,4 +126,4 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
 
 
 def _only(folder: Path) -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(folder)}
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), str(ROOT.parent / "tools")])}

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Imports point one way: core <- meshes, viewers and sessions <- ros <- the page and the command line."""
+"""Every folder of the package knows only the folders before it, and each outside package is imported in its own place."""
 
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -17,39 +17,36 @@ MODULES = {
     ".".join((PACKAGE, *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__"): path
     for path in sorted(ROOT.rglob("*.py"))
 }
+ORDER = (
+    *("base", "mesh", "mass", "motion", "simulation", "messages", "scene", "session"),
+    *("rerun_view", "ros", "workbench", "sweep", "cli"),
+)
+"""Folders in the order of imports: each knows only those before it."""
+STRANGERS = {"sweep": ("rerun_view", "ros", "workbench")}
+"""Folders that stand before one in the order but that it doesn't know all the same."""
 ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
-# Which modules may import a package that is neither ours nor Python's; a trailing dot means everything below.
+# Which folders or modules may import a package that is neither ours nor Python's.
 ALLOWED = {
-    "numpy": (f"{PACKAGE}.",),
-    "numba": (f"{PACKAGE}.core.", f"{PACKAGE}.mesh_"),
-    "llvmlite": (f"{PACKAGE}.core.",),  # comes with numba
-    "yaml": (
-        f"{PACKAGE}.scene_file",
-        f"{PACKAGE}.plain_yaml",
-        f"{PACKAGE}.poke_script",
-        f"{PACKAGE}.parameters",
-        f"{PACKAGE}.session_bag",
-        f"{PACKAGE}.session_branch",
-        f"{PACKAGE}.sweep.",
-        f"{PACKAGE}.ros.",
-        f"{PACKAGE}.cli.",
-    ),
-    "trimesh": (f"{PACKAGE}.mesh_io",),
-    "manifold3d": (f"{PACKAGE}.bodies.surfaces",),
-    "rerun": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.inspect_view"),
-    "rerun_bindings": (f"{PACKAGE}.rerun_view",),
-    "pyarrow": (f"{PACKAGE}.rerun_view", f"{PACKAGE}.sweep.table"),  # comes with rerun, as PIL does
-    "scipy": (f"{PACKAGE}.sweep.sampling", f"{PACKAGE}.mesh_hull"),
-    "distributed": (f"{PACKAGE}.sweep.cluster",),
-    "matplotlib": (f"{PACKAGE}.sweep.plot",),
-    "PIL": (f"{PACKAGE}.rerun_view",),
-    "ament_index_python": (f"{PACKAGE}.mesh_io", f"{PACKAGE}.ros."),  # package:// URIs
-    "rich": (f"{PACKAGE}.cli.terminal",),
-    "argcomplete": (f"{PACKAGE}.command_line",),
-    "viser": (f"{PACKAGE}.workbench",),
-    "websockets": (f"{PACKAGE}.workbench",),  # comes with viser
-    "mcap": (f"{PACKAGE}.session_mcap",),
-    "zstandard": (f"{PACKAGE}.session_mcap",),  # comes with mcap
+    "numpy": ORDER,
+    "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep"),
+    "llvmlite": ("base.simd", "motion.integrators.rough_logarithm"),  # comes with numba
+    "argcomplete": ("base.command_line",),
+    "rich": ("cli", "base.progress"),
+    "yaml": ("scene", "session", "sweep", "ros", "cli"),
+    "trimesh": ("mesh.reading",),
+    "manifold3d": ("bodies.surfaces",),
+    "rerun": ("rerun_view",),
+    "rerun_bindings": ("rerun_view",),
+    "pyarrow": ("rerun_view", "sweep.table"),  # comes with rerun, as PIL does
+    "PIL": ("rerun_view",),
+    "scipy": ("mesh.hull", "sweep.sampling"),
+    "distributed": ("sweep.cluster",),
+    "matplotlib": ("sweep.plot",),
+    "ament_index_python": ("mesh.reading", "ros"),  # package:// URIs
+    "viser": ("workbench",),
+    "websockets": ("workbench",),  # comes with viser
+    "mcap": ("session.mcap_file",),
+    "zstandard": ("session.mcap_file",),  # comes with mcap
 }
 
 
@@ -67,16 +64,22 @@ def imports(module: str, path: Path) -> Iterator[tuple[str, int]]:
                 yield (whole if whole in MODULES else name), node.lineno
 
 
-def within(module: str, *places: str) -> bool:
-    """Whether a module is one of the places, or below one (`package.core.`), or starts like one (`package.mesh_`)."""
-    return any(f"{module}.".startswith(place) if place.endswith((".", "_")) else _is(module, place) for place in places)
+def place(module: str) -> str:
+    """A module's name without the package's."""
+    return module.removeprefix(PACKAGE).removeprefix(".")
 
 
-def _is(module: str, place: str) -> bool:
-    return module == place or module.startswith((f"{place}.", f"{place}_"))
+def folder(module: str) -> str:
+    """The folder that a module lies in; empty for the package itself."""
+    return place(module).partition(".")[0]
 
 
-def complaints(allowed) -> list[str]:
+def within(module: str, places: tuple[str, ...]) -> bool:
+    """Whether a module is one of the places or lies below one."""
+    return any(place(module) == known or place(module).startswith(f"{known}.") for known in places)
+
+
+def complaints(allowed: Callable[[str, str], bool]) -> list[str]:
     """One line for each import that ``allowed(module, imported)`` denies."""
     return [
         f"{module}:{line} imports {name}"
@@ -86,69 +89,60 @@ def complaints(allowed) -> list[str]:
     ]
 
 
+def is_ours(name: str) -> bool:
+    return name.split(".")[0] == PACKAGE
+
+
 def test_the_reader_of_imports_sees_them_all() -> None:
-    found = {name for name, _ in imports(f"{PACKAGE}.mesh_io", MODULES[f"{PACKAGE}.mesh_io"])}
-    assert {"numpy", "trimesh"} <= found
+    found = {name for name, _ in imports(f"{PACKAGE}.mesh.reading", MODULES[f"{PACKAGE}.mesh.reading"])}
+    assert {"numpy", "trimesh", f"{PACKAGE}.mesh.obj"} <= found
 
 
-def test_core_imports_numpy_numba_the_standard_library_and_itself() -> None:
+def test_every_folder_has_its_place_in_the_order() -> None:
+    assert {folder(module) for module in MODULES} - {""} == {*ORDER, "bodies"}
+    assert not [module for module, path in MODULES.items() if path.parent == ROOT and path.name != "__init__.py"]
+
+
+def test_every_folder_knows_only_those_before_it() -> None:
     def allowed(module: str, name: str) -> bool:
-        top = name.split(".")[0]
-        return not within(module, f"{PACKAGE}.core.") or (
-            top in ("numpy", "numba", "llvmlite") or top in sys.stdlib_module_names or within(name, f"{PACKAGE}.core.")
-        )
+        own, other = folder(module), folder(name) if is_ours(name) else ""
+        if not other or other == own:
+            return True
+        if own not in ORDER or other not in ORDER:
+            return False
+        return ORDER.index(other) < ORDER.index(own) and other not in STRANGERS.get(own, ())
 
     assert not complaints(allowed)
 
 
-def test_each_outside_package_is_imported_in_its_own_modules_alone() -> None:
+def test_imports_inside_the_package_are_relative() -> None:
+    absolute = [
+        f"{module}:{node.lineno}"
+        for module, path in MODULES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if (isinstance(node, ast.ImportFrom) and not node.level and is_ours(node.module or ""))
+        or (isinstance(node, ast.Import) and any(is_ours(alias.name) for alias in node.names))
+    ]
+    assert not absolute
+
+
+def test_each_outside_package_is_imported_in_its_own_place_alone() -> None:
     def allowed(module: str, name: str) -> bool:
         top = name.split(".")[0]
         if top == PACKAGE or top in sys.stdlib_module_names:
             return True
         if top in ROS or top == "simulation_interfaces" or top.endswith(("_msgs", "_srvs")):
-            return within(module, f"{PACKAGE}.ros.", f"{PACKAGE}.workbench.")
-        return within(module, *ALLOWED.get(top, ()))
+            return within(module, ("ros", "workbench"))
+        return within(module, ALLOWED.get(top, ()))
 
     assert not complaints(allowed)
 
 
-def test_nothing_below_ros_and_the_command_line_imports_them() -> None:
-    edges = (f"{PACKAGE}.ros.", f"{PACKAGE}.workbench.", f"{PACKAGE}.cli.")
-
-    def allowed(module: str, name: str) -> bool:
-        return within(module, *edges) or not within(name, *edges)
-
-    assert not complaints(allowed)
-
-
-def test_ros_imports_neither_the_page_nor_the_command_line() -> None:
-    beyond = (f"{PACKAGE}.workbench.", f"{PACKAGE}.cli.")
-    assert not complaints(lambda module, name: not (within(module, f"{PACKAGE}.ros.") and within(name, *beyond)))
-
-
-def test_the_page_does_not_import_the_command_line() -> None:
-    page, line = f"{PACKAGE}.workbench.", f"{PACKAGE}.cli."
-    assert not complaints(lambda module, name: not (within(module, page) and within(name, line)))
-
-
-def test_sweeps_are_imported_by_the_command_line_alone() -> None:
-    sweep = f"{PACKAGE}.sweep."
-    assert not complaints(lambda module, name: within(module, sweep, f"{PACKAGE}.cli.") or not within(name, sweep))
-
-
-def test_the_generator_of_bodies_is_imported_by_nobody() -> None:
-    bodies = f"{PACKAGE}.bodies."
-    assert not complaints(lambda module, name: within(module, bodies) or not within(name, bodies))
-
-
-@pytest.mark.parametrize(
-    "module", [f"{PACKAGE}.core", f"{PACKAGE}.core.simulation", f"{PACKAGE}.bundled", f"{PACKAGE}.scenario"]
-)
-def test_importing_the_core_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
+@pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.replay"])
+def test_simulating_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
     # scipy is not among them: numba loads it where it is installed, for linear algebra that we don't use.
     heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d")
-    code = f"import sys, {module}; print(*[name for name in {heavy!r} if name in sys.modules])"
+    code = f"import sys, {PACKAGE}.{module}; print(*[name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []

@@ -15,8 +15,8 @@ import pytest
 import yaml
 
 import rigid_proto_ros
-from rigid_proto_ros import bundled
-from rigid_proto_ros.core.errors import InputError
+from rigid_proto_ros.base import bundled
+from rigid_proto_ros.base.errors import InputError
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 EXECUTABLES = {"rigid_proto", "rigid_body_node", "poke_client"}

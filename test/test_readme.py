@@ -18,15 +18,15 @@ import numpy as np
 import pytest
 import yaml
 
+import docs_tables
 import rigid_proto_ros
-from rigid_proto_ros import docs_tables
-from rigid_proto_ros.bundled import example_names, example_path, scene_names
+from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
 from rigid_proto_ros.cli.main import main as rigid_proto
-from rigid_proto_ros.offline import OfflineRun, read_scene
-from rigid_proto_ros.poke_script import parse_script, read_script
+from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.ros.poke_client import main as poke_client
-from rigid_proto_ros.scenario import nanoseconds
-from rigid_proto_ros.session_reader import read_runs
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.script import parse_script, read_script
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 README = SOURCE / "README.md"
@@ -232,9 +232,9 @@ def test_message_to_publish_is_accepted_and_moves_the_t_handle(command: str, top
 
 
 def _submit(run: OfflineRun, topic: str, message) -> None:
-    from rigid_proto_ros.command_codec import string_target
-    from rigid_proto_ros.core.commands import WrenchCommand
-    from rigid_proto_ros.core.frames import parse_frame
+    from rigid_proto_ros.motion.frames import parse_frame
+    from rigid_proto_ros.scene.command_codec import string_target
+    from rigid_proto_ros.simulation.commands import WrenchCommand
 
     simulation, frame_id = run.simulation, message.header.frame_id
     if topic == "string/target":
@@ -377,7 +377,7 @@ def test_picture_is_there_and_small() -> None:
 
 
 def test_frames_of_the_reference_are_read_and_are_what_it_says() -> None:
-    from rigid_proto_ros.core.frames import parse_frame
+    from rigid_proto_ros.motion.frames import parse_frame
 
     section = REFERENCE.read_text("utf-8").partition("## Frames and units")[2].partition("\n## ")[0]
     rows = [line.split("|")[2] for line in section.splitlines() if line.startswith("| a ")]

@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from random_scenes import log_uniform
 
-from rigid_proto_ros.core import problem as of
-from rigid_proto_ros.core.integrators import control as ctl
-from rigid_proto_ros.core.integrators import series_steps, splitting_steps, taylor_adaptive
-from rigid_proto_ros.core.integrators.error_measure import FLOOR, scales, size
-from rigid_proto_ros.core.integrators.taylor_adaptive import MAX_DEGREE
-from rigid_proto_ros.core.motion import STORED
+from rigid_proto_ros.motion import problem as of
+from rigid_proto_ros.motion.integrators import control as ctl
+from rigid_proto_ros.motion.integrators import series_steps, splitting_steps, taylor_adaptive
+from rigid_proto_ros.motion.integrators.error_measure import FLOOR, scales, size
+from rigid_proto_ros.motion.integrators.taylor_adaptive import MAX_DEGREE
+from rigid_proto_ros.motion.variables import STORED
 
 JUDGE_ROUNDING = 1e-14
 """Times |ω| and the turn of a step in rad: an accuracy at which the judge's rounding takes 0.05; measured over 4000 steps."""

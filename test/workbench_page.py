@@ -219,7 +219,7 @@ class Ear(RosClient):
 
     def values(self) -> dict:
         """The parameters in force, as ~/scene says."""
-        from rigid_proto_ros.scene_file import read_scene_text
+        from rigid_proto_ros.scene.scene_file import read_scene_text
 
         return read_scene_text(self.until(lambda: self.heard("scene", last=1), "a scene")[-1]["data"]).values
 

@@ -16,8 +16,8 @@ from conftest import held_domain
 from playwright.sync_api import sync_playwright
 from workbench_page import CHROMIUM, FLAGS, Bench, Page
 
-from rigid_proto_ros.lessons import lessons
 from rigid_proto_ros.rerun_view.ports import any_free_port
+from rigid_proto_ros.scene.lessons import lessons
 from rigid_proto_ros.workbench.side_by_side import START
 
 SIZE = (1400, 800)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Bundled bodies: closed .obj solids in metres, and their generator (``python -m rigid_proto_ros.bodies``)."""
+"""Bundled bodies: closed .obj solids in metres, written by tools/bundled_bodies."""

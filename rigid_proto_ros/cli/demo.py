@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 
 FLIGHT_S = 10.0
 OUT = Path("out")
@@ -40,9 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly, and say what happened."""
-    from ..bundled import example_path, scene_path
-    from ..offline import read_scene
-    from ..poke_script import read_script
+    from ..base.bundled import example_path, scene_path
+    from ..scene.offline import read_scene
+    from ..scene.script import read_script
     from .processes import Processes, own_executable, text_parameter
 
     if not 3.0 <= args.duration <= 3600.0:
@@ -95,9 +95,9 @@ def _show_flight(duration_s: float, node) -> None:
 
 def _report(session: Path) -> int:
     """What happened, read back from the recording itself."""
-    from ..core.state import State
-    from ..replay import session_scenario
+    from ..motion.state import State
     from ..rerun_view.reader import read_session
+    from ..session.replay import session_scenario
 
     recorded = read_session(session)
     if not len(recorded.times):

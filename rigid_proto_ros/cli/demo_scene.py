@@ -21,7 +21,7 @@ def write_demo(mesh: str, folder: Path) -> tuple[Path, Path]:
     The body spins about its middle principal axis, a little off; pokes act at the COM and at the vertex farthest from it.
     Raises InputError for a mesh that can't fly.
     """
-    from ..scenario import make_scenario
+    from ..scene.scenario import make_scenario
 
     scenario = make_scenario({"mesh": str(Path(mesh).resolve()) if Path(mesh).exists() else mesh})
     body, surface = scenario.setup.body, scenario.setup.surface

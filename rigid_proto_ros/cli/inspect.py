@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bundled import body_names
-from ..command_line import completes
-from ..core.errors import InputError
-from ..core.mass_properties import scale_vector
-from ..inertial_export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
-from ..mesh_body import FALLBACKS, mesh_body
-from ..mesh_inspection import MODELS, Inspection, as_json, inspect_mesh, verify
-from ..mesh_io import MAX_TRIANGLES, load_mesh, resolve_mesh
-from ..progress import Progress
+from ..base.bundled import body_names
+from ..base.command_line import completes
+from ..base.errors import InputError
+from ..base.progress import Progress
+from ..mass.export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
+from ..mass.from_mesh import FALLBACKS, mesh_body
+from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify
+from ..mass.properties import scale_vector
+from ..mesh.reading import MAX_TRIANGLES, load_mesh, resolve_mesh
 from .inspect_report import print_diagnoses, print_report
 
 DENSITY = 1000.0
@@ -122,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
         raise inspection.refusal
     status = _verify(inspection, report, args.json) if args.verify else 0
     if args.record:
-        from ..inspect_view import record_inspection
+        from ..rerun_view.inspection import record_inspection
 
         record_inspection(args.record, inspection)
     if args.json:
@@ -166,7 +166,7 @@ def _check_amount(name: str, value: float, *, zero: bool) -> None:
 
 def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:
     """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to 1e-3, otherwise 1."""
-    from ..inertia_doctor import compare_robot  # XML and all: only who compares pays for it
+    from ..mass.diagnosis import compare_robot  # XML and all: only who compares pays for it
 
     for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
         if getattr(args, flag):

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.inertia_tensor import principal_axes, six_from_tensor
-from ..mesh_inspection import Inspection
+from ..mass.inspection import Inspection
+from ..mass.tensor import principal_axes, six_from_tensor
 from .terminal import SEVERITY_STYLES, Text, line, table
 
 if TYPE_CHECKING:
-    from ..inertia_doctor import LinkDiagnosis
+    from ..mass.diagnosis import LinkDiagnosis
 
 SHOWN_ZERO = 5e-7
 """Of a quantity's largest entry: what is smaller is beyond the six digits shown, and stands as 0. JSON has it."""

@@ -12,8 +12,8 @@ import signal
 import sys
 
 from .. import __version__
-from ..command_line import Parser, complete, completing
-from ..core.errors import InputError
+from ..base.command_line import Parser, complete, completing
+from ..base.errors import InputError
 
 COMMANDS = {
     "inspect": "mass properties of a mesh, and what is wrong with it",

@@ -8,9 +8,9 @@ import math
 import sys
 from pathlib import Path
 
-from ..core.errors import InputError
-from ..output_file import output_file
-from ..progress import Progress
+from ..base.errors import InputError
+from ..base.output_file import output_file
+from ..base.progress import Progress
 
 EXAMPLES = (
     ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Say what the session holds, and do what is asked for with it."""
-    from ..session_reader import read_runs, repair
+    from ..rerun_view.session_files import read_runs, repair
 
     _check(args)
     if args.repair:
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if args.repair:
         print(f"  repaired: {args.repair}")
     if args.record:
-        from ..session_playback import record
+        from ..rerun_view.session_files import record
 
         with Progress(f"recording {args.record}") as progress:
             record(runs, args.record, given_scene(args.scene), progress.fraction)
@@ -106,7 +106,7 @@ def _say_how_to_see_it(args: argparse.Namespace) -> None:
 
 
 def _verify(runs: list, args: argparse.Namespace) -> int:
-    from ..session_check import BeganLaterError, verify
+    from ..session.check import BeganLaterError, verify
 
     verified = 0
     for number, session in enumerate(runs, 1):
@@ -132,14 +132,14 @@ def given_scene(path: str | None):
     """The scene of this file, which was given for a session that lacks its own; None without one."""
     if not path:
         return None
-    from ..offline import read_scene
+    from ..scene.offline import read_scene
 
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
 def _branch(session, args: argparse.Namespace) -> None:
-    from ..scenario import nanoseconds
-    from ..session_branch import branch_at, recorded_branch
+    from ..scene.scenario import nanoseconds
+    from ..session.branch import branch_at, recorded_branch
 
     given, time_ns = given_scene(args.scene), nanoseconds(args.at)
     if given is None and session.missing:

@@ -9,10 +9,10 @@ import math
 import sys
 from pathlib import Path
 
-from ..bundled import scene_names
-from ..command_line import completes
-from ..core.errors import InputError
-from ..output_file import output_file
+from ..base.bundled import scene_names
+from ..base.command_line import completes
+from ..base.errors import InputError
+from ..base.output_file import output_file
 from .terminal import line, table
 
 EXAMPLES = (
@@ -46,17 +46,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _settings() -> list[str]:
-    from ..parameters import PARAMETERS
+    from ..scene.parameters import PARAMETERS
 
     return [f"{name}=" for name in PARAMETERS]
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
-    from ..offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
-    from ..poke_script import read_script
-    from ..scenario import nanoseconds
-    from ..session_recorder import is_mcap
+    from ..rerun_view.recorder import is_mcap
+    from ..scene.offline import (
+        OfflineRun,
+        parse_setting,
+        read_scene,
+        run_with_progress,
+        summary,
+    )
+    from ..scene.scenario import nanoseconds
+    from ..scene.script import read_script
 
     if not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
         raise InputError("--duration", args.duration, "seconds from 0 to 1e9")
@@ -106,8 +112,8 @@ def _recorder(files: list[str], values):
     """One observer that records to all of these files; None without any."""
     if not files:
         return None
-    from ..core.observer import Observers
-    from ..session_recorder import make_recorder
+    from ..rerun_view.recorder import make_recorder
+    from ..simulation.observer import Observers
 
     opened: list = []
     try:

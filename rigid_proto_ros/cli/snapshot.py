@@ -7,8 +7,8 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from ..core.errors import InputError
-from ..progress import Progress
+from ..base.errors import InputError
+from ..base.progress import Progress
 
 EXAMPLES = (
     ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Take the picture; InputError says what was wrong with the request."""
-    from ..session_reader import is_bag
+    from ..rerun_view.session_files import is_bag
 
     size = _size(args.size)
     if not is_bag(Path(args.session)):
@@ -57,9 +57,8 @@ def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]
 
 def _drawn(args: argparse.Namespace, folder: Path) -> Path:
     """The last run of a bag as a recording for the viewer."""
+    from ..rerun_view.session_files import read_runs, record
     from ..rerun_view.snapshot import check_picture, check_time
-    from ..session_playback import record
-    from ..session_reader import read_runs
     from .replay import given_scene
 
     session = read_runs(args.session, args.node)[-1]

@@ -8,9 +8,9 @@ import json
 import sys
 from pathlib import Path
 
-from ..bundled import study_names
-from ..command_line import completes
-from ..core.errors import InputError
+from ..base.bundled import study_names
+from ..base.command_line import completes
+from ..base.errors import InputError
 
 EXAMPLES = (
     ("rigid_proto sweep box_tensor -o out/box_tensor.parquet", "a bundled study, on all cores"),
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _whole(study, args) -> int:
-    from ..core.compilation import told_when_compiling
+    from ..base.compilation import told_when_compiling
     from ..sweep.chunk import run_chunk
     from ..sweep.plot import check_plot, plot_table, read_plot
     from ..sweep.run import Interrupted, run_study
@@ -103,8 +103,9 @@ def _row_number(text, study) -> int:
 
 
 def _one_row(study, args) -> int:
-    from ..sweep.one_row import record_row, row_summary, write_scene
+    from ..sweep.one_row import row_summary, write_scene
     from ..sweep.variation import variation
+    from .sweep_recordings import record_row
 
     row = _row_number(args.row, study)
     summary = row_summary(study, row)
@@ -122,7 +123,7 @@ def _one_row(study, args) -> int:
 
 
 def _ghosts(study, args) -> int:
-    from ..sweep.one_row import MAX_GHOSTS, record_ghosts
+    from .sweep_recordings import MAX_GHOSTS, record_ghosts
 
     rows = [_row_number(text, study) for text in args.ghosts.split(",")]
     if not args.record or not 1 <= len(rows) <= MAX_GHOSTS:

@@ -7,8 +7,8 @@ import argparse
 import os
 import sys
 
-from ..bundled import scene_names
-from ..command_line import completes
+from ..base.bundled import scene_names
+from ..base.command_line import completes
 
 EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Become the node: signals reach it directly."""
-    from ..offline import read_scene, scene_file
+    from ..scene.offline import read_scene, scene_file
     from .processes import text_parameter
 
     overrides = text_parameter("mesh", args.mesh) if args.mesh else []

@@ -8,9 +8,9 @@ import importlib.util
 import sys
 import time
 
-from ..bundled import scene_names
-from ..command_line import completes
-from ..core.errors import InputError
+from ..base.bundled import scene_names
+from ..base.command_line import completes
+from ..base.errors import InputError
 
 RESTART_S = 3.0
 """[s] A page or node that is killed sooner after its start isn't started again."""
@@ -60,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _stay(args: argparse.Namespace) -> int:
-    from ..parameters import PARAMETERS
     from ..rerun_view.ports import LOOPBACK
+    from ..scene.parameters import PARAMETERS
     from ..workbench.listening import choose_page_port
     from .processes import Processes, own_executable
 
@@ -110,8 +110,8 @@ def _ended(name: str, status: int) -> int:
 def _node_arguments(scene: str, mesh: str | None) -> tuple[list[str], int | None]:
     """How to start the node, and the page's port where the scene asks for one; what is wrong with it is said before anything
     starts."""
-    from ..offline import read_scene, scene_file
-    from ..parameters import PARAMETERS
+    from ..scene.offline import read_scene, scene_file
+    from ..scene.parameters import PARAMETERS
     from .processes import text_parameter
 
     values = read_scene(scene, {"mesh": mesh} if mesh else {}).values

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core.observer import ShownLoad
+from ..simulation.observer import ShownLoad
 from .derived import rotation_matrices, to_world
 
 IMPULSE_SHOWN_NS = 150_000_000

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Energies and angular momentum of many states at once, for plots.
 
-States are rows (n, 13) in ``core.observer.STATE_FIELDS`` order: COM position, attitude xyzw, COM velocity (world),
+States are rows (n, 13) in ``simulation/observer.py``'s ``STATE_FIELDS`` order: COM position, attitude xyzw, COM velocity (world),
 angular velocity (body axes).
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.observer import BodySnapshot
+from ..simulation.observer import BodySnapshot
 
 
 @dataclass(frozen=True)

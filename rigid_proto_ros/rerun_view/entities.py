@@ -6,7 +6,7 @@ Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` 
 
 from __future__ import annotations
 
-from ..appearance import (
+from .appearance import (
     BLUE,
     ENERGY_SERIES,
     FORCE_COLOUR,

@@ -12,9 +12,15 @@ import uuid
 from collections.abc import Callable
 from typing import Any
 
-from ..core.errors import InputError
-from ..mailbox import Block, Mailbox, Mark
-from .streams import FileStream, LiveServer, LiveStream, end_without_waiting, forget_closed_recordings
+from ..base.errors import InputError
+from ..simulation.mailbox import Block, Mailbox, Mark
+from .streams import (
+    FileStream,
+    LiveServer,
+    LiveStream,
+    end_without_waiting,
+    forget_closed_recordings,
+)
 from .writer import SceneWriter
 
 FLUSH_PERIOD_S = 0.5

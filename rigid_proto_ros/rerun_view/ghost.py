@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from ..core.observer import BodySnapshot
-from ..mailbox import Block
+from ..simulation.mailbox import Block
+from ..simulation.observer import BodySnapshot
 from . import entities as e
 from .columns import Send, one_time, scalar_columns, time_columns
 from .inertia_shapes import PrincipalFrame

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import rerun.blueprint as rrb
 
-from .. import appearance
+from . import appearance
 from . import entities as e
 
 TRAIL_SECONDS = 3.0

@@ -8,10 +8,16 @@ from collections import deque
 import numpy as np
 import rerun as rr
 
-from ..core.observer import ShownLoad
-from ..mailbox import Block
+from ..simulation.mailbox import Block
+from ..simulation.observer import ShownLoad
 from . import entities as e
-from .arrows import IMPULSE_SHOWN_NS, Arrow, ArrowSamples, ArrowScale, arrows_of
+from .arrows import (
+    IMPULSE_SHOWN_NS,
+    Arrow,
+    ArrowSamples,
+    ArrowScale,
+    arrows_of,
+)
 from .columns import Send, time_columns
 from .derived import carried_along, rotation_matrices
 

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.observer import BodySnapshot, Observer, ShownLoad, ShownString
+from ..base.errors import InputError
+from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
 from .ports import choose_port
 
 if TYPE_CHECKING:

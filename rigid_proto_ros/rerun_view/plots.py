@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.inertia_tensor import principal_axes
-from ..core.observer import BodySnapshot
-from ..plot_range import plot_range
+from ..mass.tensor import principal_axes
+from ..simulation.observer import BodySnapshot
 from . import entities as e
 from .columns import Send, scalar_columns, time_columns
 from .derived import angle_to, derive
+from .plot_range import plot_range
 
 
 class Ranges:

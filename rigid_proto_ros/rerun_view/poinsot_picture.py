@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from ..core.observer import BodySnapshot
+from ..simulation.observer import BodySnapshot
 from . import entities as e
 from .columns import Send, Ticks, one_time, time_columns
 from .derived import rotation_matrices, to_world

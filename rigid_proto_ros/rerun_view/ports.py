@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import socket
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 
 LOOPBACK = "127.0.0.1"
 PORTS_TRIED = 64

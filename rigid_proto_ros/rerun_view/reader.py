@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..recorded_session import RecordedSession
+from ..base.errors import InputError
+from ..session.recorded_session import RecordedSession
 from . import entities as e
 from .rrd_file import whole_bytes, whole_part
 

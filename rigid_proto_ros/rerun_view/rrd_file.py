@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from .viewers import viewer_program
 
 MAGIC = b"RRF2"

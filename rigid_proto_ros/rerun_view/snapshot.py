@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from ..core.errors import InputError
-from ..output_file import output_file
-from ..recorded_session import RecordedSession
+from ..base.errors import InputError
+from ..base.output_file import output_file
+from ..session.recorded_session import RecordedSession
 from . import entities as e
 from .ports import LOOPBACK, any_free_port
 from .reader import read_session

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from .. import appearance
-from ..core.observer import BodySnapshot
+from ..simulation.observer import BodySnapshot
+from . import appearance
 from . import entities as e
 from .columns import one_time
 from .inertia_shapes import PrincipalFrame, bounding_box

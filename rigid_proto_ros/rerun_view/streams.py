@@ -20,8 +20,8 @@ from typing import Any
 import rerun as rr
 import rerun_bindings
 
-from ..core.errors import InputError
-from ..output_file import output_file
+from ..base.errors import InputError
+from ..base.output_file import output_file
 from .layout import Subject
 from .ports import LOOPBACK
 from .rrd_file import end_without_index

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from .. import appearance
-from ..core.observer import ShownString
-from ..mailbox import Block
+from ..simulation.mailbox import Block
+from ..simulation.observer import ShownString
+from . import appearance
 from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 
 
 def bring_to_front(client: Any, name: str) -> str | None:

@@ -10,27 +10,36 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from .. import appearance
-from ..core.errors import InputError
-from ..core.observer import BodySnapshot
-from ..mailbox import Block, Mark
-from ..scene_file import read_scene_text
+from ..base.errors import InputError
+from ..scene.scene_file import read_scene_text
+from ..simulation.mailbox import Block, Mark
+from ..simulation.observer import BodySnapshot
+from . import appearance
 from . import entities as e
 from .arrows import ArrowScale, arrow_length
 from .columns import Ticks, one_time, scalar_columns, time_columns
 from .derived import rotation_matrices, to_world
 from .ghost import Ghost
 from .inertia_shapes import skewed
-from .lanes import Lanes
 from .layout import Subject
 from .load_arrows import LoadArrows
+from .logged_text import Words
 from .plots import Plots, Ranges
 from .poinsot_picture import PoinsotPicture
-from .statics import TRAIL_RADIUS, Scene, drawn_mesh, hide_mesh, send_body, send_mesh, send_scene, send_styles
+from .state_timeline import Lanes
+from .statics import (
+    TRAIL_RADIUS,
+    Scene,
+    drawn_mesh,
+    hide_mesh,
+    send_body,
+    send_mesh,
+    send_scene,
+    send_styles,
+)
 from .streams import Stream
 from .string_picture import StringPicture
 from .trail import Trail
-from .words import Words
 
 PICTURE_RATE = 250
 """[1/s, simulated] of what is only looked at, plots and arrows: the states themselves are all logged, exactly."""

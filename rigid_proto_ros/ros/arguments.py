@@ -7,12 +7,12 @@ import argparse
 import textwrap
 from collections.abc import Callable
 
-from ..bundled import scene_names
-from ..command_line import Parser, complete, completes
-from ..core.errors import InputError
-from ..nearest_name import did_you_mean
-from ..parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named
-from ..scene_file import read_scene_file, typed_value
+from ..base.bundled import scene_names
+from ..base.command_line import Parser, complete, completes
+from ..base.errors import InputError
+from ..base.nearest_name import did_you_mean
+from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named
+from ..scene.scene_file import read_scene_file, typed_value
 
 _WITH_VALUE = (
     "-p", "--param", "--params-file", "-r", "--remap", "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name",

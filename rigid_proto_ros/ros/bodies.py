@@ -6,8 +6,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ..core.errors import InputError
-from ..offline import scene_file, scene_values
+from ..base.errors import InputError
+from ..scene.offline import scene_file, scene_values
 
 NODE_NAME_FORM = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 

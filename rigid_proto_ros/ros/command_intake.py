@@ -15,18 +15,18 @@ from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from .. import cdr
-from ..command_codec import core_command
-from ..core.commands import WrenchCommand
-from ..core.errors import CommandRefused
-from ..core.frames import Frame, parse_frame
-from ..scenario import check_inertia, nanoseconds
+from ..base.errors import CommandRefused
+from ..messages import cdr
+from ..motion.frames import Frame, parse_frame
+from ..scene.command_codec import core_command
+from ..scene.scenario import check_inertia, nanoseconds
+from ..simulation.commands import WrenchCommand
 from . import qos
 from .message_bytes import read_command, read_message, read_wrench_stamped
+from .polled_subscription import TakenByHand
 from .scheduling import LONG_TEXT, Beside, Scheduled
 from .sequence_gaps import SequenceGaps
 from .stamps import effective_time
-from .taken_by_hand import TakenByHand
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""

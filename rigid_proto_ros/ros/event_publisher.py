@@ -9,11 +9,11 @@ from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from .. import cdr
-from ..core.body import Body
-from ..core.commands import WrenchCommand
-from ..core.loads import Load
-from ..core.observer import BodySnapshot, Observer
+from ..messages import cdr
+from ..motion.body import Body
+from ..motion.loads import Load
+from ..simulation.commands import WrenchCommand
+from ..simulation.observer import BodySnapshot, Observer
 from . import qos
 from .robot_description import RobotDescription
 

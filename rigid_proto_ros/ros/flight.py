@@ -11,11 +11,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..core.observer import Observer
-from ..core.simulation import Simulation
-from ..core.state import State
-from ..ghost import Ghost, ghost_of
-from ..scenario import Scenario, publication_ns
+from ..motion.state import State
+from ..scene.ghost import Ghost, ghost_of
+from ..scene.scenario import Scenario, publication_ns
+from ..simulation.observer import Observer
+from ..simulation.simulation import Simulation
 from .portions import Portions
 
 DRAIN_NS = 10_000_000

@@ -10,10 +10,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
-from ..core.commands import Change
-from ..core.errors import CommandRefused, InputError
-from ..parameters import is_ros_parameter, parameter_named
-from ..scenario import Scenario
+from ..base.errors import CommandRefused, InputError
+from ..scene.parameters import is_ros_parameter, parameter_named
+from ..scene.scenario import Scenario
+from ..simulation.commands import Change
 from .parameter_server import converted, descriptor, is_read_only, ros_parameter
 from .warm_up import warm_up
 

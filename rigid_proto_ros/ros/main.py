@@ -7,10 +7,10 @@ import sys
 import threading
 import traceback
 
-from ..core.compilation import told_when_compiling
-from ..core.errors import InputError
-from ..parameters import PARAMETERS
-from .ending import Ending, begin_closing, begin_teardown, leave
+from ..base.compilation import told_when_compiling
+from ..base.errors import InputError
+from ..scene.parameters import PARAMETERS
+from .shutdown import Ending, begin_closing, begin_teardown, leave
 
 
 def main(argv: list[str] | None = None) -> int:

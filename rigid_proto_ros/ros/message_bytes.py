@@ -6,9 +6,9 @@ from __future__ import annotations
 from geometry_msgs.msg import WrenchStamped
 from rclpy.serialization import deserialize_message, serialize_message
 
-from .. import cdr
-from ..command_codec import ScriptCommand, of_message, whole_stamp
-from ..core.errors import CommandRefused
+from ..base.errors import CommandRefused
+from ..messages import cdr
+from ..scene.command_codec import ScriptCommand, of_message, whole_stamp
 
 
 def read_wrench_stamped(data: bytes) -> tuple[int, str, tuple, tuple]:

@@ -15,11 +15,11 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from ..core.commands import ClearWrench, ReleaseString
-from ..core.errors import InputError
-from ..core.observer import Observer, Observers
-from ..offline import tell_start
-from ..scenario import BodyMesh, Scenario, check_inertia, make_scenario
+from ..base.errors import InputError
+from ..scene.offline import tell_start
+from ..scene.scenario import BodyMesh, Scenario, check_inertia, make_scenario
+from ..simulation.commands import ClearWrench, ReleaseString
+from ..simulation.observer import Observer, Observers
 from .command_intake import TOPICS, CommandIntake
 from .diagnostics import REFUSAL_REASONS, Diagnostics
 from .event_publisher import EventPublisher
@@ -110,7 +110,7 @@ class RigidBodyNode(Node):
         path = scenario.values["record"]
         if not path:
             return None
-        from ..session_recorder import make_recorder
+        from ..rerun_view.recorder import make_recorder
 
         return make_recorder(path, self.get_name(), scenario.values, self._recording_failed)
 

@@ -7,9 +7,15 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from .. import parameters
-from ..core.errors import InputError
-from ..parameters import PARAMETERS, READ_ONLY, Parameter, is_ros_parameter, parameter_named
+from ..base.errors import InputError
+from ..scene import parameters
+from ..scene.parameters import (
+    PARAMETERS,
+    READ_ONLY,
+    Parameter,
+    is_ros_parameter,
+    parameter_named,
+)
 
 _TYPES = {
     "double": ParameterType.PARAMETER_DOUBLE,

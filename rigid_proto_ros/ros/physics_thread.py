@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from .flight import Flight
 
 SHORT_NS = 3_000_000

@@ -14,11 +14,11 @@ import argparse
 import signal
 import sys
 
-from ..command_codec import ScriptCommand
-from ..command_line import Parser, complete, completes
-from ..core.errors import InputError
-from ..parameters import PARAMETERS
-from ..poke_script import MAX_TIME_S, parse_script, read_script
+from ..base.command_line import Parser, complete, completes
+from ..base.errors import InputError
+from ..scene.command_codec import ScriptCommand
+from ..scene.parameters import PARAMETERS
+from ..scene.script import MAX_TIME_S, parse_script, read_script
 
 _ONE_LINE_COMMANDS = ("poke", "wrench")
 

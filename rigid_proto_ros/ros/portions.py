@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
 """How far a simulation may be advanced at a time, so that whoever waits for the physics thread never waits long.
 
-The motion doesn't depend on the portions (core/segment.py), so they may follow the wall clock.
+The motion doesn't depend on the portions (simulation/segment.py), so they may follow the wall clock.
 """
 
 from __future__ import annotations
 
 import time
 
-from ..core.simulation import Simulation
+from ..simulation.simulation import Simulation
 
 WORK_NS = 8_000_000
 """[ns of wall time] A tick advances no longer than this before it lets commands and requests in."""

@@ -15,15 +15,15 @@ from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.signals import SignalHandlerOptions
 
-from .. import cdr
-from ..command_codec import MARKS, ScriptCommand, frame_names, in_words, of_event
-from ..core.errors import InputError
-from ..parameters import defaults
-from ..recorded_session import RecordedSession
-from ..scene_file import read_scene_text
-from ..session_messages import PROJECTIONS, StampedRows
-from ..session_playback import sorted_states
-from ..session_runs import decode_event
+from ..base.errors import InputError
+from ..messages import cdr
+from ..messages.session_messages import PROJECTIONS, StampedRows
+from ..scene.command_codec import MARKS, ScriptCommand, frame_names, in_words, of_event
+from ..scene.parameters import defaults
+from ..scene.scene_file import read_scene_text
+from ..session.playback import sorted_states
+from ..session.recorded_session import RecordedSession
+from ..session.runs import decode_event
 from . import qos
 from .script_sender import ScriptSender
 

@@ -11,9 +11,9 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
-from ..core.mass_properties import MassProperties
-from ..core.observer import BodySnapshot
-from ..inertial_export import urdf_inertial
+from ..mass.export import urdf_inertial
+from ..mass.properties import MassProperties
+from ..simulation.observer import BodySnapshot
 from . import qos
 
 

@@ -15,13 +15,13 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
-from ..command_codec import ScriptCommand, core_command
-from ..core.commands import Command, Listed
-from ..core.errors import CommandRefused, InputError
-from ..core.setup import Setup
-from ..core.simulation import judge
-from ..poke_script import expand_schedule, read_schedule, with_contacts
-from ..scenario import BodyMesh, Scenario
+from ..base.errors import CommandRefused, InputError
+from ..scene.command_codec import ScriptCommand, core_command
+from ..scene.scenario import BodyMesh, Scenario
+from ..scene.script import expand_schedule, read_schedule, with_contacts
+from ..simulation.commands import Command, Listed
+from ..simulation.setup import Setup
+from ..simulation.simulation import judge
 from .warm_up import warm_up
 
 LONG_TEXT = 20_000

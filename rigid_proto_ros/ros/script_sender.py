@@ -18,11 +18,11 @@ from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from ..command_codec import ScriptCommand, outgoing
-from ..core.errors import InputError
-from ..parameters import PARAMETERS
-from ..poke_script import with_contacts
-from ..scenario import nanoseconds
+from ..base.errors import InputError
+from ..scene.command_codec import ScriptCommand, outgoing
+from ..scene.parameters import PARAMETERS
+from ..scene.scenario import nanoseconds
+from ..scene.script import with_contacts
 from . import qos
 
 MAX_UNCONFIRMED = 500

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from .flight import Flight
 from .physics_thread import step_over
 

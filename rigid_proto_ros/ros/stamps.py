@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..core.errors import CommandRefused
+from ..base.errors import CommandRefused
 
 DAY_NS = 24 * 3600 * 1_000_000_000
 

@@ -14,9 +14,9 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
-from .. import cdr
-from ..core.rotation import rotate
-from ..core.state import State
+from ..base.rotation import rotate
+from ..messages import cdr
+from ..motion.state import State
 from . import qos
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..core.commands import MoveString, WrenchCommand
-from ..core.errors import CommandRefused
-from ..core.frames import parse_frame
-from ..core.setup import Setup
-from ..core.simulation import Simulation
-from ..core.state import State
+from ..base.errors import CommandRefused
+from ..motion.frames import parse_frame
+from ..motion.state import State
+from ..simulation.commands import MoveString, WrenchCommand
+from ..simulation.setup import Setup
+from ..simulation.simulation import Simulation
 
 
 def warm_up(setup: Setup) -> State:

@@ -13,8 +13,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core.batch import Results, fly_variants, new_results
-from ..core.errors import InputError
+from ..base.errors import InputError
+from ..simulation.batch import Results, fly_variants, new_results
 from .forms import VERTEX, Draw, as_text
 from .groups import Group, is_structural
 from .row_flight import fly_row

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from .chunk import Chunk, run_chunk
 from .study import Study
 from .table import Parts

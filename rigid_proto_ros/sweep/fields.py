@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from ..core.errors import InputError
-from ..nearest_name import one_of
+from ..base.errors import InputError
+from ..base.nearest_name import one_of
 
 
 def number(value, field: str, lower: float = -1e100, upper: float = 1e100, above: float = -math.inf) -> float:

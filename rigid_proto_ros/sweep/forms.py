@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import row_random as rr
-from ..core.errors import InputError
+from ..base.errors import InputError
+from . import row_random as rr
 from .fields import mapping, number, whole
 
 MAX_POINTS = 1_000_000
@@ -61,7 +61,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Draw:
-    """A random value; ``a`` and ``b`` as core/row_random.py takes them."""
+    """A random value; ``a`` and ``b`` as sweep/row_random.py takes them."""
 
     shape: int
     a: float = 0.0

@@ -8,15 +8,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..core import batch_body as bb
-from ..core import flight as fl
-from ..core import loads as ld
-from ..core.batch import Variants
-from ..core.errors import InputError
-from ..core.integrators.taylor_adaptive import degree_for
-from ..parameters import convert_all, parameter_named
-from ..poke_script import expand_script
-from ..scenario import BodyMesh
+from ..base.errors import InputError
+from ..motion import loads as ld
+from ..motion.integrators.taylor_adaptive import degree_for
+from ..scene.parameters import convert_all, parameter_named
+from ..scene.scenario import BodyMesh
+from ..scene.script import expand_script
+from ..simulation import batch_body as bb
+from ..simulation import flight as fl
+from ..simulation.batch import Variants
 from .forms import VERTEX, Draw
 from .overlay import Overlay, fits, make_overlay
 from .study import Study, Vary, script_entries

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import flight_measures as fm
-from ..core.errors import InputError
-from ..core.quantities import DIFFERENCES, NAMES, QUANTITIES, TURNED
-from ..scenario import nanoseconds, publication_ns
+from ..base.errors import InputError
+from ..scene.scenario import nanoseconds, publication_ns
+from ..simulation import flight_measures as fm
+from ..simulation.quantities import DIFFERENCES, NAMES, QUANTITIES, TURNED
 from .fields import known_name, mapping, names, number
 
 MAX_LOOKS = 100_000

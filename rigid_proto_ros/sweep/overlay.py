@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..command_codec import ScriptCommand
-from ..core import flight as fl
-from ..core import loads as ld
-from ..poke_script import MAX_TIME_S, expand_script
+from ..motion import loads as ld
+from ..scene.command_codec import ScriptCommand
+from ..scene.script import MAX_TIME_S, expand_script
+from ..simulation import flight as fl
 from .study import Study
 from .targets import Target
 from .templates import Script, Settler, script_of

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..output_file import output_file
+from ..base.errors import InputError
+from ..base.output_file import output_file
 from .table import read_columns
 
 _KEYS = ("x", "y", "color", "to", "log")

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.flight_measures import measure_flight
-from ..core.quantities import CONTEXT, STATE, begin, which_is_met
-from ..core.simulation import Simulation
-from ..offline import OfflineRun
-from ..scenario import Scenario
+from ..base.errors import InputError
+from ..scene.offline import OfflineRun
+from ..scene.scenario import Scenario
+from ..simulation.flight_measures import measure_flight
+from ..simulation.quantities import CONTEXT, STATE, begin, which_is_met
+from ..simulation.simulation import Simulation
 from .measures import Measures
 from .study import Study
 from .variation import Variation

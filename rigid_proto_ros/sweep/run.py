@@ -7,7 +7,7 @@ from collections.abc import Generator
 from contextlib import closing
 from pathlib import Path
 
-from ..progress import Progress
+from ..base.progress import Progress
 from .chunk import Chunk
 from .local import chunk_rows, cores, local_chunks
 from .study import Study

@@ -9,8 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.row_random import latin_uniforms, row_uniforms, seed_words
+from ..base.errors import InputError
+from .row_random import latin_uniforms, row_uniforms, seed_words
 
 SAMPLERS = ("random", "latin_hypercube", "sobol")
 MAX_SOBOL = 1 << 30

@@ -17,14 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bundled import example_names, example_path, study_names, study_path
-from ..core.errors import InputError
-from ..offline import OfflineRun, scene_file, scene_values
-from ..parameters import READ_ONLY, convert_all, parameter_named
-from ..plain_yaml import load_plain_yaml
-from ..poke_script import expand_script
-from ..scenario import Scenario, make_scenario, nanoseconds
-from ..scene_file import MAX_BYTES
+from ..base.bundled import example_names, example_path, study_names, study_path
+from ..base.errors import InputError
+from ..scene.offline import OfflineRun, scene_file, scene_values
+from ..scene.parameters import READ_ONLY, convert_all, parameter_named
+from ..scene.plain_yaml import load_plain_yaml
+from ..scene.scenario import Scenario, make_scenario, nanoseconds
+from ..scene.scene_file import MAX_BYTES
+from ..scene.script import expand_script
 from .fields import mapping, number, whole
 from .forms import GRID, LIST, Draw, Points, read_form
 from .measures import Measures, read_measures

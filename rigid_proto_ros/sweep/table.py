@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..provenance import cpu, versions
+from ..base.errors import InputError
+from ..base.provenance import cpu, versions
 from .chunk import Chunk
 from .study import Study
 

@@ -11,9 +11,9 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..core.errors import InputError
-from ..nearest_name import one_of
-from ..parameters import READ_ONLY, Parameter, parameter_named
+from ..base.errors import InputError
+from ..base.nearest_name import one_of
+from ..scene.parameters import READ_ONLY, Parameter, parameter_named
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
 _BALLAST = "mass x y z"

@@ -8,17 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..command_codec import ScriptCommand
-from ..core import batch_body as bb
-from ..core import flight as fl
-from ..core.commands import WrenchCommand
-from ..core.errors import InputError, MeshError
-from ..core.frames import parse_frame
-from ..core.integrators import check_carried, integrator_named
-from ..core.integrators.integrator import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, Integrator, needs_of_load
-from ..core.integrators.taylor_adaptive import degree_for
-from ..core.loads import LOAD, Load, settle
-from ..scenario import BodyMesh, nanoseconds
+from ..base.errors import InputError, MeshError
+from ..motion.frames import parse_frame
+from ..motion.integrators import check_carried, integrator_named
+from ..motion.integrators.integrator import (
+    ANGULAR_DAMPING,
+    NO_GYROSCOPIC_TERM,
+    Integrator,
+    needs_of_load,
+)
+from ..motion.integrators.taylor_adaptive import degree_for
+from ..motion.loads import LOAD, Load, settle
+from ..scene.command_codec import ScriptCommand
+from ..scene.scenario import BodyMesh, nanoseconds
+from ..simulation import batch_body as bb
+from ..simulation import flight as fl
+from ..simulation.commands import WrenchCommand
 
 FAST = {
     "scale": (bb.SCALE, 3),
@@ -51,7 +56,7 @@ class NotCarried(Exception):
 
 @dataclass(frozen=True)
 class Script:
-    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of core/flight.py and core/loads.py."""
+    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of simulation/flight.py and motion/loads.py."""
 
     commands: np.ndarray
     loads: np.ndarray

@@ -11,9 +11,9 @@ from functools import lru_cache
 import numpy as np
 import yaml
 
-from ..command_codec import ScriptCommand
-from ..poke_script import expand_script
-from ..scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
+from ..scene.command_codec import ScriptCommand
+from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
+from ..scene.script import expand_script
 from .forms import VERTEX, Draw
 from .study import Study, script_entries
 

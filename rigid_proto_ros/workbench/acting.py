@@ -7,13 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.commands import ClearWrench, Command, MoveString, ReleaseString, TieString, WrenchCommand
-from ..core.loads import Load, settle
-from ..core.setup import Setup
-from ..core.state import State
-from ..core.string import Tied
-from ..core.string_control import StringControl
-from ..scenario import Scenario, nanoseconds
+from ..motion.loads import Load, settle
+from ..motion.state import State
+from ..motion.string import Tied
+from ..scene.scenario import Scenario, nanoseconds
+from ..simulation.commands import (
+    ClearWrench,
+    Command,
+    MoveString,
+    ReleaseString,
+    TieString,
+    WrenchCommand,
+)
+from ..simulation.setup import Setup
+from ..simulation.string_control import StringControl
 
 SHOWN_AT_LEAST_NS = 800_000_000
 """[ns, of a body that flies in real time] A poke is over before a page has drawn it twice; its arrow stays this long."""

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..bundled import body_names
-from ..core.inertia_tensor import six_from_tensor
-from ..mesh_body import mesh_body
-from ..mesh_io import Mesh
-from ..scenario import Scenario
+from ..base.bundled import body_names
+from ..mass.from_mesh import mesh_body
+from ..mass.tensor import six_from_tensor
+from ..mesh.reading import Mesh
+from ..scene.scenario import Scenario
 from .controls import Controls, read_numbers
 from .tensors import comparison, judged
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import viser
 
-from ..parameters import parameter_named
+from ..scene.parameters import parameter_named
 
 TYPING_S = 0.6
 """[s] A text that hasn't changed for this long is meant as it stands."""

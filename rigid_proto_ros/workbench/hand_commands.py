@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..command_codec import ScriptCommand, outgoing
-from ..parameters import LIVE, parameter_named
 from ..ros.scheduling import SLOW
+from ..scene.command_codec import ScriptCommand, outgoing
+from ..scene.parameters import LIVE, parameter_named
 from .rewind import KEPT
 from .ros_link import RosLink
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..command_codec import MARKS
-from ..core.errors import InputError
-from ..recorded_session import RecordedSession
-from ..session_mesh import scene_sha256
-from ..session_runs import decode_event
+from ..base.errors import InputError
+from ..scene.command_codec import MARKS
+from ..session.mesh import scene_sha256
+from ..session.recorded_session import RecordedSession
+from ..session.runs import decode_event
 from .rewind import Rewind, core_row, make_rewind
 from .save_as_script import SavedScript, save_as_script
 from .state_log import StateLog

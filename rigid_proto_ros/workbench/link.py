@@ -16,13 +16,13 @@ import zlib
 from collections.abc import Mapping
 from typing import Any
 
-from ..command_codec import flow
-from ..core.errors import InputError
-from ..mesh_io import bundled_names
-from ..parameters import PARAMETERS, convert_all
-from ..poke_script import expand_script, script_entries
-from ..scenario import scene_text
-from ..scene_file import read_scene_text
+from ..base.errors import InputError
+from ..mesh.reading import bundled_names
+from ..scene.command_codec import flow
+from ..scene.parameters import PARAMETERS, convert_all
+from ..scene.scenario import scene_text
+from ..scene.scene_file import read_scene_text
+from ..scene.script import expand_script, script_entries
 from .save_as_script import NOT_OF_THE_MOTION
 
 VERSION = "1"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import errno
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from ..rerun_view.ports import PORTS_TRIED
 
 _THE_PORTS_FAULT = (errno.EADDRINUSE, errno.EACCES)

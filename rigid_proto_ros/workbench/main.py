@@ -9,10 +9,10 @@ import sys
 import time
 import webbrowser
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
-from ..ros.ending import Ending
+from ..ros.shutdown import Ending
 
 PATIENCE_S = 10.0
 """[s] For a node that is said to be running: discovery takes less than one of them."""

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..command_codec import command_of_event, frame_names
-from ..core.errors import InputError
-from ..core.state import State
-from ..scenario import Scenario
+from ..base.errors import InputError
+from ..motion.state import State
+from ..scene.command_codec import command_of_event, frame_names
+from ..scene.scenario import Scenario
 from .acting import Acting
 from .body_tab import BodyTab
 from .controls import Controls, ParameterSetter

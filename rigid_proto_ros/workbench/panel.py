@@ -7,7 +7,7 @@ import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..core.integrators import INTEGRATORS
+from ..motion.integrators import INTEGRATORS
 from .controls import TYPING_S, Controls, log_slider, on_slider, read_numbers
 from .pointer import POKE, PUSH
 

@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..command_codec import MESH_FRAME, ScriptCommand
-from ..scenario import Scenario
+from ..scene.command_codec import MESH_FRAME, ScriptCommand
+from ..scene.scenario import Scenario
 from .hand_commands import HandCommands
 from .sighting import DrawnPose, Sightings
 

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..appearance import (
+from ..mass.tensor import principal_axes
+from ..motion.state import State
+from ..rerun_view.appearance import (
     ANGLE_UNIT,
     ENERGY_SERIES,
     ENERGY_TITLE,
@@ -28,10 +30,8 @@ from ..appearance import (
     TOTAL_ENERGY_SERIES,
     css,
 )
-from ..core.inertia_tensor import principal_axes
-from ..core.state import State
-from ..plot_range import AXIS_PIXELS, PlotRange, plot_range
-from ..scenario import Scenario
+from ..rerun_view.plot_range import AXIS_PIXELS, PlotRange, plot_range
+from ..scene.scenario import Scenario
 from .readouts import angle_between
 
 PLOTTED_S = 20.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.rotation import rotate, rotate_inverse
+from ..base.rotation import rotate, rotate_inverse
 
 
 @dataclass(frozen=True)

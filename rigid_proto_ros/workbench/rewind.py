@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ..command_codec import ScriptCommand
-from ..core.errors import InputError, MeshError
-from ..core.rotation import rotate_inverse
-from ..parameters import READ_ONLY, parameter_named
-from ..poke_script import expand_script
-from ..recorded_session import RecordedSession
-from ..scenario import scene_text
-from ..scene_file import read_scene_text
-from ..session_branch import Branch, branch_at
-from ..session_runs import decode_event
+from ..base.errors import InputError, MeshError
+from ..base.rotation import rotate_inverse
+from ..scene.command_codec import ScriptCommand
+from ..scene.parameters import READ_ONLY, parameter_named
+from ..scene.scenario import scene_text
+from ..scene.scene_file import read_scene_text
+from ..scene.script import expand_script
+from ..session.branch import Branch, branch_at
+from ..session.recorded_session import RecordedSession
+from ..session.runs import decode_event
 
 KEPT = frozenset(
     {
@@ -64,7 +64,7 @@ class Rewind:
 
 
 def core_row(row: np.ndarray) -> np.ndarray:
-    """A published state (13,) in the order of ``core.observer.STATE_FIELDS``: the angular velocity in body axes."""
+    """A published state (13,) in the order of ``simulation/observer.py``'s ``STATE_FIELDS``: the angular velocity in body axes."""
     values = row.tolist()
     return np.array([*values[:10], *rotate_inverse(*values[3:7], *values[10:13])])
 

@@ -25,12 +25,12 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from .. import cdr
-from ..core.errors import InputError
-from ..parameters import parameter_named
+from ..base.errors import InputError
+from ..messages import cdr
 from ..ros import qos
 from ..ros.parameter_server import ros_parameter
-from ..ros.taken_by_hand import TakenByHand
+from ..ros.polled_subscription import TakenByHand
+from ..scene.parameters import parameter_named
 
 _TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
 

@@ -10,19 +10,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..command_codec import MARKS, MESH_FRAME, ScriptCommand, entry_of, flow, frame_names, of_event
-from ..core.body import Body
-from ..core.commands import TieString, WrenchCommand
-from ..core.errors import InputError
-from ..core.frames import Frame
-from ..core.loads import Load
-from ..core.observer import Observer
-from ..core.string_control import mesh_point
-from ..parameters import PARAMETERS
-from ..recorded_session import RecordedSession
-from ..replay import Resimulation, mesh_finder, session_scenario
-from ..scenario import Scenario, nanoseconds, scene_text
-from ..session_runs import decode_event
+from ..base.errors import InputError
+from ..motion.body import Body
+from ..motion.frames import Frame
+from ..motion.loads import Load
+from ..scene.command_codec import (
+    MARKS,
+    MESH_FRAME,
+    ScriptCommand,
+    entry_of,
+    flow,
+    frame_names,
+    of_event,
+)
+from ..scene.parameters import PARAMETERS
+from ..scene.scenario import Scenario, nanoseconds, scene_text
+from ..session.recorded_session import RecordedSession
+from ..session.replay import Resimulation, mesh_finder, session_scenario
+from ..session.runs import decode_event
+from ..simulation.commands import TieString, WrenchCommand
+from ..simulation.observer import Observer
+from ..simulation.string_control import mesh_point
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
 """Parameters of a running node that a scene to keep or to send doesn't carry."""

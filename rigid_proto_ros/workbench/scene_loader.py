@@ -6,10 +6,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 
-from ..core.errors import InputError
-from ..parameters import READ_ONLY, parameter_named
-from ..scenario import Scenario, make_scenario
-from ..scene_file import read_scene_text
+from ..base.errors import InputError
+from ..scene.parameters import READ_ONLY, parameter_named
+from ..scene.scenario import Scenario, make_scenario
+from ..scene.scene_file import read_scene_text
 
 
 class SceneLoader:

@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..appearance import (
+from ..base.rotation import quaternion_from_matrix
+from ..mass.tensor import equimomental_shapes
+from ..motion.surface import Surface
+from ..rerun_view.appearance import (
     AXES_COLOURS,
     BODY_COLOUR,
     FORCE_COLOUR,
@@ -23,12 +26,9 @@ from ..appearance import (
     MOMENTUM_COLOUR,
     STRING_COLOUR,
 )
-from ..core.inertia_tensor import equimomental_shapes
-from ..core.rotation import quaternion_from_matrix
-from ..core.surface import Surface
-from ..plot_range import nice_step
+from ..rerun_view.plot_range import nice_step
 from ..rerun_view.surface_normals import shaded_surface
-from ..scenario import Scenario
+from ..scene.scenario import Scenario
 from .acting import Hit
 from .motion_arrows import MotionArrows
 from .poke_mark import UNWRITTEN, PokeMark

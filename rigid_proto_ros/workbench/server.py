@@ -15,7 +15,7 @@ import viser
 import websockets.asyncio.server
 from viser import _messages
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from .listening import check_address
 from .page_style import lay_out
 

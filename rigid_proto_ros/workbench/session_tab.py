@@ -8,10 +8,10 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..bundled import example_path
-from ..core.errors import InputError
-from ..lessons import Lesson, lessons
-from ..scene_file import read_scene_text
+from ..base.bundled import example_path
+from ..base.errors import InputError
+from ..scene.lessons import Lesson, lessons
+from ..scene.scene_file import read_scene_text
 from .link import decode, encode
 from .rewind import Rewind
 from .situation import Situation, situation_of

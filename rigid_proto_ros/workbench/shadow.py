@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.commands import Change, Command
-from ..core.setup import Setup
-from ..core.simulation import Simulation
-from ..core.state import State
-from ..ghost import Refusals
-from ..scenario import Scenario
+from ..motion.state import State
+from ..scene.ghost import Refusals
+from ..scene.scenario import Scenario
+from ..simulation.commands import Change, Command
+from ..simulation.setup import Setup
+from ..simulation.simulation import Simulation
 
 PORTION_NS = 1_000_000_000
 """[ns] That it is carried at most between two pictures: whoever draws waits for it."""

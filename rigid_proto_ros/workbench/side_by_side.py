@@ -9,10 +9,10 @@ from collections.abc import Awaitable, Callable
 import numpy as np
 import viser
 
-from ..appearance import BODY_COLOUR, GHOST_COLOUR, css
-from ..core.quantities import attitude_angle
-from ..core.state import State
-from ..scenario import Scenario
+from ..motion.state import State
+from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, css
+from ..scene.scenario import Scenario
+from ..simulation.quantities import attitude_angle
 from .tensors import TITLES
 
 SHOWN_S = 0.2

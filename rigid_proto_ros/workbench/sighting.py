@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.body import Body
-from ..core.rotation import matrix_from_quaternion
-from ..core.surface import Surface
+from ..base.rotation import matrix_from_quaternion
+from ..motion.body import Body
+from ..motion.surface import Surface
 
 KEPT_S = 1.0
 """Drawn poses are remembered for this long: a page further behind isn't usable."""

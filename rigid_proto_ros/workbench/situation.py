@@ -12,12 +12,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from .. import parameters
-from ..command_codec import ScriptCommand, outgoing
-from ..core.errors import InputError
-from ..core.frames import parse_frame
-from ..poke_script import parse_script, with_contacts
-from ..scene_file import read_scene_text
+from ..base.errors import InputError
+from ..motion.frames import parse_frame
+from ..scene import parameters
+from ..scene.command_codec import ScriptCommand, outgoing
+from ..scene.scene_file import read_scene_text
+from ..scene.script import parse_script, with_contacts
 from .rewind import changes_to
 from .ros_link import RosLink
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.rotation import matrix_from_quaternion
-from ..core.surface import Surface
+from ..base.rotation import matrix_from_quaternion
+from ..motion.surface import Surface
 
 POINTS = 4000
 """Of the surface: enough to fill the cells that a body covers."""

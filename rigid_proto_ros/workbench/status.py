@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from ..troubles import grown, serious_troubles
+from ..ros.troubles import grown, serious_troubles
 
 SILENT_S = 2.5
 """[s] Without a state or a report: a node that lives sends a report every second."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..appearance import GREY
+from ..rerun_view.appearance import GREY
 from .motion_arrows import length_text
 from .poke_mark import UNWRITTEN
 

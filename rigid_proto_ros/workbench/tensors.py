@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.inertia_tensor import check_tensor, principal_axes, tensor_from_six
-from ..core.mass_properties import MassProperties, explicit_mass_properties
-from ..core.model_difference import model_difference
-from ..scenario import Scenario
+from ..base.errors import InputError
+from ..mass.model_difference import model_difference
+from ..mass.properties import MassProperties, explicit_mass_properties
+from ..mass.tensor import check_tensor, principal_axes, tensor_from_six
+from ..scene.scenario import Scenario
 
 ROUNDING = 1e-11
 """Relative: what is smaller comes from the arithmetic."""

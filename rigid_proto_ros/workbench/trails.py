@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..appearance import POINT_TRAIL_COLOUR, TRAIL_COLOUR
-from ..core.body import Body
-from ..core.rotation import matrix_from_quaternion
-from ..core.surface import Surface
+from ..base.rotation import matrix_from_quaternion
+from ..motion.body import Body
+from ..motion.surface import Surface
+from ..rerun_view.appearance import POINT_TRAIL_COLOUR, TRAIL_COLOUR
 
 LASTS_S = 4.0
 """[s, simulated] Length of a path."""

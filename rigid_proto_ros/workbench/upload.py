@@ -20,11 +20,11 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
-from ..core.errors import MeshError
-from ..mesh_body import mesh_body
-from ..mesh_cache import PASSING
-from ..mesh_inspection import Inspection, as_json, inspect_mesh
-from ..mesh_io import BYTES_PER_TRIANGLE, MAX_TRIANGLES, OWN_FORMATS, load_mesh
+from ..base.errors import MeshError
+from ..mass.from_mesh import mesh_body
+from ..mass.inspection import Inspection, as_json, inspect_mesh
+from ..mesh.cache import PASSING
+from ..mesh.reading import BYTES_PER_TRIANGLE, MAX_TRIANGLES, OWN_FORMATS, load_mesh
 
 MAX_BYTES = 256_000_000
 """Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""

@@ -10,9 +10,17 @@ from typing import TYPE_CHECKING
 import viser
 from viser import _messages
 
-from ..core.errors import InputError
+from ..base.errors import InputError
 from .situation import Situation
-from .upload import ACCEPTED, MAX_BYTES, UNITS, UPRIGHT, Upload, Uploads, shown_name
+from .upload import (
+    ACCEPTED,
+    MAX_BYTES,
+    UNITS,
+    UPRIGHT,
+    Upload,
+    Uploads,
+    shown_name,
+)
 
 if TYPE_CHECKING:
     from .page import Page

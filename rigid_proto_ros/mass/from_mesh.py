@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""From a mesh to its moments: the verdict first, then repair or a stand-in where they are asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..mesh import cache as mesh_cache
+from ..mesh.hull import box_surface, convex_hull
+from ..mesh.reading import Mesh, load_mesh
+from .moments import Moments, referenced_vertices
+from .properties import MeshMoments
+from .repair import repair_surface
+from .verdict import WARNING, Finding, Verdict, judge_surface
+
+FALLBACKS = ("", "hull", "box")
+"""What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""
+
+
+@dataclass(frozen=True)
+class MeshBody:
+    """A mesh, the verdict on it, and its moments; ``vertices`` and ``triangles`` are those the moments were taken of
+    (repaired ones when repair was asked for and needed)."""
+
+    mesh: Mesh
+    verdict: Verdict
+    moments: MeshMoments
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Vertices (n, 3) in mesh coordinates; repair appends to the file's, never renumbers them."""
+        return self.moments.vertices
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Triangles (m, 3), turned outward when the file winds them inward throughout."""
+        triangles = self.moments.triangles
+        return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles
+
+
+def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> MeshBody:
+    """The moments of a mesh (or of the one that a path, URI or bundled name stands for) with its verdict.
+
+    A surface that bounds no solid is not refused here: asking its moments for the solid, or for a mass from a density,
+    raises MeshError with the reason and the flags that help. ``repair`` welds, drops duplicates, orients (cavities stay
+    cavities) and caps holes first; ``fallback`` "hull" or "box" lets that shape stand in for what is still open.
+    """
+    if fallback not in FALLBACKS:
+        raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
+    if isinstance(mesh, str):
+        mesh = load_mesh(mesh)
+    verdict, known = _judged(mesh)
+    vertices, triangles, polygon_starts = mesh.vertices, mesh.triangles, mesh.polygon_starts
+    if repair and verdict.usable and _wants_repair(verdict):
+        triangles, polygon_starts, done = repair_surface(vertices, triangles, polygon_starts)
+        known, remember = {}, None
+        if done:
+            verdict, _ = judge_surface(vertices, triangles, polygon_starts)
+            verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
+    else:
+
+        def remember(moments: dict[str, Moments]) -> None:
+            _keep(mesh, verdict, moments)
+
+    stand_in = None
+    if fallback and verdict.usable and not verdict.closed:
+        stand_in = _stand_in(vertices, triangles, fallback)
+        shape = "convex hull" if fallback == "hull" else "bounding box"
+        message = f"fallback: the mass properties are those of its {shape}"
+        verdict.findings.append(Finding("fallback", WARNING, message))
+    moments = MeshMoments(
+        vertices,
+        triangles,
+        polygon_starts,
+        closed=verdict.closed,
+        closed_reason=verdict.reason,
+        name=mesh.name,
+        stand_in=stand_in,
+        remedy=("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)",
+        known=known,
+        remember=remember,
+    )
+    return MeshBody(mesh, verdict, moments)
+
+
+def _wants_repair(verdict: Verdict) -> bool:
+    return not verdict.closed or any(finding.code == "nested_components" for finding in verdict.findings)
+
+
+def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tuple[np.ndarray, np.ndarray]:
+    points = referenced_vertices(vertices, triangles)
+    if fallback == "hull":
+        return points, convex_hull(points)
+    return box_surface(points.min(axis=0), points.max(axis=0))
+
+
+def _key(mesh: Mesh) -> str:
+    return f"{mesh.sha256}-{mesh.path.rpartition('.')[2].lower()}-body"
+
+
+def _judged(mesh: Mesh) -> tuple[Verdict, dict[str, Moments]]:
+    """The verdict on the mesh and what is known of its moments, from the cache or anew."""
+    kept = mesh_cache.load_json(_key(mesh))
+    if kept is not None:
+        try:
+            findings = [Finding(**finding) for finding in kept["verdict"].pop("findings")]
+            moments = {name: Moments.from_dict(value) for name, value in kept["moments"].items()}
+            return Verdict(findings=findings, **kept["verdict"]), moments
+        except (KeyError, TypeError, ValueError, AttributeError):
+            pass
+    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    _keep(mesh, verdict, {})
+    return verdict, {}
+
+
+def _keep(mesh: Mesh, verdict: Verdict, moments: dict[str, Moments]) -> None:
+    if mesh_cache.is_passing(mesh.path):
+        return
+    known = {name: value.as_dict() for name, value in moments.items()}
+    mesh_cache.store_json(_key(mesh), {"verdict": dataclasses.asdict(verdict), "moments": known})

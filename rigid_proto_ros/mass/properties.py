@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""Mass, centre of mass and inertia of a mesh under each model; every change but the mesh itself is closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.compilation import njit
+from ..base.errors import InputError, MeshError, TensorError
+from .moments import Moments, box_moments, point_moments, solid_moments
+from .moments_shell import shell_moments
+from .tensor import (
+    MAX_MOMENT_RATIO,
+    TRIANGLE_SLACK_COMPUTED,
+    check_tensor,
+    principal_axes_kernel,
+    tensor_from_six,
+)
+
+INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
+"""How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
+box's cuboid, or given numbers."""
+MODEL_COMS = ("model", "solid")
+"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can be compared alone."""
+SCALE_LIMITS = (1e-9, 1e9)
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """mass [kg], center_of_mass (3,) [m, mesh axes, after scale], inertia (3, 3) [kg m², about the COM, mesh axes].
+
+    warnings: what the tensor check had to say. center_from_reference (3,) is center_of_mass minus ``reference`` (3,),
+    a point near the bounding box's centre; far from the origin it keeps the digits that center_of_mass can't hold.
+    """
+
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+    warnings: tuple[str, ...] = ()
+    reference: np.ndarray | None = None
+    center_from_reference: np.ndarray | None = None
+
+
+def scale_vector(scale) -> np.ndarray:
+    """One or three numbers as (3,); raises InputError unless each is nonzero with 1e-9 ≤ |s| ≤ 1e9."""
+    try:
+        s = [float(value) for value in np.ravel(scale).tolist()]
+    except (TypeError, ValueError):
+        s = []
+    if len(s) == 1:
+        s = s * 3
+    if len(s) != 3 or not all(SCALE_LIMITS[0] <= abs(value) <= SCALE_LIMITS[1] for value in s):
+        received = scale.tolist() if isinstance(scale, np.ndarray) else scale
+        raise InputError("scale", received, "one or three numbers, each with 1e-9 <= |s| <= 1e9")
+    return np.array(s)
+
+
+def _checked_ballast(ballast: Iterable) -> np.ndarray:
+    """Entries with a mass, (k, 4): m, x, y, z."""
+    checked = []
+    for entry in ballast:
+        try:
+            row = [float(value) for value in entry]
+        except (TypeError, ValueError):
+            row = []
+        if len(row) != 4 or row[0] < 0.0 or not all(map(math.isfinite, row)):
+            raise InputError("ballast", entry, "mass >= 0 [kg] and x, y, z, all finite")
+        if row[0] > 0.0:
+            checked.append(row)
+    return np.array(checked) if checked else _NO_BALLAST
+
+
+_NO_BALLAST = np.empty((0, 4))
+
+
+@njit(cache=True, nogil=True)
+def loaded(mass, center, second, stretch, reference, points):
+    """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
+
+    mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
+    mesh coordinates, ``stretch`` and ``reference`` (3,) in mesh coordinates bring them there. Each point mass adds by
+    the parallel-axis theorem, so that nothing cancels.
+    """
+    total = mass
+    moved = mass * center
+    offset = np.empty(3)
+    for p in range(points.shape[0]):
+        total += points[p, 0]
+        for k in range(3):
+            moved[k] += points[p, 0] * stretch[k] * (points[p, 1 + k] - reference[k])
+    if points.shape[0]:
+        moved /= total
+    else:
+        moved[:] = center
+    gathered = second.copy()
+    for p in range(-1, points.shape[0]):
+        if points.shape[0] == 0:
+            break
+        m = mass if p < 0 else points[p, 0]
+        for k in range(3):
+            place = center[k] if p < 0 else stretch[k] * (points[p, 1 + k] - reference[k])
+            offset[k] = place - moved[k]
+        for i in range(3):
+            for j in range(3):
+                gathered[i, j] += m * (offset[i] * offset[j])  # symmetric to the bit
+    inertia = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            inertia[i, j] = 0.0 - gathered[i, j]  # no -0
+        inertia[i, i] = gathered[(i + 1) % 3, (i + 1) % 3] + gathered[(i + 2) % 3, (i + 2) % 3]
+    return total, moved, inertia, principal_axes_kernel(inertia)[0]
+
+
+@njit(cache=True, nogil=True)
+def stretched(left, center, center_low, reference, second, per_measure):
+    """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
+    a unit of measure."""
+    place = np.empty(3)
+    base = np.empty(3)
+    com = np.empty(3)
+    matrix = np.empty((3, 3))
+    slot = 0
+    for i in range(3):
+        base[i] = left[i] * reference[i] + 0.0  # no -0
+        place[i] = left[i] * center[i]
+        com[i] = base[i] + (place[i] + left[i] * center_low[i])
+        for j in range(i, 3):
+            matrix[i, j] = matrix[j, i] = second[slot] * (left[i] * left[j]) * per_measure
+            slot += 1
+    return place, base, com, matrix
+
+
+class MeshMoments:
+    """A mesh's moments at unit density, each model's computed when first asked for and never again.
+
+    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``closed``
+    False says that the surface bounds no solid: the solid model, and a density, are then refused with
+    ``closed_reason`` and ``remedy``, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is
+    then taken instead. A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed earlier, by
+    model; ``remember`` is called with all of them whenever another one has been computed.
+    """
+
+    def __init__(
+        self,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        polygon_starts: np.ndarray | None = None,
+        *,
+        closed: bool = True,
+        closed_reason: str = "the surface is open",
+        remedy: str = "--repair (mesh_repair), --fallback hull|box (mesh_fallback)",
+        name: str = "mesh",
+        stand_in: tuple[np.ndarray, np.ndarray] | None = None,
+        known: dict[str, Moments] | None = None,
+        remember: Callable[[dict[str, Moments]], None] | None = None,
+    ) -> None:
+        self.vertices = vertices
+        self.triangles = triangles
+        self.polygon_starts = polygon_starts
+        self.closed = closed
+        self.closed_reason = closed_reason
+        self.remedy = remedy
+        self.name = name
+        self.stand_in = stand_in
+        self._remember = remember
+        self._moments: dict[str | tuple, Moments] = dict((known or {}).items())
+
+    @property
+    def turned(self) -> bool:
+        """The file's surface is wound inward throughout; results are those of the outward one."""
+        return self.solid_raw().measure < 0.0
+
+    def solid_raw(self) -> Moments:
+        """The solid's signed moments as the file winds it; raises MeshError when the surface isn't closed."""
+        if self.stand_in is not None:
+            return self._get(("stand-in",), lambda: solid_moments(*self.stand_in))
+        if not self.closed:
+            raise MeshError(self.name, f"{self.closed_reason}; use {self.remedy}, or another model with --mass (mass)")
+        return self._get("solid", lambda: solid_moments(self.vertices, self.triangles))
+
+    def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:
+        if key not in self._moments:
+            self._moments[key] = compute()
+            if self._remember is not None and isinstance(key, str):
+                self._remember({name: known for name, known in self._moments.items() if isinstance(name, str)})
+        return self._moments[key]
+
+    def moments(self, model: str, scale=(1.0, 1.0, 1.0)) -> Moments:
+        """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for the shell alone.
+
+        A shell's area elements stretch by direction, so a non-uniform scale takes a new pass over the surface; it is
+        kept per ratio of the components. Its moments are then those of the shape stretched by scale/|scale_x|.
+        """
+        if model == "solid":
+            raw = self.solid_raw()
+            sign = math.copysign(1.0, raw.measure)
+            return Moments(sign * raw.measure, raw.reference, raw.center, raw.center_low, sign * raw.second, raw.path)
+        if model == "points":
+            return self._get("points", lambda: point_moments(self.vertices, self.triangles))
+        if model == "bounding_box":
+            return self._get("bounding_box", lambda: box_moments(self.vertices, self.triangles))
+        if model == "shell":
+            stretch = np.abs(scale_vector(scale))
+            stretch = stretch / stretch[0]
+            key = "shell" if np.all(stretch == 1.0) else ("shell", *stretch.tolist())
+            return self._get(key, lambda: shell_moments(self.vertices * stretch, self.triangles, self.polygon_starts))
+        raise InputError("inertia_model", model, ", ".join(INERTIA_MODELS))
+
+    def body_mass(self, *, scale=(1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:
+        """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models."""
+        if not (0.0 <= mass < math.inf):
+            raise InputError("mass", mass, "a finite number >= 0 (0: density decides) [kg]")
+        if mass > 0.0:
+            return float(mass)
+        if not (0.0 < density < math.inf):
+            raise InputError("density", density, "a finite number > 0 [kg/m^3]")
+        body = float(density) * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
+        if not (1e-300 < body < math.inf):
+            raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
+        return body
+
+    def mass_properties(
+        self,
+        model: str = "solid",
+        *,
+        scale=(1.0, 1.0, 1.0),
+        mass: float = 0.0,
+        density: float = 1000.0,
+        ballast: Iterable = (),
+        com: str = "model",
+    ) -> MassProperties:
+        """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form on its ten numbers.
+
+        com: one of MODEL_COMS; "solid" carries the model's tensor, as it is about its own centre, to the solid's. scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries
+        (m [kg], x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's.
+        Raises InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
+        """
+        if model not in INERTIA_MODELS or model == "explicit":
+            raise InputError("inertia_model", model, ", ".join(m for m in INERTIA_MODELS if m != "explicit"))
+        if com not in MODEL_COMS:
+            raise InputError("inertia_model_com", com, ", ".join(MODEL_COMS))
+        s = scale_vector(scale)
+        points = _checked_ballast(ballast)
+        moments = self.moments(model, s)
+        own = self.body_mass(scale=s, mass=mass, density=density)
+        # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
+        left = np.copysign(abs(s[0]), s) if model == "shell" else s
+        place, low, base = moments.center, moments.center_low, moments.reference
+        if com == "solid":
+            solid = self.moments("solid")
+            place, low, base = ((s / left) * of for of in (solid.center, solid.center_low, solid.reference))
+        center, reference, center_of_mass, second = stretched(
+            left, place, low, base, moments.second, own / moments.measure
+        )
+        unscaled = base * (left / s) if model == "shell" else base
+        total, center, inertia, principal = loaded(own, center, second, s, unscaled, points)
+        if len(points):
+            center_of_mass = reference + center
+        warnings = ()
+        if not _plainly_good(principal):
+            try:
+                warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
+            except TensorError as error:
+                raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
+        return MassProperties(total, center_of_mass, inertia, warnings, reference, center)
+
+
+def _plainly_good(moments: np.ndarray) -> bool:
+    """Principal moments (3,) about which ``check_tensor`` would say nothing."""
+    a, b, c = moments.tolist()
+    return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
+
+
+def explicit_mass_properties(
+    mass: float, center_of_mass, tensor6, ballast: Iterable = (), scale=(1.0, 1.0, 1.0)
+) -> MassProperties:
+    """Given numbers as they are: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz, iyy, iyz,
+    izz) [kg m², about the COM]. ``scale`` moves the COM and the ballast with the picture; mass and tensor are final.
+    """
+    s = scale_vector(scale)
+    if not (0.0 < float(mass) < math.inf):
+        raise TensorError("explicit_inertia.mass", mass, "a finite number > 0 [kg]")
+    center = np.asarray(center_of_mass, dtype=np.float64)
+    if center.shape != (3,) or not np.all(np.isfinite(center)):
+        raise TensorError("explicit_inertia.center_of_mass", center.tolist(), "three finite numbers [mesh coordinates]")
+    if len(tuple(tensor6)) != 6:
+        raise TensorError("explicit_inertia.tensor", list(tensor6), "six numbers: ixx ixy ixz iyy iyz izz [kg m^2]")
+    inertia = tensor_from_six(tensor6)
+    warnings = check_tensor(inertia, source="explicit_inertia.tensor")
+    points = _checked_ballast(ballast)
+    if not len(points):
+        return MassProperties(float(mass), s * center, inertia, warnings, s * center, np.zeros(3))
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    total, moved, inertia, _ = loaded(float(mass), np.zeros(3), second, s, center, points)
+    warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
+    return MassProperties(total, s * center + moved, inertia, warnings, s * center, moved)

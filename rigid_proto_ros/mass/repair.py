@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""Repair of a surface: drop copies, weld rims, orient (cavities stay cavities), cap holes. Each step says what it did.
+
+The file's vertices keep their numbers; nothing is moved but rim vertices that are welded onto a neighbour by using its
+number instead of theirs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.compilation import njit
+from ..mesh.nesting import component_nesting
+from ..mesh.topology import Topology, component_volumes, mesh_topology
+from .verdict import MAX_NESTED_COMPONENTS
+
+WELD = 1e-5
+"""Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""
+
+
+class Surface:
+    """Triangles (m, 3) over vertices (n, 3) with polygon_starts (p + 1,) or None, changed step by step."""
+
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None) -> None:
+        self.vertices = vertices
+        self.triangles = triangles.copy()
+        self.polygon_starts = polygon_starts
+
+    def drop(self, triangles: np.ndarray) -> None:
+        """Remove the triangles marked True in ``triangles`` (m,)."""
+        if self.polygon_starts is not None:
+            kept = np.concatenate([[0], np.cumsum(~triangles)])
+            self.polygon_starts = kept[self.polygon_starts]
+        self.triangles = self.triangles[~triangles]
+
+    def turn(self, triangles: np.ndarray) -> None:
+        """Reverse the triangles marked True in ``triangles`` (m,); a polygon's fan is reversed as a whole."""
+        self.triangles[triangles] = self.triangles[triangles][:, [0, 2, 1]]
+        if self.polygon_starts is None:
+            return
+        starts = self.polygon_starts
+        for polygon in np.nonzero(np.diff(starts) > 1)[0]:
+            part = slice(starts[polygon], starts[polygon + 1])
+            if triangles[part].all():
+                self.triangles[part] = self.triangles[part][::-1].copy()
+
+    def add_polygon(self, ring: list[int]) -> None:
+        """Append a polygon, fanned from its first corner."""
+        fan = np.array([[ring[0], ring[k], ring[k + 1]] for k in range(1, len(ring) - 1)], np.int64)
+        if self.polygon_starts is None:
+            self.polygon_starts = np.arange(len(self.triangles) + 1)
+        self.triangles = np.concatenate([self.triangles, fan])
+        self.polygon_starts = np.append(self.polygon_starts, len(self.triangles))
+
+    def topology(self) -> Topology:
+        """The topology as it is now."""
+        return mesh_topology(self.vertices, self.triangles)
+
+
+def repair_surface(
+    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
+    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was."""
+    surface = Surface(vertices, triangles, polygon_starts)
+    done = [
+        *_drop_copies(surface),
+        *_weld_rims(surface),
+        *_orient(surface),
+        *_cap_holes(surface),
+        *_turn_outward(surface),
+    ]
+    return surface.triangles, surface.polygon_starts, tuple(done)
+
+
+def _drop_copies(surface: Surface) -> list[str]:
+    topology = surface.topology()
+    done = []
+    if topology.duplicates.any():
+        done.append(f"removed {int(np.count_nonzero(topology.duplicates))} duplicate faces")
+        surface.drop(topology.duplicates)
+        topology = surface.topology()
+    if 2 * topology.opposites == len(surface.triangles):
+        # Every face lies there both ways round: a surface made visible from both sides.
+        ordered = np.sort(topology.corners, axis=1)
+        _, first = np.unique(ordered, axis=0, return_index=True)
+        back = np.ones(len(surface.triangles), dtype=bool)
+        back[first] = False
+        surface.drop(back)
+        done.append(f"removed {int(np.count_nonzero(back))} faces wound opposite to another")
+    return done
+
+
+@njit(cache=True, nogil=True)
+def _near_pairs(points, order, tolerance, target):
+    """For points (k, 3), visited by ascending x, the first point within ``tolerance`` as target (k,)."""
+    for i in range(order.shape[0]):
+        a = order[i]
+        if target[a] != a:
+            continue
+        for j in range(i + 1, order.shape[0]):
+            b = order[j]
+            if points[b, 0] - points[a, 0] > tolerance:
+                break
+            if target[b] == b:
+                dx, dy, dz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+                if dx * dx + dy * dy + dz * dz <= tolerance * tolerance:
+                    target[b] = a
+
+
+def _weld_rims(surface: Surface) -> list[str]:
+    topology = surface.topology()
+    rim = np.unique(topology.boundary[:, :2])
+    if not len(rim):
+        return []
+    points = surface.vertices[rim]
+    used = surface.vertices[surface.triangles.ravel()]
+    tolerance = WELD * float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+    target = np.arange(len(rim))
+    _near_pairs(points, np.argsort(points[:, 0], kind="stable"), tolerance, target)
+    moved = int(np.count_nonzero(target != np.arange(len(rim))))
+    if not moved:
+        return []
+    far = float(np.max(np.linalg.norm(points - points[target], axis=1)))
+    number = np.arange(len(surface.vertices))
+    number[rim] = rim[target]
+    surface.triangles = number[topology.corners]
+    flat = surface.triangles
+    surface.drop((flat[:, 0] == flat[:, 1]) | (flat[:, 1] == flat[:, 2]) | (flat[:, 2] == flat[:, 0]))
+    return [f"welded {moved} rim vertices, the farthest by {far:.2g}"]
+
+
+@njit(cache=True, nogil=True)
+def _parities(edges, count):
+    """Whether to turn each triangle (m,) so that neighbours agree, its patch (m,), and the number of contradictions.
+
+    A union-find whose links carry a parity; edges (e, 6) as in Topology, those of two triangles alone.
+    """
+    parent = np.arange(count)
+    parity = np.zeros(count, np.bool_)
+    contradictions = 0
+    for e in range(edges.shape[0]):
+        if edges[e, 2] + edges[e, 3] != 2 or edges[e, 4] == edges[e, 5]:
+            continue
+        turn = edges[e, 2] != 1
+        root = np.empty(2, np.int64)
+        side = np.zeros(2, np.bool_)
+        for k in range(2):
+            i = edges[e, 4 + k]
+            while parent[i] != i:
+                side[k] ^= parity[i]
+                up = parent[i]
+                if parent[up] != up:  # halve the path
+                    parity[i] ^= parity[up]
+                    parent[i] = parent[up]
+                    side[k] ^= parity[up]
+                    i = parent[i]
+                else:
+                    i = up
+            root[k] = i
+        if root[0] == root[1]:
+            contradictions += side[0] ^ side[1] ^ turn
+        else:
+            parent[root[1]] = root[0]
+            parity[root[1]] = side[0] ^ side[1] ^ turn
+    for i in range(count):
+        flip = False
+        j = i
+        while parent[j] != j:
+            flip ^= parity[j]
+            j = parent[j]
+        # Roots keep their place and their parity False, so rewriting i alone leaves the others' paths valid.
+        parent[i] = j
+        parity[i] = flip
+    return parity, parent, contradictions
+
+
+def _orient(surface: Surface) -> list[str]:
+    topology = surface.topology()
+    if topology.flipped == 0:
+        return []
+    turn, patch, contradictions = _parities(topology.edges, len(surface.triangles))
+    if contradictions:
+        return [f"could not orient it: {contradictions} edges contradict, as on a Moebius strip"]
+    turned = np.bincount(patch, weights=turn, minlength=len(turn))
+    size = np.bincount(patch, minlength=len(turn))
+    turn ^= (turned > 0.5 * size)[patch]  # keep the way that most of a patch has
+    surface.turn(turn)
+    return [f"turned {int(np.count_nonzero(turn))} faces to agree with their neighbours"]
+
+
+def _cap_holes(surface: Surface) -> list[str]:
+    """Close each rim with one polygon; rims that meet in a vertex are walked one after the other."""
+    topology = surface.topology()
+    rim = topology.boundary
+    if not len(rim):
+        return []
+    forward = rim[:, 2] == 1
+    # The cap runs against its neighbour's direction.
+    tails = np.where(forward, rim[:, 1], rim[:, 0]).tolist()
+    heads = np.where(forward, rim[:, 0], rim[:, 1]).tolist()
+    leaving: dict[int, list[int]] = {}
+    for tail, head in zip(tails, heads, strict=True):
+        leaving.setdefault(tail, []).append(head)
+    caps = 0
+    for start in tails:
+        while leaving.get(start):
+            ring, vertex = [], start
+            while leaving.get(vertex):
+                ring.append(vertex)
+                vertex = leaving[vertex].pop()
+                if vertex in ring and vertex != start:  # a loop hangs on the path: cap it by itself
+                    at = ring.index(vertex)
+                    if len(ring) - at >= 3:
+                        surface.add_polygon(ring[at:])
+                        caps += 1
+                    ring = ring[:at]
+                if vertex == start:
+                    break
+            if vertex == start and len(ring) >= 3:
+                surface.add_polygon(ring)
+                caps += 1
+    edges = "edge" if len(rim) == 1 else "edges"
+    return [f"capped {caps} holes with {len(rim)} {edges}"] if caps else []
+
+
+def _turn_outward(surface: Surface) -> list[str]:
+    """Outermost components outward, those inside one of them inward, and so on by parity."""
+    topology = surface.topology()
+    if topology.unbalanced or topology.components > MAX_NESTED_COMPONENTS:
+        return []
+    volume, _, lower, upper = component_volumes(
+        surface.vertices, surface.triangles, topology.component, topology.components
+    )
+    wrong = volume < 0.0
+    if topology.components > 1:
+        nesting = component_nesting(surface.vertices, surface.triangles, topology.component, lower, upper)
+        # A component of which it is unknown where it lies stays as it is.
+        wrong = (np.sign(volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.decided
+    if not wrong.any():
+        return []
+    surface.turn(wrong[topology.component])
+    return [f"turned {int(np.count_nonzero(wrong))} of {topology.components} components"]

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""What was once read or computed of a file's bytes, kept in the user's cache folder under their hash.
+
+Entries carry the hash of the code that made them, so that a newer version never serves an older one's numbers. A cache
+that can't be written or read is no error: the work is then done again. ``RIGID_PROTO_CACHE=off`` turns it off.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+SIZE_LIMIT = 4_000_000_000
+"""Bytes that the folder may hold; the entries longest unused go first."""
+
+PASSING = "rigid_proto_upload_"
+"""Folders named so hold files that are gone tomorrow: nothing of them is kept."""
+
+
+def is_passing(path: str | Path) -> bool:
+    """Whether a file lies in such a folder, or in one of its own."""
+    return any(folder.name.startswith(PASSING) for folder in Path(path).parents)
+
+
+def folder() -> Path | None:
+    """The cache folder, or None when it is turned off or there is no home."""
+    if os.environ.get("RIGID_PROTO_CACHE", "").lower() in ("off", "0", "no"):
+        return None
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    try:
+        return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "rigid_proto_ros" / "meshes"
+    except RuntimeError:
+        return None
+
+
+@functools.cache
+def code_tag() -> str:
+    """Hash of the modules whose results are kept."""
+    package = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    sources = [
+        *(package / "mesh").glob("*.py"),
+        *(package / "mass").glob("moments*.py"),
+        *(package / "mass" / name for name in ("from_mesh.py", "verdict.py", "repair.py")),
+        package / "base" / "exact_arithmetic.py",
+    ]
+    for path in sorted(sources):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _path(key: str, kind: str) -> Path | None:
+    base = folder()
+    return base / f"{key}-{code_tag()}.{kind}" if base else None
+
+
+def _write(path: Path, save) -> None:
+    """Write to a file beside ``path`` and move it there, so that a reader never sees half an entry."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".new-")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                save(stream)
+            os.replace(name, path)
+        except BaseException:
+            os.unlink(name)
+            raise
+        _prune(path.parent)
+    except OSError:
+        pass
+
+
+def _prune(base: Path) -> None:
+    entries = sorted(((p.stat().st_mtime, p.stat().st_size, p) for p in base.iterdir()), reverse=True)
+    total = 0
+    for _, size, path in entries:
+        total += size
+        if total > SIZE_LIMIT:
+            path.unlink(missing_ok=True)
+
+
+def load_arrays(key: str) -> dict[str, np.ndarray] | None:
+    """The arrays kept under ``key``, or None."""
+    path = _path(key, "npz")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        os.utime(path)
+        return arrays
+    except (OSError, ValueError, TypeError, EOFError, KeyError, zipfile.BadZipFile):
+        return None
+
+
+def store_arrays(key: str, **arrays: np.ndarray) -> None:
+    """Keep arrays under ``key``."""
+    path = _path(key, "npz")
+    if path:
+        _write(path, lambda stream: np.savez(stream, **arrays))
+
+
+def load_json(key: str) -> dict | None:
+    """The JSON object kept under ``key``, or None."""
+    path = _path(key, "json")
+    try:
+        value = json.loads(path.read_bytes())
+        return value if isinstance(value, dict) else None
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
+def store_json(key: str, value: dict) -> None:
+    """Keep a JSON object under ``key``; floats keep all their digits."""
+    path = _path(key, "json")
+    if path:
+        _write(path, lambda stream: stream.write(json.dumps(value).encode()))

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: MIT
+"""Which closed components lie inside which others, and which cross.
+
+A point lies inside a closed component when a ray from it leaves the component more often than it enters it. The ray's hits are
+found with the watertight test of Woop, Benthin and Wald (Journal of Computer Graphics Techniques 2, 2013); one that comes too
+near an edge to be sure is shot again in another direction, and a point on the other surface decides nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.compilation import njit
+from .tree import LEAF, triangle_tree
+
+WORK_LIMIT = 100_000_000
+"""Boxes and triangles visited after which nesting or crossing is left undecided and said to be so: about a second of work."""
+SAMPLES = 24
+"""Points of a component, inside evenly picked triangles, of which it is asked whether they lie inside another one."""
+NEAR = 1e-9
+"""Part of a triangle's size, or of the mesh's, within which a hit on an edge, or on the surface itself, isn't trusted."""
+
+# Directions that no mesh is aligned with; the first alone is used unless a ray meets an edge.
+_DIRECTIONS = np.array([(0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316)])
+# Barycentric coordinates of the sample in its triangle: not on any of its symmetry lines.
+_SAMPLE = (0.4479, 0.3413, 0.2108)
+_UNKNOWN, _OUTSIDE, _INSIDE = 0, 1, 2
+
+
+@njit(cache=True, nogil=True)
+def _may_hit(box, origin, inverse):
+    """Whether the ray from ``origin`` meets the box; inverse (3,): 1/direction."""
+    near, far = 0.0, math.inf
+    for k in range(3):
+        a, b = (box[k] - origin[k]) * inverse[k], (box[3 + k] - origin[k]) * inverse[k]
+        near, far = max(near, min(a, b)), min(far, max(a, b))
+    # A little wider than the box: its own roundings must not lose a hit.
+    return near <= far * (1.0 + 1e-14) + 1e-300
+
+
+@njit(cache=True, nogil=True)
+def _hit(vertices, triangle, origin, direction, kx, ky, kz, reach):
+    """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: not near an edge or
+    within ``reach`` of the origin.
+    """
+    sx, sy = direction[kx] / direction[kz], direction[ky] / direction[kz]
+    a, b, c = vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]
+    az, bz, cz = a[kz] - origin[kz], b[kz] - origin[kz], c[kz] - origin[kz]
+    ax, ay = a[kx] - origin[kx] - sx * az, a[ky] - origin[ky] - sy * az
+    bx, by = b[kx] - origin[kx] - sx * bz, b[ky] - origin[ky] - sy * bz
+    cx, cy = c[kx] - origin[kx] - sx * cz, c[ky] - origin[ky] - sy * cz
+    u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
+    edges = max(abs(bx - ax), abs(cx - ax), abs(cx - bx)) * max(abs(by - ay), abs(cy - ay), abs(cy - by))
+    corners = max(abs(ax), abs(bx), abs(cx)) * max(abs(ay), abs(by), abs(cy))
+    margin = NEAR * edges + 1e-15 * corners
+    if (u < -margin or v < -margin or w < -margin) and (u > margin or v > margin or w > margin):
+        return 0, True
+    total = u + v + w
+    if abs(u) <= margin or abs(v) <= margin or abs(w) <= margin:
+        return 0, False
+    distance = (u * az + v * bz + w * cz) / total / direction[kz]
+    if abs(distance) <= reach:
+        return 0, False
+    if distance < 0.0:
+        return 0, True
+    # The projected triangle runs one way round seen from behind, the other way seen from in front.
+    front = total * direction[kz] > 0.0
+    return (-1 if front else 1), True
+
+
+@njit(cache=True, nogil=True)
+def _shoot(vertices, triangles, component, order, boxes, own, origin, direction, reach, winding, sure, limit):
+    """Add the signed hits of all components but ``own`` to winding (k,), marking those not sure; returns the visits."""
+    kz = 0
+    for k in range(1, 3):
+        if abs(direction[k]) > abs(direction[kz]):
+            kz = k
+    kx, ky = (kz + 1) % 3, (kz + 2) % 3
+    inverse = 1.0 / direction
+    leaves = (len(boxes) + 1) // 2
+    stack = np.empty(64, np.int64)
+    stack[0], top, visits = 0, 1, 0
+    while top > 0 and visits < limit:
+        top -= 1
+        node = stack[top]
+        visits += 1
+        if not _may_hit(boxes[node], origin, inverse):
+            continue
+        if node < leaves - 1:
+            stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
+            top += 2
+            continue
+        first = (node - leaves + 1) * LEAF
+        for i in range(first, min(first + LEAF, len(order))):
+            other = component[order[i]]
+            if other != own:
+                sign, certain = _hit(vertices, triangles[order[i]], origin, direction, kx, ky, kz, reach)
+                winding[other] += sign
+                if not certain:
+                    sure[other] = False
+    return visits
+
+
+@njit(cache=True, nogil=True)
+def _sides(vertices, triangles, component, order, boxes, samples, owners, near, reach, limit):
+    """For samples (s,), triangle numbers of components ``owners`` (s,): how many of each component's samples are outside
+    and inside each other one, (k, k) each, and the components left undecided (k,) when ``limit`` visits didn't suffice.
+
+    near (k, k): pairs whose boxes overlap.
+    """
+    count = near.shape[0]
+    outside, inside = np.zeros((count, count), np.int32), np.zeros((count, count), np.int32)
+    undecided = np.zeros(count, np.bool_)
+    winding, sure, answer = np.zeros(count, np.int64), np.ones(count, np.bool_), np.zeros(count, np.int8)
+    origin = np.empty(3)
+    visits = 0
+    for s in range(len(samples)):
+        own = owners[s]
+        if visits >= limit:
+            undecided[own] = True
+            continue
+        a, b, c = triangles[samples[s], 0], triangles[samples[s], 1], triangles[samples[s], 2]
+        for k in range(3):
+            origin[k] = _SAMPLE[0] * vertices[a, k] + _SAMPLE[1] * vertices[b, k] + _SAMPLE[2] * vertices[c, k]
+        answer[:] = _UNKNOWN
+        for attempt in range(len(_DIRECTIONS)):
+            winding[:] = 0
+            sure[:] = True
+            visits += _shoot(
+                vertices,
+                triangles,
+                component,
+                order,
+                boxes,
+                own,
+                origin,
+                _DIRECTIONS[attempt],
+                reach,
+                winding,
+                sure,
+                limit - visits,
+            )
+            if visits >= limit:
+                undecided[own] = True
+                break
+            open_ones = False
+            for other in range(count):
+                if near[own, other] and answer[other] == _UNKNOWN:
+                    if sure[other]:
+                        answer[other] = _INSIDE if winding[other] != 0 else _OUTSIDE
+                    else:
+                        open_ones = True
+            if not open_ones:
+                break
+        for other in range(count):
+            if near[own, other]:
+                outside[own, other] += answer[other] == _OUTSIDE
+                inside[own, other] += answer[other] == _INSIDE
+    return outside, inside, undecided
+
+
+@njit(cache=True, nogil=True)
+def _segment_crosses(p, q, a, b, c):
+    """Whether segment p q passes properly through triangle a b c; touching and coplanar cases don't count."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    span = abs(ux) + abs(uy) + abs(uz) + abs(wx) + abs(wy) + abs(wz)
+    margin = 1e-9 * size * span
+    dp = (p[0] - a[0]) * nx + (p[1] - a[1]) * ny + (p[2] - a[2]) * nz
+    dq = (q[0] - a[0]) * nx + (q[1] - a[1]) * ny + (q[2] - a[2]) * nz
+    if not ((dp > margin and dq < -margin) or (dp < -margin and dq > margin)):
+        return False
+    s = dp / (dp - dq)
+    x, y, z = p[0] + s * (q[0] - p[0]) - a[0], p[1] + s * (q[1] - p[1]) - a[1], p[2] + s * (q[2] - p[2]) - a[2]
+    # Barycentric coordinates from the areas against the normal.
+    n2 = size * size
+    beta = ((y * wz - z * wy) * nx + (z * wx - x * wz) * ny + (x * wy - y * wx) * nz) / n2
+    gamma = ((uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz) / n2
+    return beta > 1e-9 and gamma > 1e-9 and beta + gamma < 1.0 - 1e-9
+
+
+@njit(cache=True, nogil=True)
+def _triangles_cross(vertices, s, t):
+    for k in range(3):
+        if _segment_crosses(vertices[s[k]], vertices[s[(k + 1) % 3]], vertices[t[0]], vertices[t[1]], vertices[t[2]]):
+            return True
+        if _segment_crosses(vertices[t[k]], vertices[t[(k + 1) % 3]], vertices[s[0]], vertices[s[1]], vertices[s[2]]):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _crossing_pairs(vertices, triangles, component, order, boxes, near, found, limit):
+    """Mark pairs of components whose triangles cross in found (k, k); False when ``limit`` visits didn't suffice."""
+    leaves = (len(boxes) + 1) // 2
+    stack = np.empty(64, np.int64)
+    box = np.empty(6)
+    visits = 0
+    for i in range(len(order)):
+        s, own = triangles[order[i]], component[order[i]]
+        for k in range(3):
+            x, y, z = vertices[s[0], k], vertices[s[1], k], vertices[s[2], k]
+            box[k], box[3 + k] = min(x, y, z), max(x, y, z)
+        stack[0], top = 0, 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            visits += 1
+            if visits > limit:
+                return False
+            apart = False
+            for k in range(3):
+                apart = apart or boxes[node, k] > box[3 + k] or boxes[node, 3 + k] < box[k]
+            if apart:
+                continue
+            if node < leaves - 1:
+                stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
+                top += 2
+                continue
+            first = (node - leaves + 1) * LEAF
+            for j in range(max(first, i + 1), min(first + LEAF, len(order))):
+                other = component[order[j]]
+                if near[own, other] and not found[own, other] and _triangles_cross(vertices, s, triangles[order[j]]):
+                    found[own, other] = found[other, own] = True
+    return True
+
+
+@dataclass(frozen=True)
+class Nesting:
+    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. decided (k,) bool: False
+    for a component of which the work limit left open where it lies. complete: False when anything was left open.
+    """
+
+    inside: np.ndarray
+    crossing: tuple[tuple[int, int], ...]
+    decided: np.ndarray
+    complete: bool
+
+    @property
+    def depth(self) -> np.ndarray:
+        """In how many other components each one lies, (k,)."""
+        return np.count_nonzero(self.inside, axis=1)
+
+
+def component_nesting(vertices, triangles, component, lower, upper) -> Nesting:
+    """How closed components lie to each other; component (m,) numbers them, lower and upper (k, 3) are their boxes."""
+    count = len(lower)
+    near = np.all((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None]), axis=2)
+    np.fill_diagonal(near, False)
+    if not near.any():
+        return Nesting(np.zeros((count, count), dtype=bool), (), np.ones(count, dtype=bool), True)
+    order = np.argsort(component, kind="stable")
+    starts = np.searchsorted(component[order], np.arange(count + 1))
+    asked = np.nonzero(near.any(axis=1))[0]
+    picked = [order[starts[c] : starts[c + 1]][:: max(1, (starts[c + 1] - starts[c]) // SAMPLES)] for c in asked]
+    samples, owners = np.concatenate(picked), np.repeat(asked, [len(part) for part in picked])
+    chosen = np.nonzero(near.any(axis=1)[component])[0]
+    leaf_order, boxes = triangle_tree(vertices, triangles, chosen)
+    reach = NEAR * float(np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)))
+    outside, within, undecided = _sides(
+        vertices, triangles, component, leaf_order, boxes, samples, owners, near, reach, WORK_LIMIT
+    )
+    found = (outside > 0) & (within > 0)
+    found |= found.T
+    complete = bool(_crossing_pairs(vertices, triangles, component, leaf_order, boxes, near, found, WORK_LIMIT))
+    inside = (within > 0) & (outside == 0) & ~found & ~undecided[:, None]
+    crossing = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))
+    return Nesting(inside, crossing, ~undecided, complete and not undecided.any())

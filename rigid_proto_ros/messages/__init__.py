@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Messages as bytes, both ways, without ROS."""

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""The messages of a session: topics, types, definitions, and their bytes both ways. Knows neither ROS nor files.
+
+A body's states go over ``pose``, ``twist`` and ``odom``; each is a row of doubles behind a stamp. ``PROJECTIONS`` says which
+numbers of a state row a topic carries, computed as the node computes them, so that a recording compares to the bit.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.rotation import rotate
+from . import cdr
+
+_TIME = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
+_HEADER = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id"
+_VECTOR = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z"
+_POINT = "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z"
+_QUATERNION = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w"
+_POSE = "MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation"
+_TWIST = "MSG: geometry_msgs/Twist\nVector3 linear\nVector3 angular"
+_WRENCH = "MSG: geometry_msgs/Wrench\nVector3 force\nVector3 torque"
+_INERTIA = (
+    "MSG: geometry_msgs/Inertia\nfloat64 m\ngeometry_msgs/Vector3 com\n"
+    "float64 ixx\nfloat64 ixy\nfloat64 ixz\nfloat64 iyy\nfloat64 iyz\nfloat64 izz"
+)
+_SEPARATOR = "\n" + "=" * 80 + "\n"
+
+
+def _definition(*parts: str) -> str:
+    """A definition with those of the types inside it behind, as bags keep them."""
+    return _SEPARATOR.join(parts) + "\n"
+
+
+DEFINITIONS = {
+    "std_msgs/msg/String": _definition("string data"),
+    "geometry_msgs/msg/PoseStamped": _definition(
+        "std_msgs/Header header\nPose pose", _HEADER, _TIME, _POSE, _POINT, _QUATERNION
+    ),
+    "geometry_msgs/msg/TwistStamped": _definition(
+        "std_msgs/Header header\nTwist twist", _HEADER, _TIME, _TWIST, _VECTOR
+    ),
+    "geometry_msgs/msg/WrenchStamped": _definition(
+        "std_msgs/Header header\nWrench wrench", _HEADER, _TIME, _WRENCH, _VECTOR
+    ),
+    "geometry_msgs/msg/InertiaStamped": _definition(
+        "std_msgs/Header header\nInertia inertia", _HEADER, _TIME, _INERTIA, _VECTOR
+    ),
+}
+"""Message definitions (ros2msg) of the topics that we write."""
+
+TOPICS = {
+    "scene": "std_msgs/msg/String",
+    "events": "std_msgs/msg/String",
+    "pose": "geometry_msgs/msg/PoseStamped",
+    "twist": "geometry_msgs/msg/TwistStamped",
+    "applied": "geometry_msgs/msg/WrenchStamped",
+    "inertia": "geometry_msgs/msg/InertiaStamped",
+}
+"""Topics of a session that we write, below the node's name, and their types."""
+
+LATCHED = ("scene", "inertia")
+
+READ = {name: TOPICS[name] for name in ("scene", "events", "pose", "twist")} | {"odom": "nav_msgs/msg/Odometry"}
+"""Topics that a session is read from."""
+
+_STAMP = struct.Struct("<iII")
+_LENGTH = struct.Struct("<I")
+_LITTLE_ENDIAN = b"\x00\x01"
+
+
+@dataclass(frozen=True)
+class StampedRows:
+    """What one topic published: times (n,) int64 [ns, simulated] and rows (n, k) float64."""
+
+    times: np.ndarray
+    rows: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+
+def pose_row(row: list[float]) -> list[float]:
+    """x, y, z, then the attitude xyzw."""
+    return row[:7]
+
+
+def twist_row(row: list[float]) -> list[float]:
+    """Velocity of the COM, then angular velocity, both in world axes."""
+    return [*row[7:10], *rotate(*row[3:7], *row[10:13])]
+
+
+def odom_row(row: list[float]) -> list[float]:
+    """The pose, then velocity and angular velocity in body axes."""
+    q = row[3:7]
+    return [*row[:7], *rotate(-q[0], -q[1], -q[2], q[3], *row[7:10]), *row[10:13]]
+
+
+PROJECTIONS: dict[str, Callable[[list[float]], list[float]]] = {"pose": pose_row, "twist": twist_row, "odom": odom_row}
+"""What each state topic carries of a state row (13 floats), in the order of ``simulation/observer.py``'s ``STATE_FIELDS``."""
+
+_DOUBLES = {"pose": 7, "twist": 6, "odom": cdr.ODOMETRY_DOUBLES}
+
+
+def read_text(data: bytes, topic: str) -> str:
+    """The text of a std_msgs/String; raises InputError."""
+    try:
+        (length,) = _LENGTH.unpack_from(data, 4)
+        if data[:2] == _LITTLE_ENDIAN and 0 < length <= len(data) - 8:
+            return data[8 : 8 + length - 1].decode()
+    except (struct.error, UnicodeDecodeError):
+        pass
+    raise _undecodable(topic, "std_msgs/msg/String")
+
+
+def read_state(name: str, data: bytes, topic: str) -> tuple[int, list[float]]:
+    """Stamp [ns] and row of a message of the state topic ``name``; raises InputError."""
+    try:
+        if data[:2] == _LITTLE_ENDIAN:
+            seconds, nanoseconds, length = _STAMP.unpack_from(data, 4)
+            end = 16 + length
+            if name == "odom":
+                end = 4 + (end - 4 + 3) // 4 * 4
+                end += 4 + _LENGTH.unpack_from(data, end)[0]
+            doubles_at = 4 + (end - 4 + 7) // 8 * 8
+            values = list(struct.unpack_from(f"<{_DOUBLES[name]}d", data, doubles_at))
+            if name == "odom":
+                at = cdr.ODOMETRY_TWIST_AT
+                values = values[:7] + values[at : at + 6]
+            return seconds * 1_000_000_000 + nanoseconds, values
+    except struct.error:
+        pass
+    raise _undecodable(topic, READ[name])
+
+
+def _undecodable(topic: str, message_type: str) -> InputError:
+    return InputError(topic, f"a message can't be decoded as {message_type} in little-endian CDR")
+
+
+def inertia_bytes(time_ns: int, frame_id: str, mass: float, com, tensor6) -> bytes:
+    """A geometry_msgs/InertiaStamped; tensor6 ixx ixy ixz iyy iyz izz."""
+    return cdr.stamped_doubles(time_ns, frame_id, (mass, *com, *tensor6))

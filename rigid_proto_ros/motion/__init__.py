@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""One body's state, loads, string and equations of motion; the integrators are in a folder of their own."""

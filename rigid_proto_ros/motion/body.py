@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""The rigid body: mass properties, principal axes, and where mesh points lie on it.
+
+Compiled kernels read a body as a row of BODY doubles.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base.compilation import njit
+from ..base.rotation import quaternion_from_matrix
+from ..mass.tensor import principal_axes
+
+# Where the numbers of a body stand in its row.
+MASS = 0
+COM = 1  # (3,) [m, mesh axes after scaling]
+INERTIA = 4  # (9,) row by row
+MOMENTS = 13  # (3,) ascending
+AXES = 16  # (9,) principal axes row by row
+QUATERNION = 25  # (4,) principal to body
+BODY_SCALE = 29  # (3,)
+LENGTH = 32  # ℓ, what displacement errors are measured by [m]; 1 where no mesh gives it a size
+BODY = 33
+
+
+@njit(cache=True, error_model="numpy")
+def angular_acceleration(body, x, y, z):
+    """I⁻¹ τ of a torque x, y, z, in body axes."""
+    P, m = AXES, MOMENTS
+    a = (body[P] * x + body[P + 3] * y + body[P + 6] * z) / body[m]
+    b = (body[P + 1] * x + body[P + 4] * y + body[P + 7] * z) / body[m + 1]
+    c = (body[P + 2] * x + body[P + 5] * y + body[P + 8] * z) / body[m + 2]
+    return (
+        body[P] * a + body[P + 1] * b + body[P + 2] * c,
+        body[P + 3] * a + body[P + 4] * b + body[P + 5] * c,
+        body[P + 6] * a + body[P + 7] * b + body[P + 8] * c,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def arm(body, x, y, z):
+    """Mesh coordinates x, y, z to metres from the COM, body axes."""
+    s, c = BODY_SCALE, COM
+    return x * body[s] - body[c], y * body[s + 1] - body[c + 1], z * body[s + 2] - body[c + 2]
+
+
+@njit(cache=True, error_model="numpy")
+def normal(body, x, y, z):
+    """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
+    x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size
+
+
+@dataclass(frozen=True)
+class Body:
+    """mass [kg], center_of_mass (3,) [m, mesh axes after scaling], inertia (3, 3) [kg m², about the COM, mesh axes].
+
+    principal_moments (3,) ascending; principal_axes (3, 3): columns, body axes; principal_quaternion (4,) xyzw takes
+    principal to body axes. scale (3,): mesh coordinates times scale are metres from the mesh origin.
+    """
+
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+    scale: np.ndarray
+    principal_moments: np.ndarray
+    principal_axes: np.ndarray
+    principal_quaternion: np.ndarray
+
+    @cached_property
+    def row(self) -> np.ndarray:
+        """The body as compiled kernels read it (BODY,)."""
+        row = np.ones(BODY)
+        row[MASS] = self.mass
+        row[COM : COM + 3] = self.center_of_mass
+        row[INERTIA : INERTIA + 9] = self.inertia.ravel()
+        row[MOMENTS : MOMENTS + 3] = self.principal_moments
+        row[AXES : AXES + 9] = self.principal_axes.ravel()
+        row[QUATERNION : QUATERNION + 4] = self.principal_quaternion
+        row[BODY_SCALE : BODY_SCALE + 3] = self.scale
+        return row
+
+    def point(self, mesh_point) -> np.ndarray:
+        """Mesh coordinates (3,) to metres from the COM, body axes."""
+        x, y, z = mesh_point
+        return np.array(arm(self.row, float(x), float(y), float(z)))
+
+    def mesh_point(self, point) -> np.ndarray:
+        """Metres from the COM, body axes, to mesh coordinates (3,)."""
+        return (np.asarray(point) + self.center_of_mass) / self.scale
+
+    def angular_acceleration(self, torque_body) -> np.ndarray:
+        """I⁻¹ τ (3,), both in body axes."""
+        x, y, z = torque_body
+        return np.array(angular_acceleration(self.row, float(x), float(y), float(z)))
+
+
+def make_body(mass: float, center_of_mass, inertia, scale=(1.0, 1.0, 1.0)) -> Body:
+    """A body of given mass properties, its tensor diagonalized once."""
+    inertia = np.asarray(inertia, dtype=float)
+    moments, axes = principal_axes(inertia)
+    return Body(
+        mass=float(mass),
+        center_of_mass=np.asarray(center_of_mass, dtype=float),
+        inertia=inertia,
+        scale=np.asarray(scale, dtype=float),
+        principal_moments=moments,
+        principal_axes=axes,
+        principal_quaternion=quaternion_from_matrix(axes),
+    )

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""The frame of a wrench: which axes its numbers are in, and which point of the body it attacks.
+
+A frame is written ``axes@point[;duration=<s>|;impulse]``; README and docs list the forms. This module only reads the text;
+where the point lies on the body is settled by motion/loads.py.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from ..base.errors import CommandRefused
+
+AXES = ("world", "body", "normal")
+FIXED_POINTS = ("com", "origin")
+POINT_FORMS = "com, origin, vertex/<i>, a contact's name, point/<x>,<y>,<z>, ray/<ox>,<oy>,<oz>/<dx>,<dy>,<dz>"
+CONTACT_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+RESERVED_WORDS = frozenset({*AXES, *FIXED_POINTS, "vertex", "point", "ray", "mesh", "duration", "impulse"})
+
+MAX_FRAME_LENGTH = 1024
+"""Characters; the longest sensible frame, a ray with 17 digits a number, has about 170."""
+
+MAX_DURATION_S = 1e9
+"""A pulse's end must stay well inside the 292 years that int64 nanoseconds hold."""
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """axes: ``world``, ``body`` or ``normal``; point: a form of POINT_FORMS as a tuple, its word first."""
+
+    axes: str
+    point: tuple
+    duration_s: float | None = None
+    impulse: bool = False
+
+    @property
+    def options(self) -> str:
+        """What stands behind the point."""
+        if self.duration_s is not None:
+            return f";duration={self.duration_s!r}"
+        return ";impulse" if self.impulse else ""
+
+    @property
+    def text(self) -> str:
+        """The frame written out, with both axes and point."""
+        return f"{self.axes}@{point_text(self.point)}{self.options}"
+
+
+def point_text(point: tuple) -> str:
+    """A point as it stands in a frame; numbers keep all their digits."""
+    word, *values = point
+    if word in FIXED_POINTS:
+        return word
+    if word == "contact":
+        return values[0]
+    if word == "vertex":
+        return f"vertex/{values[0]}"
+    return "/".join([word, *(",".join(repr(float(x)) for x in triple) for triple in values)])
+
+
+def parse_frame(
+    text: str, contacts: frozenset[str] | set[str] = frozenset(), world: str = "world", body: str = "body"
+) -> Frame:
+    """Read a ``frame_id``.
+
+    contacts: the names of the body's contacts. world, body: names of this node's world and body frame, accepted beside
+    the words. Raises CommandRefused with reason ``frame``.
+    """
+    if len(text) > MAX_FRAME_LENGTH:
+        raise CommandRefused("frame", "frame_id", text[:40] + "...", f"at most {MAX_FRAME_LENGTH} characters")
+    place, *options = text.split(";")
+    axes_words = {"world": "world", "body": "body", "normal": "normal", world: "world", body: "body"}
+    if place == "":
+        axes, point = "world", ("com",)
+    elif "@" in place:
+        axes_text, point_part = place.split("@", 1)
+        if axes_text not in axes_words:
+            raise CommandRefused("frame", "frame_id", text, f"axes {_names(axes_words)} before the @")
+        axes, point = axes_words[axes_text], _parse_point(point_part, text, contacts)
+    elif place in axes_words:
+        axes, point = axes_words[place], ("com",)
+    else:
+        axes, point = "body", _parse_point(place, text, contacts, axes_words)
+    if axes == "normal" and point == ("com",):
+        raise CommandRefused("frame", "frame_id", text, "normal with a point of the surface, such as normal@vertex/0")
+    duration_s, impulse = _parse_options(options, text)
+    return Frame(axes, point, duration_s, impulse)
+
+
+def _parse_point(part: str, text: str, contacts, axes_words=()) -> tuple:
+    word, *values = part.split("/")
+    if part in FIXED_POINTS:
+        return (part,)
+    if part in contacts:
+        return ("contact", part)
+    if word == "vertex" and len(values) == 1 and re.fullmatch(r"\d{1,10}", values[0], re.ASCII):
+        return ("vertex", int(values[0]))
+    if word == "point" and len(values) == 1:
+        return ("point", _parse_triple(values[0], text))
+    if word == "ray" and len(values) == 2:
+        origin, direction = (_parse_triple(v, text) for v in values)
+        if not any(direction):
+            raise CommandRefused("frame", "frame_id", text, "a ray whose direction isn't zero")
+        return ("ray", origin, direction)
+    accepted = f"{', '.join(axes_words)}{', ' if axes_words else ''}{POINT_FORMS}"
+    if contacts:
+        accepted += f" (contacts: {_names(contacts)})"
+    raise CommandRefused("frame", "frame_id", text, accepted)
+
+
+def _parse_triple(part: str, text: str) -> tuple[float, float, float]:
+    numbers = part.split(",")
+    if len(numbers) != 3 or not all(_NUMBER.match(n) for n in numbers):
+        raise CommandRefused("frame", "frame_id", text, "three decimal numbers x,y,z without blanks")
+    values = tuple(float(n) for n in numbers)
+    if not all(math.isfinite(v) for v in values):
+        raise CommandRefused("nonfinite", "frame_id", text, "three finite numbers x,y,z")
+    return values
+
+
+def _parse_options(options: list[str], text: str) -> tuple[float | None, bool]:
+    duration_s, impulse = None, False
+    for option in options:
+        if option == "impulse" and not impulse:
+            impulse = True
+        elif option.startswith("duration=") and duration_s is None and _NUMBER.match(option[9:]):
+            duration_s = float(option[9:])
+            if not 1e-9 <= duration_s <= MAX_DURATION_S:
+                raise CommandRefused("frame", "frame_id", text, f"a duration of 1e-9 to {MAX_DURATION_S:g} s")
+        else:
+            raise CommandRefused("frame", "frame_id", text, "after the point only ;duration=<seconds> or ;impulse")
+    if impulse and duration_s is not None:
+        raise CommandRefused("frame", "frame_id", text, ";duration=<seconds> or ;impulse, not both")
+    return duration_s, impulse
+
+
+def check_contact_name(name: str) -> None:
+    """Raises CommandRefused unless ``name`` can stand for a point in a frame."""
+    if not CONTACT_NAME.match(name) or name in RESERVED_WORDS:
+        raise CommandRefused(
+            "frame", f"contacts.{name}", name, f"[a-z][a-z0-9_]*, and none of {_names(RESERVED_WORDS)}"
+        )
+
+
+def _names(words) -> str:
+    return ", ".join(sorted(words))

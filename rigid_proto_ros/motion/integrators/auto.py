@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""auto: for each segment the cheapest method that meets ``accuracy``.
+
+| what the segment holds | method |
+|---|---|
+| nothing moves, nothing pulls | none: the body sleeps |
+| no spin, no torque | closed form |
+| spin, no torque, no force that turns along | one exact step, however long |
+| a body-axes wrench, damping | Taylor series of the spin and what it carries along |
+| loads that depend on the attitude, a string | Taylor series of the whole motion |
+| loads so weak against the spin that many turns pass before they show | free_body_strang, steps as long as the accuracy allows |
+| damping that dies out long before anything else moves | Radau IIA, implicit, steps as long as the accuracy allows |
+| a string too stiff to resolve | discrete_gradient at the fixed step, accuracy not met and said so |
+
+Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's problem and
+start and of the accuracy; steps are functions of what they start from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ...base.compilation import njit
+from ...base.rotation import multiply, normalize, rotate
+from ..problem import (
+    ACCELERATION_ADDED,
+    ACCELERATION_BODY,
+    ATTACH,
+    DAMPING_ANGULAR,
+    DAMPING_LINEAR,
+    GYROSCOPIC,
+    HAND_VELOCITY,
+    HAS_STRING,
+    HAS_WORLD_TORQUE,
+    MASS,
+    MOMENTS,
+    REFERENCE_ACCELERATION,
+    REFERENCE_VELOCITY,
+    STIFFNESS,
+    TORQUE_BODY,
+    TRANSLATES,
+)
+from ..variables import damping_functions
+from . import series_steps, splitting_steps, stiff_steps, taylor_adaptive
+from .discrete_gradient import DISCRETE_GRADIENT
+from .equations import stretch
+from .exponential import exponential
+from .free_body import free_body_steps
+from .integrator import (
+    ANGULAR_DAMPING,
+    LOADS,
+    NO_GYROSCOPIC_TERM,
+    STRING,
+    Integrator,
+)
+from .runge_kutta import is_good
+from .stepping import ADAPTIVE, FIXED_STEPS, NOTHING, ONE_STEP, Method
+from .stiff_steps import damping_is_stiff
+from .taylor_adaptive import degree_for
+
+FASTEST_STRING = 1e6
+"""rad/s; above it resolving the string's swing would take millions of steps a second."""
+
+
+@njit(cache=True, error_model="numpy")
+def steady_steps(y, p, h, n):
+    """Closed form for a body that doesn't spin, or whose spin nothing changes for want of the gyroscopic term."""
+    for done in range(n):
+        B, c = ACCELERATION_BODY, p[DAMPING_LINEAR]
+        push = rotate(y[0], y[1], y[2], y[3], p[B], p[B + 1], p[B + 2])
+        phi1, phi2 = damping_functions(c * h)
+        if p[TRANSLATES] != 0.0:
+            for k in range(3):
+                a, u = push[k] + p[ACCELERATION_ADDED + k], y[10 + k]
+                y[7 + k] += h * (phi1 * u + h * phi2 * a)
+                y[10 + k] += h * phi1 * (a - c * u)
+        rx, ry, rz, rw = exponential(h * y[4], h * y[5], h * y[6])
+        qx, qy, qz, qw = multiply(y[0], y[1], y[2], y[3], rx, ry, rz, rw)
+        y[0], y[1], y[2], y[3] = normalize(qx, qy, qz, qw)
+        if not is_good(y):
+            return done
+    return n
+
+
+ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, WEAK_LOADS = range(7)
+SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(7, 11)
+"""Kinds of segments, as the table above has them; each is one of auto's methods."""
+
+
+@njit(cache=True, error_model="numpy")
+def _vector(p, at):
+    """Whether any of three numbers isn't zero."""
+    return p[at] != 0.0 or p[at + 1] != 0.0 or p[at + 2] != 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def fastest_swing(p):
+    """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against the
+    smallest moment.
+    """
+    x, y, z = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    return math.sqrt(p[STIFFNESS] * (1.0 / p[MASS] + (x * x + y * y + z * z) / p[MOMENTS]))
+
+
+@njit(cache=True, error_model="numpy")
+def _kind_on_string(p, y):
+    turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
+    accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
+    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
+        return SLACK_AT_REST
+    if damping_is_stiff(p, y, True):
+        return STIFF
+    return ON_STIFF_STRING if fastest_swing(p) > FASTEST_STRING else ON_STRING
+
+
+@njit(cache=True, error_model="numpy")
+def kind_of_segment(p, y, accuracy):
+    """Which of the kinds a segment with problem p from variables y on is, at this accuracy."""
+    spins = _vector(y, 4)
+    turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
+    translates = p[TRANSLATES] != 0.0
+    if p[HAS_STRING] != 0.0:
+        return _kind_on_string(p, y)
+    if damping_is_stiff(p, y, False):
+        return STIFF
+    if not turned:
+        if not spins and not translates:
+            moves = _vector(p, REFERENCE_VELOCITY) or _vector(p, REFERENCE_ACCELERATION)
+            return COASTING if moves else ASLEEP
+        if not spins or (p[GYROSCOPIC] == 0.0 and not translates):
+            return STEADY
+        if not translates:
+            return FREE
+    if spins and splitting_steps.splitting_pays(p, y, accuracy):
+        return WEAK_LOADS
+    return ANY_LOADS if p[HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
+
+
+def _constant(choice: str) -> Callable[..., str]:
+    return lambda p, step_s, accuracy: choice
+
+
+def _series(why: str) -> Callable[..., str]:
+    return lambda p, step_s, accuracy: f"auto: taylor of degree {degree_for(accuracy)}, {why.format(fastest_swing(p))}"
+
+
+def _stiff(p: np.ndarray, step_s: float, accuracy: float) -> str:
+    fastest = fastest_swing(p)
+    return f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
+
+
+def _methods(integrator: Integrator) -> tuple[Method, ...]:
+    """A method for each kind of segment."""
+    gradient = DISCRETE_GRADIENT
+    series = (series_steps.steps, series_steps.workspace)
+    by_kind = {
+        ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
+        COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
+        STEADY: Method(ONE_STEP, steady_steps, _constant("auto: closed form, nothing changes the spin"), 1),
+        FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, one exact step without torque"), 1),
+        TURNING_LOADS: Method(
+            ADAPTIVE, taylor_adaptive.steps, _series("the loads turn with the body"), 0, taylor_adaptive.workspace
+        ),
+        ANY_LOADS: Method(ADAPTIVE, series[0], _series("loads that depend on the attitude"), 0, series[1]),
+        WEAK_LOADS: Method(
+            ADAPTIVE,
+            splitting_steps.steps,
+            _constant("auto: free_body_strang, loads weak against the spin"),
+            workspace=splitting_steps.workspace,
+        ),
+        SLACK_AT_REST: Method(
+            NOTHING,
+            None,
+            _constant("auto: sleeping, the string is slack and nothing moves"),
+            sleeps=True,
+            on_string=True,
+        ),
+        ON_STRING: Method(ADAPTIVE, series[0], _series("a string of up to {:.3g} rad/s"), 0, series[1], on_string=True),
+        STIFF: Method(
+            ADAPTIVE,
+            stiff_steps.steps,
+            _constant("auto: radau of order 9, stiff damping"),
+            workspace=stiff_steps.workspace,
+        ),
+        ON_STIFF_STRING: Method(
+            *(FIXED_STEPS, gradient.string_kernel or gradient.kernel, _stiff, gradient.evaluations),
+            floor_binds=True,
+            on_string=True,
+        ),
+    }
+    return tuple(by_kind[kind] for kind in range(len(by_kind)))
+
+
+AUTO = Integrator(
+    name="auto",
+    order=None,
+    evaluations=0,
+    source="integrators/auto.py",
+    limits="Chooses per segment; steps follow from ``accuracy`` and not from ``step``.",
+    stability_limit=math.inf,
+    carries=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
+    kernel=None,
+    make_methods=_methods,
+    chooses=True,
+)

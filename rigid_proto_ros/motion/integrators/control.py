@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""What a kernel that chooses its own steps keeps between calls, as one array of doubles.
+
+An accepted step that reaches beyond the time asked for is kept until it can be committed, so that when anybody asks never
+changes the steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.compilation import njit
+
+ACCURACY = 0  # local error rate asked for [1/s]
+DEGREE = 1  # of the series
+ACCEPTED_NS = 2  # length of the step that waits for its commitment; 0 for none
+ELAPSED_NS = 3  # committed since the segment's start
+STEPS = 4  # committed
+EVALUATIONS = 5  # in committed steps, one for each series
+PENDING = 6  # evaluations spent on the step that waits
+FLOOR_BINDS = 7  # 1 once rounding, not the accuracy, set the allowance of a step
+FAILED = 8  # 1 when a nanosecond would be too long a step, or the motion ran away
+SERIES = 9  # 1 while the workspace holds the series from the committed variables on
+# Of the step that waits, where the string's law changes within it (integrators/series_steps.py):
+LAW = 10  # the string's law at its start
+SWITCH = 11  # time after which the last series holds and no more the first [s]; infinite for none
+LAST_START = 12  # where the last series starts [s]
+LAST_LAW = 13  # the law of the last series
+NEXT = 14  # length proposed for the next step [s], by those methods that reject steps; 0 at a segment's start
+EXCESS = 15  # what committed steps have erred above the accuracy's share, by those methods that estimate errors
+PENDING_EXCESS = 16  # of the step that waits
+SIZE = 17
+
+LONGEST = 1e6
+"""Longest step [s]: 10¹⁵ ns are exact in a double."""
+
+
+def new_control(accuracy: float, degree: int) -> np.ndarray:
+    """The array at a segment's start."""
+    control = np.zeros(SIZE)
+    control[ACCURACY], control[DEGREE] = accuracy, degree
+    return control
+
+
+@njit(cache=True, error_model="numpy")
+def commit(control):
+    """Count the step that waited as committed."""
+    control[ELAPSED_NS] += control[ACCEPTED_NS]
+    control[EVALUATIONS] += control[PENDING]
+    control[STEPS] += 1.0
+    control[ACCEPTED_NS] = 0.0
+    control[PENDING] = 0.0
+    control[SERIES] = 0.0

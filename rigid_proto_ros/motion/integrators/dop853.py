@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""dop853: the explicit Runge-Kutta method of order 8 of Prince and Dormand, fixed steps.
+
+Order 8, 12 evaluations a step. Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section
+II.10. The one for large steps under loads of any kind; not conservative, and useless beyond |ω|h of about 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.compilation import njit
+from . import slack
+from .dop853_tableau import STAGES, WEIGHTS
+from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
+from .runge_kutta import advance, is_good, rates, stages
+from .stepping import fixed_steps
+
+
+@njit(cache=True, error_model="numpy")
+def dop853_steps(y, p, h, n):
+    """Up to n steps of h seconds in place; returns the number of good ones."""
+    k, z, new = np.zeros((12, 15)), np.empty(15), y.copy()
+    for done in range(n):
+        rates(y, p, False, k[0])
+        stages(y, p, h, False, STAGES, 12, k, z)
+        advance(y, p, h, WEIGHTS, 12, k, new)
+        if not is_good(new):
+            return done
+        y[:] = new
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def dop853_string_steps(y, p, h, n):
+    """The same, each step cut where the string turns slack or taut."""
+    k, z, new, trial = np.zeros((12, 15)), np.empty(15), y.copy(), y.copy()
+    search = slack.new_search()
+    for done in range(n):
+        new[:] = y
+        slack.begin(search, new, p, h)
+        while search[slack.REMAINING] > 0.0:
+            taut = search[slack.TAUT] != 0.0
+            rates(new, p, taut, k[0])
+            stages(new, p, search[slack.TRIAL], taut, STAGES, 12, k, z)
+            advance(new, p, search[slack.TRIAL], WEIGHTS, 12, k, trial)
+            if slack.judge(search, trial, p):
+                new[:] = trial
+        if not is_good(new):
+            return done
+        y[:] = new
+    return n
+
+
+DOP853 = Integrator(
+    name="dop853",
+    order=8,
+    evaluations=12,
+    source="Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.10",
+    limits="Explicit: accurate up to |ω|h of about 1, diverges beyond about 4.",
+    stability_limit=2.0,
+    carries=LOADS | {ANGULAR_DAMPING, STRING},
+    kernel=dop853_steps,
+    string_kernel=dop853_string_steps,
+    make_methods=fixed_steps,
+)

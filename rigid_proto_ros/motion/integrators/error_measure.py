@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""How large an error is: attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s), the largest of them.
+
+``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε a
+step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...base.compilation import njit
+from ..problem import (
+    ATTACH,
+    HAS_STRING,
+    LENGTH,
+    MASS,
+    MOMENTS,
+    REFERENCE_ACCELERATION,
+    REFERENCE_DAMPING,
+    REFERENCE_VELOCITY,
+    STRING_DAMPING,
+    TRANSLATES,
+)
+from ..variables import damping_functions
+
+WEIGHINGS = 4
+"""Of a step whose end weighs errors more than its start did, each shorter than the one before."""
+
+FLOOR = 32.0 * 2.0**-52
+
+
+@njit(cache=True, error_model="numpy")
+def scales(y, p, elapsed):
+    """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into the segment."""
+    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
+    if p[TRANSLATES] == 0.0:
+        return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
+    c = p[REFERENCE_DAMPING]
+    push = elapsed * damping_functions(c * elapsed)[0]
+    speed = 0.0
+    for k in range(3):
+        v = p[REFERENCE_VELOCITY + k]
+        v += push * (p[REFERENCE_ACCELERATION + k] - c * v) + y[10 + k]
+        speed += v * v
+    length = p[LENGTH]
+    return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
+
+
+@njit(cache=True, error_model="numpy")
+def heavier(ending, weights):
+    """The larger of the weights at a step's end and start, and whether they are clearly more than those at the start: a quarter."""
+    spin, speed = max(ending[1], weights[1]), max(ending[3], weights[3])
+    return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
+
+
+_SQUARED = 1e140
+"""Up to this number, and down to one over it, squares and their sums stay well within a double."""
+
+
+@njit(cache=True, error_model="numpy")
+def length_of(x, y, z, w):
+    """√(x² + y² + z² + w²), scaled by a power of two where squares would over- or underflow."""
+    square = x * x + y * y + z * z + w * w
+    if 1.0 / _SQUARED < square < _SQUARED:
+        return math.sqrt(square)
+    largest = max(abs(x), abs(y), abs(z), abs(w))
+    if largest == 0.0 or not math.isfinite(largest):
+        return largest
+    scale = math.ldexp(1.0, math.frexp(largest)[1] - 1)
+    x, y, z, w = x / scale, y / scale, z / scale, w / scale
+    return scale * math.sqrt(x * x + y * y + z * z + w * w)
+
+
+@njit(cache=True, error_model="numpy")
+def size(e, attitude, spin, place, speed):
+    """The measure of a small difference e (≥ 13,) of variables."""
+    a = attitude * length_of(e[0], e[1], e[2], e[3])
+    a = max(a, spin * length_of(e[4], e[5], e[6], 0.0))
+    if place == 0.0:
+        return a
+    a = max(a, place * length_of(e[7], e[8], e[9], 0.0))
+    return max(a, speed * length_of(e[10], e[11], e[12], 0.0))
+
+
+@njit(cache=True, error_model="numpy")
+def jump_of_displacement(p, spin, speed):
+    """Error that a displacement by one unit of the measure causes when a damped string jerks taut that much too early or late."""
+    if p[HAS_STRING] == 0.0:
+        return 0.0
+    arm = math.sqrt(p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2)
+    # What a force at the knot does to the measured velocities, per newton and second.
+    response = max(speed / p[MASS], spin * arm / p[MOMENTS])
+    return p[STRING_DAMPING] * p[LENGTH] * response

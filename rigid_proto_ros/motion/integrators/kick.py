@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""What loads and damping do to the velocities while the attitude stands still: the other half of the splittings."""
+
+from __future__ import annotations
+
+from ...base.compilation import njit
+from ...base.rotation import rotate
+from ..problem import (
+    ACCELERATION_ADDED,
+    ACCELERATION_BODY,
+    DAMPING_ANGULAR,
+    DAMPING_LINEAR,
+    MOMENTS,
+    TRANSLATES,
+)
+from ..variables import damping_functions
+from .equations import undamped_torque
+
+
+@njit(cache=True, error_model="numpy")
+def push(y, p):
+    """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
+    tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
+    if p[TRANSLATES] == 0.0:
+        return tx, ty, tz, 0.0, 0.0, 0.0
+    B, G = ACCELERATION_BODY, ACCELERATION_ADDED
+    ax, ay, az = rotate(y[0], y[1], y[2], y[3], p[B], p[B + 1], p[B + 2])
+    return tx, ty, tz, ax + p[G], ay + p[G + 1], az + p[G + 2]
+
+
+@njit(cache=True, error_model="numpy")
+def kick(y, p, h, pushed):
+    """Let ``push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
+    angular, linear = p[DAMPING_ANGULAR], p[DAMPING_LINEAR]
+    for k in range(3):
+        rate = pushed[k] / p[MOMENTS + k]
+        if angular == 0.0:
+            y[4 + k] += h * rate
+        else:
+            # ω' = rate − z ω: ω + h φ₁(zh)(rate − z ω).
+            z = angular / p[MOMENTS + k]
+            y[4 + k] += h * damping_functions(z * h)[0] * (rate - z * y[4 + k])
+        if p[TRANSLATES] != 0.0:
+            y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
+
+
+@njit(cache=True, error_model="numpy")
+def drift_freely(y, p, h):
+    """Move the added displacement on with its velocity for h seconds, in place."""
+    for k in range(3):
+        y[7 + k] += h * y[10 + k]

@@ -1,0 +1,439 @@
+# SPDX-License-Identifier: MIT
+"""One step of Radau IIA with five stages: order 9, implicit, L-stable and stiffly accurate, on the rotation group.
+
+The unknowns are the velocities V = (ω, u) at the stages; displacements follow from them by the same quadrature, dᵢ = d + h Σ aᵢⱼ uⱼ,
+and attitudes by the rotation vector θ of q ⊗ exp θ, θᵢ = h Σ aᵢⱼ g(θⱼ, ωⱼ), g = ω + ½ θ × ω + κ θ × (θ × ω). Newton's iteration uses the
+exact derivatives at every stage: with a frozen one it would stall where a stiff string turns. A turn ξ of stage j in world axes obeys ξ' = δW with
+W = R ω, so the unknown changes are those of W and u, and turns and displacements are hA times them.
+
+Source: Hairer and Wanner, Solving Ordinary Differential Equations II (1996), sections IV.5 and IV.8; θ' from Munthe-Kaas, BIT 38 (1998) 92.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from ...base.compilation import njit
+from ...base.rotation import multiply, normalize, rotate, rotate_inverse
+from ..problem import (
+    ACCELERATION_BODY,
+    ATTACH,
+    DAMPING_ANGULAR,
+    DAMPING_LINEAR,
+    GYROSCOPIC,
+    HAS_STRING,
+    HAS_WORLD_TORQUE,
+    LENGTH,
+    MASS,
+    MOMENT,
+    MOMENTS,
+    REST_LENGTH,
+    STIFFNESS,
+    STRING_DAMPING,
+    TORQUE_WORLD,
+    TRANSLATES,
+)
+from ..string import NO_DIRECTION
+from ..variables import HAND_WORK, HEAT, LOW
+from .equations import accelerations, knot
+from .knot import moved_pair, unit_attitude
+
+STAGES = 5
+NODES = (0.05710419611451768, 0.27684301363812383, 0.5835904323689168, 0.8602401356562195, 1.0)
+"""Zeros of P₄ − P₅ on (0, 1]."""
+
+
+def _lagrange(j: int) -> list[Fraction]:
+    """Coefficients, constant first, of the polynomial that is 1 at node j and 0 at the others: exact for the nodes as doubles."""
+    c = [Fraction(x) for x in NODES]
+    poly = [Fraction(1)]
+    for i in range(STAGES):
+        if i != j:
+            scale = 1 / (c[j] - c[i])
+            raised = [Fraction(0), *poly]
+            poly = [(a - c[i] * b) * scale for a, b in zip(raised, [*poly, Fraction(0)], strict=True)]
+    return poly
+
+
+def _at(poly: list[Fraction], x: Fraction) -> float:
+    return float(sum(a * x**k for k, a in enumerate(poly)))
+
+
+def _integral_to(poly: list[Fraction], x: Fraction) -> float:
+    return float(sum(a * x ** (k + 1) / (k + 1) for k, a in enumerate(poly)))
+
+
+_POLYNOMIALS = [_lagrange(j) for j in range(STAGES)]
+A = np.array([[_integral_to(poly, Fraction(c)) for poly in _POLYNOMIALS] for c in NODES])
+"""aᵢⱼ, the integral of the j-th Lagrange polynomial up to node i."""
+_POWERS = np.array([[float(a) for a in poly] for poly in _POLYNOMIALS])
+"""Coefficients of the Lagrange polynomials, constant first."""
+HALVES = np.array([[[_at(poly, (Fraction(c) + k) / 2) for poly in _POLYNOMIALS] for c in NODES] for k in (0, 1)])
+"""A stage polynomial at the nodes of the step's first and second half, from its values at the nodes."""
+
+MOST_ITERATIONS = 12
+"""Of Newton; four to six are used, and a step that needs more is too long."""
+
+_MOST_SWEEPS = 60
+"""Of the rotation vectors; their error falls by |ω|h/4 each."""
+
+_N = 6
+
+
+@njit(cache=True, error_model="numpy")
+def _rates_of_turn(tx, ty, tz, wx, wy, wz):
+    """θ' = ω + ½ θ × ω + κ θ × (θ × ω) with κ = (1 − ½θ cot ½θ)/θ²."""
+    x = tx * tx + ty * ty + tz * tz
+    if x < 0.25:
+        k = 1.0 / 12.0 + x * (
+            1.0 / 720.0
+            + x * (1.0 / 30240.0 + x * (1.0 / 1209600.0 + x * (1.0 / 47900160.0 + x * (691.0 / 1307674368000.0))))
+        )
+    else:
+        half = 0.5 * math.sqrt(x)
+        k = (1.0 - half / math.tan(half)) / x
+    ax, ay, az = ty * wz - tz * wy, tz * wx - tx * wz, tx * wy - ty * wx
+    return (
+        wx + 0.5 * ax + k * (ty * az - tz * ay),
+        wy + 0.5 * ay + k * (tz * ax - tx * az),
+        wz + 0.5 * az + k * (tx * ay - ty * ax),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _turns(V, h, theta, rates):
+    """Rotation vectors theta (5, 3) of the stages from their spins V[:, :3], from the guess there; whether they were found."""
+    for _ in range(_MOST_SWEEPS):
+        for j in range(STAGES):
+            rates[j, 0], rates[j, 1], rates[j, 2] = _rates_of_turn(
+                theta[j, 0], theta[j, 1], theta[j, 2], V[j, 0], V[j, 1], V[j, 2]
+            )
+        moved, largest = 0.0, 0.0
+        for i in range(STAGES):
+            for k in range(3):
+                total = 0.0
+                for j in range(STAGES):
+                    total += A[i, j] * rates[j, k]
+                total *= h
+                moved = max(moved, abs(total - theta[i, k]))
+                largest = max(largest, abs(total))
+                theta[i, k] = total
+        if moved <= 4e-16 * largest:
+            return True
+        if not largest < 3.0:
+            return False
+    return moved <= 1e-14
+
+
+@njit(cache=True, error_model="numpy")
+def _half_turn(tx, ty, tz):
+    """exp θ as quaternion, its scalar part less 1 without cancellation."""
+    angle = math.sqrt(tx * tx + ty * ty + tz * tz)
+    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
+    less = math.sin(0.25 * angle)
+    return s * tx, s * ty, s * tz, -2.0 * less * less
+
+
+@njit(cache=True, error_model="numpy")
+def _cross_into(M, scale, x, y, z, row, column):
+    """Add scale [v]× to the 3 × 3 block of M at row, column."""
+    M[row, column + 1] -= scale * z
+    M[row, column + 2] += scale * y
+    M[row + 1, column] += scale * z
+    M[row + 1, column + 2] -= scale * x
+    M[row + 2, column] -= scale * y
+    M[row + 2, column + 1] += scale * x
+
+
+@njit(cache=True, error_model="numpy")
+def _derivatives(q, w, d, u, p, taut, R, Jv, Jx, K):
+    """Derivatives (6, 6) of (ω' in principal axes, u') by velocities (W, u) and by turn and displacement (ξ, d), all in world axes.
+
+    R (3, 3) is filled with the attitude's matrix; K (2, 3, 3) is scratch.
+    """
+    Jv[:, :] = 0.0
+    Jx[:, :] = 0.0
+    for k in range(3):
+        e0, e1, e2 = rotate(q[0], q[1], q[2], q[3], 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
+        R[0, k], R[1, k], R[2, k] = e0, e1, e2
+    i1, i2, i3 = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    g, cw = p[GYROSCOPIC], p[DAMPING_ANGULAR]
+    # Torque in principal axes by ω there, then by W: G Rᵀ.
+    g01, g02 = g * (i2 - i3) * w[2], g * (i2 - i3) * w[1]
+    g10, g12 = g * (i3 - i1) * w[2], g * (i3 - i1) * w[0]
+    g20, g21 = g * (i1 - i2) * w[1], g * (i1 - i2) * w[0]
+    for k in range(3):
+        Jv[0, k] = -cw * R[k, 0] + g01 * R[k, 1] + g02 * R[k, 2]
+        Jv[1, k] = g10 * R[k, 0] - cw * R[k, 1] + g12 * R[k, 2]
+        Jv[2, k] = g20 * R[k, 0] + g21 * R[k, 1] - cw * R[k, 2]
+    # A torque in world axes: its change, less ξ × τ, is turned into principal axes below.
+    S = K[0]
+    S[:, :] = 0.0
+    if p[HAS_WORLD_TORQUE] != 0.0:
+        T, M = TORQUE_WORLD, MOMENT
+        for k in range(3):
+            x, y, z = rotate_inverse(q[0], q[1], q[2], q[3], 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
+            # Rᵀ(τ × e_k), and vee of M [e_k]× R: the arms of world forces turn.
+            tx, ty, tz = rotate_inverse(q[0], q[1], q[2], q[3], p[T], p[T + 1], p[T + 2])
+            Jx[0, k] += ty * z - tz * y
+            Jx[1, k] += tz * x - tx * z
+            Jx[2, k] += tx * y - ty * x
+            for i in range(3):
+                # Row i of M [e_k]×, then times R: (m × e_k) turned into principal axes.
+                mx, my, mz = rotate_inverse(q[0], q[1], q[2], q[3], p[M + 3 * i], p[M + 3 * i + 1], p[M + 3 * i + 2])
+                S[i, 0], S[i, 1], S[i, 2] = my * z - mz * y, mz * x - mx * z, mx * y - my * x
+            Jx[0, k] += S[1, 2] - S[2, 1]
+            Jx[1, k] += S[2, 0] - S[0, 2]
+            Jx[2, k] += S[0, 1] - S[1, 0]
+    if p[TRANSLATES] != 0.0:
+        B, cv = ACCELERATION_BODY, p[DAMPING_LINEAR]
+        bx, by, bz = rotate(q[0], q[1], q[2], q[3], p[B], p[B + 1], p[B + 2])
+        _cross_into(Jx, -1.0, bx, by, bz, 3, 0)
+        for k in range(3):
+            Jv[3 + k, 3 + k] -= cv
+        if p[HAS_STRING] != 0.0:
+            _string_derivatives(q, w, d, u, p, taut, R, Jv, Jx, K)
+    for k in range(_N):
+        Jv[0, k] /= i1
+        Jv[1, k] /= i2
+        Jv[2, k] /= i3
+        Jx[0, k] /= i1
+        Jx[1, k] /= i2
+        Jx[2, k] /= i3
+
+
+@njit(cache=True, error_model="numpy")
+def _string_derivatives(q, w, d, u, p, taut, R, Jv, Jx, K):
+    """Add the string's part, its torque not yet divided by the moments: δF = K₀ δa' + K₁ δa with δa = δd + ξ × ρ and
+    δa' = δu + δW × ρ + ξ × (W × ρ), torque Rᵀ(ρ × (δF − ξ × F))."""
+    k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
+    ax, ay, az, vx, vy, vz = knot(q[0], q[1], q[2], q[3], w[0], w[1], w[2], d[0], d[1], d[2], u[0], u[1], u[2], p)
+    length = math.sqrt(ax * ax + ay * ay + az * az)
+    if rest != 0.0 and (not taut or length < NO_DIRECTION * rest):
+        return
+    r0, r1, r2 = rotate(q[0], q[1], q[2], q[3], p[ATTACH], p[ATTACH + 1], p[ATTACH + 2])
+    # W × ρ
+    e0, e1, e2 = vx - u[0], vy - u[1], vz - u[2]
+    Kv, Kx = K[0], K[1]
+    if rest == 0.0:
+        Kv[:, :] = 0.0
+        Kx[:, :] = 0.0
+        for j in range(3):
+            Kv[j, j] = -c
+            Kx[j, j] = -k
+        f0, f1, f2 = -k * ax - c * vx, -k * ay - c * vy, -k * az - c * vz
+    else:
+        n = (ax / length, ay / length, az / length)
+        v = (vx, vy, vz)
+        rate = n[0] * vx + n[1] * vy + n[2] * vz
+        tension = k * (length - rest) + c * rate
+        f0, f1, f2 = -tension * n[0], -tension * n[1], -tension * n[2]
+        for i in range(3):
+            for j in range(3):
+                nn = n[i] * n[j]
+                across = (1.0 if i == j else 0.0) - nn
+                Kv[i, j] = -c * nn
+                Kx[i, j] = -k * nn - tension / length * across - c * n[i] * (v[j] - rate * n[j]) / length
+    m = p[MASS]
+    for j in range(12):
+        # Column j: unit change of W, u, ξ or d.
+        x, y, z = 1.0 * (j % 3 == 0), 1.0 * (j % 3 == 1), 1.0 * (j % 3 == 2)
+        s0, s1, s2, t0, t1, t2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        g0, g1, g2 = 0.0, 0.0, 0.0
+        if j < 3:
+            t0, t1, t2 = y * r2 - z * r1, z * r0 - x * r2, x * r1 - y * r0
+        elif j < 6:
+            t0, t1, t2 = x, y, z
+        elif j < 9:
+            s0, s1, s2 = y * r2 - z * r1, z * r0 - x * r2, x * r1 - y * r0
+            t0, t1, t2 = y * e2 - z * e1, z * e0 - x * e2, x * e1 - y * e0
+            g0, g1, g2 = y * f2 - z * f1, z * f0 - x * f2, x * f1 - y * f0
+        else:
+            s0, s1, s2 = x, y, z
+        d0 = Kv[0, 0] * t0 + Kv[0, 1] * t1 + Kv[0, 2] * t2 + Kx[0, 0] * s0 + Kx[0, 1] * s1 + Kx[0, 2] * s2
+        d1 = Kv[1, 0] * t0 + Kv[1, 1] * t1 + Kv[1, 2] * t2 + Kx[1, 0] * s0 + Kx[1, 1] * s1 + Kx[1, 2] * s2
+        d2 = Kv[2, 0] * t0 + Kv[2, 1] * t1 + Kv[2, 2] * t2 + Kx[2, 0] * s0 + Kx[2, 1] * s1 + Kx[2, 2] * s2
+        h0, h1, h2 = d0 - g0, d1 - g1, d2 - g2
+        h0, h1, h2 = r1 * h2 - r2 * h1, r2 * h0 - r0 * h2, r0 * h1 - r1 * h0
+        J = Jv if j < 6 else Jx
+        column = j % 6
+        J[3, column] += d0 / m
+        J[4, column] += d1 / m
+        J[5, column] += d2 / m
+        for i in range(3):
+            J[i, column] += R[0, i] * h0 + R[1, i] * h1 + R[2, i] * h2
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(M, x, size):
+    """Solve M z = x in place, by elimination with the largest pivot of each column; whether there is a solution."""
+    for k in range(size):
+        pivot, largest = k, abs(M[k, k])
+        for i in range(k + 1, size):
+            if abs(M[i, k]) > largest:
+                pivot, largest = i, abs(M[i, k])
+        if not (largest > 0.0 and math.isfinite(largest)):
+            return False
+        if pivot != k:
+            for j in range(k, size):
+                M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
+            x[k], x[pivot] = x[pivot], x[k]
+        inverse = 1.0 / M[k, k]
+        for i in range(k + 1, size):
+            f = M[i, k] * inverse
+            if f != 0.0:
+                for j in range(k + 1, size):
+                    M[i, j] -= f * M[k, j]
+                x[i] -= f * x[k]
+    for k in range(size - 1, -1, -1):
+        total = x[k]
+        for j in range(k + 1, size):
+            total -= M[k, j] * x[j]
+        x[k] = total / M[k, k]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def radau_step(y, p, h, taut, V, out):
+    """One step of h seconds from y into out (STORED,). V (5, 6): velocities at the stages, a guess, then the solution.
+
+    Returns how often the equations of motion were evaluated, 0 when no solution was found: the step is too long then.
+    """
+    n = _N if p[TRANSLATES] != 0.0 else 3
+    size = STAGES * n
+    theta, rates = np.zeros((STAGES, 3)), np.zeros((STAGES, 3))
+    d, q, f = np.zeros((STAGES, 3)), np.zeros((STAGES, 4)), np.zeros((STAGES, 8))
+    Jv, Jx = np.zeros((STAGES, _N, _N)), np.zeros((STAGES, _N, _N))
+    R, K = np.zeros((STAGES, 3, 3)), np.zeros((2, 3, 3))
+    M, x = np.empty((size, size)), np.empty(size)
+    before, evaluations = math.inf, 0
+    found = False
+    while not found and evaluations < MOST_ITERATIONS * STAGES:
+        if not _turns(V, h, theta, rates):
+            return 0
+        spin, speed = 0.0, 0.0
+        for i in range(STAGES):
+            rx, ry, rz, less = _half_turn(theta[i, 0], theta[i, 1], theta[i, 2])
+            a, b, c, e = multiply(y[0], y[1], y[2], y[3], rx, ry, rz, 1.0 + less)
+            q[i, 0], q[i, 1], q[i, 2], q[i, 3] = normalize(a, b, c, e)
+            for k in range(3):
+                total = 0.0
+                if n == _N:
+                    for j in range(STAGES):
+                        total += A[i, j] * V[j, 3 + k]
+                d[i, k] = y[7 + k] + h * total
+                spin = max(spin, abs(V[i, k]))
+                speed = max(speed, abs(V[i, 3 + k]))
+            f[i, 0], f[i, 1], f[i, 2], f[i, 3], f[i, 4], f[i, 5], f[i, 6], f[i, 7] = accelerations(
+                *(q[i, 0], q[i, 1], q[i, 2], q[i, 3]),
+                *(V[i, 0], V[i, 1], V[i, 2], d[i, 0], d[i, 1], d[i, 2], V[i, 3], V[i, 4], V[i, 5]),
+                p,
+                taut,
+            )
+            _derivatives(q[i], V[i, :3], d[i], V[i, 3:], p, taut, R[i], Jv[i], Jx[i], K)
+        evaluations += STAGES
+        # Newton: (δᵢⱼ Rᵀ − h aᵢⱼ Jv − h² Σ aᵢₖ Jx aₖⱼ) δ = −(Vᵢ − V − h Σ aᵢⱼ V'ⱼ).
+        for i in range(STAGES):
+            for a in range(n):
+                start = y[4 + a] if a < 3 else y[7 + a]
+                total = 0.0
+                for j in range(STAGES):
+                    total += A[i, j] * f[j, a]
+                x[i * n + a] = (start - V[i, a]) + h * total
+            for j in range(STAGES):
+                for a in range(n):
+                    for b in range(n):
+                        total = A[i, j] * Jv[j, a, b]
+                        more = 0.0
+                        for k in range(STAGES):
+                            more += A[i, k] * A[k, j] * Jx[k, a, b]
+                        M[i * n + a, j * n + b] = -h * (total + h * more)
+            for a in range(3):
+                for b in range(3):
+                    M[i * n + a, i * n + b] += R[i, b, a]
+            for a in range(3, n):
+                M[i * n + a, i * n + a] += 1.0
+        if not _solve(M, x, size):
+            return 0
+        change = 0.0
+        # Changes are measured as errors are (error_measure.scales): a speed that a medium stops is beside the spin's but rounding.
+        spin, speed = max(spin, 1.0), max(speed, p[LENGTH])
+        for i in range(STAGES):
+            for a in range(3):
+                turned = R[i, 0, a] * x[i * n] + R[i, 1, a] * x[i * n + 1] + R[i, 2, a] * x[i * n + 2]
+                V[i, a] += turned
+                change = max(change, abs(turned) / spin)
+            for a in range(3, n):
+                V[i, a] += x[i * n + a]
+                change = max(change, abs(x[i * n + a]) / speed)
+        if not math.isfinite(change):
+            return 0
+        # Changes that no longer fall are rounding, or there is nothing to be found.
+        stalls = evaluations > 4 * STAGES and change > before
+        if stalls and not change < 1e-12:
+            return 0
+        # Convergence is quadratic: what remains is about change²; where rounding stands in its way, change stays.
+        found = change <= 1e-15 or (math.isfinite(before) and change * min(change / before, 1.0) < 1e-17)
+        found = found or stalls or (change < 1e-13 and change > 0.25 * before)
+        before = change
+    if not found or not _turns(V, h, theta, rates):
+        return 0
+    last = STAGES - 1
+    out[:] = y
+    rx, ry, rz, less = _half_turn(theta[last, 0], theta[last, 1], theta[last, 2])
+    a, b, c, e = multiply(y[0], y[1], y[2], y[3], rx, ry, rz, less)
+    moved_pair(y, out, 0, LOW, a)
+    moved_pair(y, out, 1, LOW + 1, b)
+    moved_pair(y, out, 2, LOW + 2, c)
+    moved_pair(y, out, 3, LOW + 3, e)
+    unit_attitude(out)
+    for k in range(3):
+        out[4 + k] = V[last, k]
+        if n == _N:
+            out[10 + k] = V[last, 3 + k]
+            total = 0.0
+            for j in range(STAGES):
+                total += A[last, j] * V[j, 3 + k]
+            moved_pair(y, out, 7 + k, LOW + 4 + k, h * total)
+    if p[HAS_STRING] != 0.0:
+        work, heat = 0.0, 0.0
+        for j in range(STAGES):
+            work += A[last, j] * f[j, 6]
+            heat += A[last, j] * f[j, 7]
+        out[HAND_WORK] = y[HAND_WORK] + h * work
+        out[HEAT] = y[HEAT] + h * heat
+    return evaluations
+
+
+@njit(cache=True, error_model="numpy")
+def stage_rates(V, h, rates):
+    """Rates (5, 3) of the rotation vector at the stages of a step of h seconds with velocities V there, for ``within``."""
+    _turns(V, h, np.zeros((STAGES, 3)), rates)
+
+
+@njit(cache=True, error_model="numpy")
+def within(y, h, V, rates, s, out):
+    """Variables at the part s of a step of h seconds from y, by its own polynomials, into out: order 5, at its end 9.
+
+    V (5, 6): velocities at the stages; rates: ``stage_rates``. Work and heat are left out.
+    """
+    tx, ty, tz, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    out[:] = 0.0
+    for j in range(STAGES):
+        value, integral = 0.0, 0.0
+        for k in range(STAGES - 1, -1, -1):
+            value = value * s + _POWERS[j, k]
+            integral = integral * s + _POWERS[j, k] / (k + 1)
+        integral *= s * h
+        tx, ty, tz = tx + integral * rates[j, 0], ty + integral * rates[j, 1], tz + integral * rates[j, 2]
+        dx, dy, dz = dx + integral * V[j, 3], dy + integral * V[j, 4], dz + integral * V[j, 5]
+        for k in range(3):
+            out[4 + k] += value * V[j, k]
+            out[10 + k] += value * V[j, 3 + k]
+    rx, ry, rz, less = _half_turn(tx, ty, tz)
+    a, b, c, e = multiply(y[0], y[1], y[2], y[3], rx, ry, rz, 1.0 + less)
+    out[0], out[1], out[2], out[3] = normalize(a, b, c, e)
+    out[7], out[8], out[9] = y[7] + dx, y[8] + dy, y[9] + dz

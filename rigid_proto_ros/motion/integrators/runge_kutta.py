@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""One step of an explicit Runge-Kutta method given by its tableau, on all variables of a segment at once.
+
+Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1. The quaternion is
+normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...base.compilation import njit
+from ...base.rotation import normalize
+from ..problem import HAS_STRING, HAS_WORLD_TORQUE, TRANSLATES
+from ..variables import VARIABLES
+from .equations import accelerations
+from .integrator import MAX_SPEED
+
+
+@njit(cache=True, error_model="numpy")
+def integrated(p):
+    """How many of the variables change: attitude and spin; with added motion also that; with a string also its energies."""
+    if p[HAS_STRING] != 0.0:
+        return VARIABLES
+    return 13 if p[TRANSLATES] != 0.0 else 7
+
+
+@njit(cache=True, error_model="numpy")
+def rates(z, p, taut, k):
+    """Time derivatives k of variables z, both (15,)."""
+    qx, qy, qz, qw = z[0], z[1], z[2], z[3]
+    wx, wy, wz = z[4], z[5], z[6]
+    k[0] = 0.5 * (qw * wx + qy * wz - qz * wy)
+    k[1] = 0.5 * (qw * wy - qx * wz + qz * wx)
+    k[2] = 0.5 * (qw * wz + qx * wy - qy * wx)
+    k[3] = -0.5 * (qx * wx + qy * wy + qz * wz)
+    if p[TRANSLATES] != 0.0 or p[HAS_WORLD_TORQUE] != 0.0:
+        qx, qy, qz, qw = normalize(qx, qy, qz, qw)
+    k[4], k[5], k[6], k[10], k[11], k[12], k[13], k[14] = accelerations(
+        qx, qy, qz, qw, wx, wy, wz, z[7], z[8], z[9], z[10], z[11], z[12], p, taut
+    )
+    k[7], k[8], k[9] = z[10], z[11], z[12]
+
+
+@njit(cache=True, error_model="numpy")
+def stages(y, p, h, taut, A, count, k, z):
+    """Fill the stage derivatives k (count, 15); k[0] must hold the rates at y. z (15,) is scratch."""
+    size = integrated(p)
+    for i in range(1, count):
+        for j in range(size):
+            z[j] = 0.0
+        for m in range(i):
+            a = A[i, m]
+            if a != 0.0:
+                for j in range(size):
+                    z[j] += a * k[m, j]
+        for j in range(size):
+            z[j] = y[j] + h * z[j]
+        rates(z, p, taut, k[i])
+
+
+@njit(cache=True, error_model="numpy")
+def advance(y, p, h, B, count, k, out):
+    """The new variables from the stages: out = y + h Σ bᵢ kᵢ with a unit quaternion."""
+    size = integrated(p)
+    for j in range(size):
+        total = 0.0
+        for i in range(count):
+            total += B[i] * k[i, j]
+        out[j] = y[j] + h * total
+    for j in range(size, VARIABLES):
+        out[j] = y[j]
+    out[0], out[1], out[2], out[3] = normalize(out[0], out[1], out[2], out[3])
+
+
+@njit(cache=True, error_model="numpy")
+def is_good(y):
+    """Finite and no runaway."""
+    size = 0.0
+    for j in range(4, 13):
+        size += abs(y[j])
+    # Negated sense, so that NaN counts as a runaway.
+    return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])

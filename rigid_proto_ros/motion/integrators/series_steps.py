@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""Steps by the power series of the whole motion, as long as the accuracy allows, with slack and taut found on the series.
+
+The length of a step is read off the coefficients (integrators/taylor_adaptive.py), so none is rejected. Where a pull-only string
+turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law, begun. A step is laid out at
+its full length first: a series from its start, and where the law changes within it a last one from that time on. It ends at
+a whole nanosecond, so that times of commands stay integers. Committing it and looking within it evaluate those same series.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...base.compilation import njit
+from ..problem import HAS_STRING, STIFFNESS
+from ..variables import HEAT, STORED
+from . import control as ctl
+from .error_measure import (
+    FLOOR,
+    WEIGHINGS,
+    heavier,
+    jump_of_displacement,
+    scales,
+    size,
+)
+from .first_root import NONE
+from .motion_series import COLUMNS, motion_at, motion_series, stretch_at
+from .runge_kutta import is_good
+from .string_law import PULLS, SHORTENS, is_one_sided, law_of, next_law
+from .taylor_adaptive import PART, step_length
+
+PART_ON_A_STRING = 0.1
+"""The same as taylor_adaptive.PART for a string, whose coefficients fall less evenly: the nearer the knot to its free end, the
+nearer the poles."""
+
+_MAX_PARTS = 200
+"""In one step, all but the first and last within one nanosecond; more is chatter, and the rest of the step is taken with one law."""
+
+
+@njit(cache=True, error_model="numpy")
+def rows(degree):
+    """Of a workspace: coefficients from the step's start, those of its last series, and the variables that one starts from."""
+    return 2 * (degree + 2) + 1
+
+
+def workspace(degree: int) -> np.ndarray:
+    """Room for the series, which stay there until the step is committed: every look before takes them once more."""
+    return np.zeros((rows(degree), COLUMNS))
+
+
+@njit(cache=True, error_model="numpy")
+def growth_of(c, degree, weights):
+    """σ from the last three coefficients: the largest k-th root of their measure."""
+    attitude, spin, place, speed = weights
+    growth = 0.0
+    for k in range(degree - 2, degree + 1):
+        a = size(c[k], attitude, spin, place, speed)
+        if a > 0.0:
+            growth = max(growth, math.exp(math.log(a) / k))
+    return growth
+
+
+@njit(cache=True, error_model="numpy")
+def _lay_out(y, p, control, weights, c):
+    """Series of one step from y into c and control; returns its length [ns], 0 when there is none. weights: of errors."""
+    degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
+    jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
+    part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
+    series, last = c, c[2 * (degree + 2)]
+    start = y
+    law = law_of(y, p)
+    control[ctl.LAW], control[ctl.SWITCH] = law, math.inf
+    gone = 0.0
+    parts = 0
+    while True:
+        if control[ctl.SERIES] == 0.0 or parts > 0:
+            motion_series(start, p, degree, law == PULLS, series)
+            control[ctl.PENDING] += 1.0
+        control[ctl.SERIES] = 1.0
+        parts += 1
+        # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much better.
+        allowance = part if law == PULLS else part / (1.0 + jerk_of_place)
+        h = step_length(growth_of(series, degree, weights), accuracy, degree, allowance)
+        if not h * 1e9 >= 1.0 or not is_good(series[1]):
+            return 0
+        if not is_one_sided(p) or parts >= _MAX_PARTS:
+            break
+        switch, after, h = next_law(series, p, degree, h, law, accuracy)
+        if switch == NONE:
+            break
+        before_ns = int(math.floor((gone + switch) * 1e9))
+        if parts > 1 and before_ns * 1e-9 > gone:
+            # One switch a step: each multiplies what the step has erred before it.
+            return before_ns
+        if parts == 1:
+            last[:STORED] = y
+            control[ctl.SWITCH] = switch
+        _move(series, p, degree, switch, law, last)
+        start, series = last, c[degree + 2 : 2 * (degree + 2)]
+        gone, law = gone + switch, after
+        control[ctl.LAST_START], control[ctl.LAST_LAW] = gone, law
+    length_ns = int(math.floor((gone + h) * 1e9))
+    # The last series must be of some use.
+    return length_ns if length_ns * 1e-9 > gone else length_ns + 1
+
+
+@njit(cache=True, error_model="numpy")
+def _reach(y, p, control, c, time_ns, out):
+    """The variables ``time_ns`` into the step that is laid out from y."""
+    degree, t = int(control[ctl.DEGREE]), time_ns * 1e-9
+    if t <= control[ctl.SWITCH]:
+        out[:] = y
+        _move(c, p, degree, t, control[ctl.LAW], out)
+    else:
+        out[:] = c[2 * (degree + 2)][:STORED]
+        _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control[ctl.LAST_START], control[ctl.LAST_LAW], out)
+
+
+@njit(cache=True, error_model="numpy")
+def _move(c, p, degree, h, law, out):
+    motion_at(c, p, degree, h, out)
+    if law == SHORTENS:
+        # Stretched but not pulling: the damper takes what is left of ½ k x².
+        before, after = max(stretch_at(c, p, degree, 0.0)[0], 0.0), max(stretch_at(c, p, degree, h)[0], 0.0)
+        out[HEAT] += 0.5 * p[STIFFNESS] * (before - after) * (before + after)
+
+
+@njit(cache=True, error_model="numpy")
+def _accept(y, p, control, following, c):
+    """Lay out the next step and take it into ``following``; returns whether there is one."""
+    elapsed = control[ctl.ELAPSED_NS]
+    weights = scales(y, p, elapsed * 1e-9)
+    length, good = 0, False
+    for _ in range(WEIGHINGS):
+        length = _lay_out(y, p, control, weights, c)
+        if length < 1:
+            return False
+        _reach(y, p, control, c, length, following)
+        good = is_good(following)
+        # The errors of velocities are measured by those at the end: where they fall within the step, that counts.
+        weights, more = heavier(scales(following, p, (elapsed + length) * 1e-9), weights)
+        if not (good and more):
+            break
+    if control[ctl.ACCURACY] * length * 1e-9 < FLOOR:
+        control[ctl.FLOOR_BINDS] = 1.0
+    control[ctl.ACCEPTED_NS] = length
+    return good
+
+
+@njit(cache=True, error_model="numpy")
+def steps(y, p, control, following, c, span_ns, look):
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
+
+    look: go span_ns into the step that waits instead, which is longer; returns 0 if that failed.
+    """
+    advanced = 0
+    while True:
+        if control[ctl.ACCEPTED_NS] == 0.0 and not _accept(y, p, control, following, c):
+            control[ctl.FAILED] = 1.0
+            return advanced
+        if look:
+            out = np.empty(STORED)
+            _reach(y, p, control, c, span_ns, out)
+            y[:] = out
+            return span_ns if is_good(y) else 0
+        length = int(control[ctl.ACCEPTED_NS])
+        if advanced + length > span_ns:
+            return advanced
+        y[:] = following
+        advanced += length
+        ctl.commit(control)

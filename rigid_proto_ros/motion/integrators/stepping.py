@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""How a segment is stepped: fixed steps, one exact step, nothing at all, or steps whose length follows from the error.
+
+All keep the same promise. ``commit`` commits only steps that are functions of the variables they start from; ``reach`` takes
+one shorter step from there on a copy. So neither depends on when anybody asked.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.compilation import njit
+from ...base.kernel_calls import (
+    ADAPTIVE_STEPS,
+    STEPS,
+    adaptive_steps_at,
+    address_of,
+    steps_at,
+)
+from . import control as ctl
+from .integrator import Integrator
+
+NOTHING, ONE_STEP, FIXED_STEPS, ADAPTIVE = range(4)
+"""Ways to step. ONE_STEP: a single one from the segment's start, however far: for exact maps. NOTHING: the variables stay."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to step, and the kernel that does it.
+
+    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, look), which commits steps, or looks;
+    control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of the equations
+    of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel. sleeps: nothing moves.
+    floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments with a string alone.
+    """
+
+    way: int
+    kernel: Callable | None
+    choice: Callable[[np.ndarray, float, float], str]
+    evaluations: int = 0
+    workspace: Callable[[int], np.ndarray] | None = None
+    sleeps: bool = False
+    floor_binds: bool = False
+    on_string: bool = False
+
+
+def fixed_steps(integrator: Integrator) -> tuple[Method, ...]:
+    """Steps of one length, counted from the segment's start; the second method is for a segment with a string."""
+
+    def choice(p: np.ndarray, step_s: float, accuracy: float) -> str:
+        return f"{integrator.name}: fixed steps of {step_s:g} s"
+
+    without = Method(FIXED_STEPS, integrator.kernel, choice, integrator.evaluations)
+    return without, replace(without, kernel=integrator.string_kernel or integrator.kernel, on_string=True)
+
+
+# A row of a table of methods.
+WAY, ADDRESS, EVALUATIONS, SLEEPS, ROWS, COLUMNS, METHOD = range(7)
+"""ADDRESS 0: not compiled yet. ROWS and COLUMNS of the workspace."""
+
+
+@functools.lru_cache(maxsize=256)
+def method_table(integrator: Integrator, degree: int) -> np.ndarray:
+    """The integrator's methods as compiled loops read them (n, METHOD); kernels have no address until they are wanted."""
+    table = np.zeros((len(integrator.methods), METHOD), np.int64)
+    for row, method in zip(table, integrator.methods, strict=True):
+        rows, columns = method.workspace(degree).shape if method.workspace else (0, 0)
+        row[:] = method.way, 0, method.evaluations, method.sleeps, rows, columns
+    return table
+
+
+def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> None:
+    """Compile a method's kernel, or load it from the cache, and put its address into the table."""
+    kernel, way = integrator.methods[number].kernel, table[number, WAY]
+    if way != NOTHING and table[number, ADDRESS] == 0:
+        table[number, ADDRESS] = address_of(kernel, ADAPTIVE_STEPS if way == ADAPTIVE else STEPS)
+
+
+@njit(cache=True, error_model="numpy")
+def is_provided(table, number):
+    """Whether the method's kernel can be called."""
+    return table[number, WAY] == NOTHING or table[number, ADDRESS] != 0
+
+
+@njit(cache=True, error_model="numpy")
+def commit(method, y, p, control, following, room, step_ns, span_ns):
+    """Commit steps in y that fit into ``span_ns``; returns how far it came [ns], how many were counted here, and whether
+    all were good. room: for the workspace, of any size that is enough.
+    """
+    if method[WAY] == FIXED_STEPS:
+        wanted = span_ns // step_ns
+        if wanted <= 0:
+            return 0, 0, True
+        done = steps_at(method[ADDRESS])(y, p, step_ns * 1e-9, wanted)
+        return done * step_ns, done, done == wanted
+    if method[WAY] == ADAPTIVE:
+        workspace = room[: method[ROWS] * method[COLUMNS]].reshape((method[ROWS], method[COLUMNS]))
+        advanced = adaptive_steps_at(method[ADDRESS])(y, p, control, following, workspace, span_ns, False)
+        return advanced, 0, control[ctl.FAILED] == 0.0
+    return 0, 0, True
+
+
+@njit(cache=True, error_model="numpy")
+def reach(method, y, p, control, following, room, rest_ns):
+    """One step of ``rest_ns`` in y, a copy; whether it was good."""
+    if method[WAY] == NOTHING:
+        return True
+    if method[WAY] == ADAPTIVE:
+        workspace = room[: method[ROWS] * method[COLUMNS]].reshape((method[ROWS], method[COLUMNS]))
+        steps = adaptive_steps_at(method[ADDRESS])
+        return steps(y, p, control, following, workspace, rest_ns, True) == rest_ns
+    return steps_at(method[ADDRESS])(y, p, rest_ns * 1e-9, 1) == 1

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""Which law a pull-only string obeys, and the first time at which it changes along a power series of the motion.
+
+It is slack while x = l − rest length ≤ 0; else it pulls while k x + c l' > 0; else it is stretched but shortens faster than its damper
+lets it pull. Each law ends where a polynomial rises above zero, and the first such time is found (integrators/first_root.py):
+slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial however near the knot passes its free end;
+the other two where the tension, or the stretch, changes sign, whose series are at hand.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...base.compilation import njit
+from ..problem import (
+    BILATERAL,
+    HAS_STRING,
+    REST_LENGTH,
+    STIFFNESS,
+    STRING_DAMPING,
+)
+from .equations import knot
+from .first_root import NONE, first_rise
+from .knot import knot_and_stretch
+from .motion_series import (
+    A_KNOT,
+    DISTANCE,
+    STRETCH,
+    TENSION,
+    distance_series,
+    stretch_at,
+)
+
+SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
+
+_AGREEMENT = 0.03
+_AGREEMENT_SLACK = 1e-3
+"""Times the root of the accuracy, of the tension's terms: by so much the series of the distance may differ from what the motion's
+series give, which converge where it may not. The law changes where the tension is zero, so that a tension of the
+wrong sign counts by its square. Less where the string doesn't pull: there the length of the step knows nothing of it."""
+
+_NEGLIGIBLE = 1e-19
+"""Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
+
+
+@njit(cache=True, error_model="numpy")
+def is_one_sided(p):
+    """Whether the string's law may change at all."""
+    return p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def law_of(y, p):
+    """The law at variables y."""
+    if not is_one_sided(p):
+        return PULLS
+    ax, ay, az, length, x = knot_and_stretch(y, p)
+    if x <= 0.0:
+        return SLACK
+    _, _, _, vx, vy, vz = knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
+    rate = (ax * vx + ay * vy + az * vz) / length
+    return PULLS if p[STIFFNESS] * x + p[STRING_DAMPING] * rate > 0.0 else SHORTENS
+
+
+@njit(cache=True, error_model="numpy")
+def next_law(c, p, degree, h, law, accuracy):
+    """When within h seconds the law first changes, NONE for never; the one that follows; and how far of h that is known."""
+    if law == SLACK:
+        return _tautens(c, p, degree, h), PULLS, h
+    g = np.empty(degree + 1)
+    tolerance = math.sqrt(accuracy) * (_AGREEMENT if law == PULLS else _AGREEMENT_SLACK)
+    if law == SHORTENS:
+        distance_series(c, degree)
+    while True:
+        if law == PULLS:
+            power = 1.0
+            for k in range(degree):
+                g[k] = -c[k, TENSION] * power
+                power *= h
+            g[0] = min(g[0], 0.0)
+            time, after = first_rise(g, degree - 1), SHORTENS if p[STRING_DAMPING] > 0.0 else SLACK
+            told = time if time == NONE else time * h
+        else:
+            time, after = _stops_shortening(c, p, degree, h, g)
+            told = h if time == NONE else time * h
+        if told == NONE or _converges(c, p, degree, told, tolerance):
+            return NONE if time == NONE else time * h, after, h
+        h = 0.5 * told
+
+
+@njit(cache=True, error_model="numpy")
+def _tautens(c, p, degree, h):
+    """When |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
+    rest = p[REST_LENGTH]
+    reach, power, last = c[0, DISTANCE], 1.0, 0
+    for k in range(1, degree + 1):
+        power *= h
+        x, y, z = abs(c[k, A_KNOT]), abs(c[k, A_KNOT + 1]), abs(c[k, A_KNOT + 2])
+        if x + y + z > 0.0:
+            reach += (x + y + z) * power
+            last = k
+    if reach < rest:
+        return NONE
+    a = np.empty((last + 1, 3))
+    power = 1.0
+    for k in range(last + 1):
+        for j in range(3):
+            a[k, j] = c[k, A_KNOT + j] * power
+        power *= h
+    g = np.zeros(2 * last + 1)
+    for i in range(last + 1):
+        x, y, z = a[i]
+        for j in range(last + 1):
+            g[i + j] += x * a[j, 0] + y * a[j, 1] + z * a[j, 2]
+    # l² − rest² from the stretch, which is known to more digits than l.
+    x = min(c[0, STRETCH], 0.0)
+    g[0] = x * (2.0 * rest + x)
+    left_out, top = 0.0, 2 * last
+    while top > 2:
+        left_out += abs(g[top])
+        if left_out > _NEGLIGIBLE * rest * rest:
+            break
+        top -= 1
+    time = first_rise(g, top)
+    return time if time == NONE else time * h
+
+
+@njit(cache=True, error_model="numpy")
+def _stops_shortening(c, p, degree, h, g):
+    """At which part of h the string's stretch is gone or it begins to pull, whichever is first, and the law after that."""
+    power = 1.0
+    for k in range(1, degree + 1):
+        power *= h
+        g[k] = -c[k, DISTANCE] * power
+    g[0] = -max(c[0, STRETCH], 0.0)
+    gone = first_rise(g, degree)
+    # It pulls before its stretch is gone, or not at all.
+    end = h if gone == NONE else gone * h
+    power = 1.0
+    for k in range(degree):
+        x = c[k, DISTANCE] if k > 0 else c[0, STRETCH]
+        g[k] = (p[STIFFNESS] * x + p[STRING_DAMPING] * (k + 1) * c[k + 1, DISTANCE]) * power
+        power *= end
+    g[0] = min(g[0], 0.0)
+    pulls = first_rise(g, degree - 1)
+    if pulls == NONE:
+        return gone, SLACK
+    return pulls * end / h, PULLS
+
+
+@njit(cache=True, error_model="numpy")
+def _converges(c, p, degree, t, tolerance):
+    """Whether the series of the knot's distance gives the tension that the motion's series give."""
+    stiffness, damping = p[STIFFNESS], p[STRING_DAMPING]
+    tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0
+    for k in range(1, degree + 1):
+        slope = damping * k * c[k, DISTANCE] * power
+        power *= t
+        spring = stiffness * c[k, DISTANCE] * power
+        tension += slope + spring
+        terms += abs(slope) + abs(spring)
+    x, rate = stretch_at(c, p, degree, t)
+    wrong = abs(stiffness * x + damping * rate - tension)
+    speed = abs(c[1, A_KNOT]) + abs(c[1, A_KNOT + 1]) + abs(c[1, A_KNOT + 2])
+    return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed

@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: MIT
+"""Forces and torques on the body, and their sum as an integrator takes it.
+
+Three kinds of load differ on a turning body: a torque fixed in the world, a world force at a point of the body, and a force
+that turns with the body. Any number of each sums to the same few vectors, because the torque of world forces Fᵢ at body
+points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial vector of M R.
+
+What a load does is compiled, once: live flights, offline ones and sweeps call the functions here on a load's row.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import struct
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba import boolean, float64
+
+from ..base.compilation import njit
+from ..base.errors import CommandRefused
+from ..base.kernel_calls import entry_of
+from ..base.rotation import matrix_elements
+from . import body as of_body
+from .body import Body
+from .frames import Frame, point_text
+from .state import State
+from .surface import Surface
+
+MAX_ACCELERATION = 1e15
+"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it would leave no digits."""
+
+# Where the sums of loads stand in one row of LOADS_SIZE doubles.
+FORCE_WORLD = 0  # (3,) [N]
+FORCE_BODY = 3  # (3,) [N]
+TORQUE_WORLD = 6  # (3,) [N m]
+TORQUE_BODY = 9  # (3,) [N m]
+MOMENT = 12  # (9,) M row by row [N m]
+LOADS_SIZE = 21
+
+# Where the numbers of one load stand in its row of LOAD doubles.
+LOAD_AXES = 0
+WORLD_AXES, BODY_AXES, NORMAL_AXES = 0.0, 1.0, 2.0
+HAS_POINT = 1
+POINT = 2  # (3,) [mesh coordinates]
+FORCE = 5  # (3,) [N, or N s]
+TORQUE = 8  # (3,) [N m, or N m s]
+NORMAL = 11  # (3,) inward, of the unscaled mesh
+LOAD = 14
+
+_AXES = ("world", "body", "normal")
+_AXES_NUMBERS = {"world": WORLD_AXES, "body": BODY_AXES, "normal": NORMAL_AXES}
+_ROW = struct.Struct("=14d")
+_ORIGIN = (0.0, 0.0, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def arm_of(load, body):
+    """From the COM to the point of attack [m, body axes]: three numbers."""
+    if load[HAS_POINT] == 0.0:
+        return 0.0, 0.0, 0.0
+    return of_body.arm(body, load[POINT], load[POINT + 1], load[POINT + 2])
+
+
+@njit(cache=True, error_model="numpy")
+def own_force(load, body):
+    """The force in body axes, of a load whose axes turn with the body: three numbers."""
+    f = load[FORCE]
+    if load[LOAD_AXES] == NORMAL_AXES:
+        x, y, z = of_body.normal(body, load[NORMAL], load[NORMAL + 1], load[NORMAL + 2])
+        return f * x, f * y, f * z
+    return f, load[FORCE + 1], load[FORCE + 2]
+
+
+@njit(cache=True, error_model="numpy")
+def _bound(x, y, z):
+    """√3 times the largest component: not below the length, and without its overflow."""
+    return 1.7320508075688772 * max(abs(x), abs(y), abs(z))
+
+
+@njit(cache=True, error_model="numpy")
+def magnitudes(load, body):
+    """Bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes: by |r||F| and the smallest moment."""
+    force = _bound(load[FORCE], load[FORCE + 1], load[FORCE + 2])
+    torque = _bound(load[TORQUE], load[TORQUE + 1], load[TORQUE + 2])
+    if load[HAS_POINT] != 0.0:
+        x, y, z = arm_of(load, body)
+        torque += _bound(x, y, z) * force
+    return force / body[of_body.MASS], torque / body[of_body.MOMENTS]
+
+
+@njit(cache=True, error_model="numpy")
+def is_within_magnitude(load, body):
+    """Whether both stay within MAX_ACCELERATION; an overflow to NaN doesn't."""
+    linear, angular = magnitudes(load, body)
+    return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
+
+
+@functools.cache
+def _within_magnitude() -> Callable:
+    return entry_of(is_within_magnitude, boolean(float64[::1], float64[::1]))
+
+
+@njit(cache=True, error_model="numpy")
+def is_zero(load):
+    """Whether there is neither force nor torque."""
+    return not load[FORCE : FORCE + 6].any()
+
+
+@njit(cache=True, error_model="numpy")
+def share_of(load, body, share):
+    """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r Fᵀ of a world force."""
+    share[:] = 0.0
+    rx, ry, rz = arm_of(load, body)
+    tx, ty, tz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
+    if load[LOAD_AXES] == WORLD_AXES:
+        for j in range(3):
+            f = load[FORCE + j]
+            share[FORCE_WORLD + j] = f
+            if load[HAS_POINT] != 0.0:
+                share[MOMENT + j], share[MOMENT + 3 + j], share[MOMENT + 6 + j] = rx * f, ry * f, rz * f
+        share[TORQUE_WORLD], share[TORQUE_WORLD + 1], share[TORQUE_WORLD + 2] = tx, ty, tz
+        return
+    fx, fy, fz = own_force(load, body)
+    if load[HAS_POINT] != 0.0:
+        tx, ty, tz = tx + (ry * fz - rz * fy), ty + (rz * fx - rx * fz), tz + (rx * fy - ry * fx)
+    share[FORCE_BODY], share[FORCE_BODY + 1], share[FORCE_BODY + 2] = fx, fy, fz
+    share[TORQUE_BODY], share[TORQUE_BODY + 1], share[TORQUE_BODY + 2] = tx, ty, tz
+
+
+@njit(cache=True, error_model="numpy")
+def apply_impulse(load, body, row):
+    """What an impulse does to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
+    a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
+    hx, hy, hz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
+    if load[LOAD_AXES] == WORLD_AXES:
+        jx, jy, jz = load[FORCE], load[FORCE + 1], load[FORCE + 2]
+        fx, fy, fz = a * jx + d * jy + g * jz, b * jx + e * jy + h * jz, c * jx + f * jy + i * jz
+        hx, hy, hz = a * hx + d * hy + g * hz, b * hx + e * hy + h * hz, c * hx + f * hy + i * hz
+    else:
+        fx, fy, fz = own_force(load, body)
+        jx, jy, jz = a * fx + b * fy + c * fz, d * fx + e * fy + f * fz, g * fx + h * fy + i * fz
+    if load[HAS_POINT] != 0.0:
+        rx, ry, rz = arm_of(load, body)
+        hx, hy, hz = hx + (ry * fz - rz * fy), hy + (rz * fx - rx * fz), hz + (rx * fy - ry * fx)
+    if jx != 0.0 or jy != 0.0 or jz != 0.0:
+        row[7] += jx / body[of_body.MASS]
+        row[8] += jy / body[of_body.MASS]
+        row[9] += jz / body[of_body.MASS]
+    if hx != 0.0 or hy != 0.0 or hz != 0.0:
+        x, y, z = of_body.angular_acceleration(body, hx, hy, hz)
+        row[10] += x
+        row[11] += y
+        row[12] += z
+
+
+class Load(NamedTuple):
+    """One command's wrench, its point settled on the body.
+
+    axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,): the
+    inward normal there, for ``normal``. force [N, or N s for an impulse], torque about the point [N m, or N m s].
+    """
+
+    axes: str
+    mesh_point: tuple[float, float, float] | None
+    force: tuple[float, float, float]
+    torque: tuple[float, float, float]
+    mesh_normal: tuple[float, float, float] | None = None
+
+    @property
+    def is_zero(self) -> bool:
+        return not (any(self.force) or any(self.torque))
+
+    @property
+    def packed(self) -> bytes:
+        """The load's row (LOAD,) as bytes."""
+        axes, point, force, torque, normal = self
+        return _ROW.pack(
+            _AXES_NUMBERS[axes], point is not None, *(point or _ORIGIN), *force, *torque, *(normal or _ORIGIN)
+        )
+
+    @property
+    def row(self) -> np.ndarray:
+        """The load as compiled functions read it (LOAD,)."""
+        return np.frombuffer(self.packed).copy()
+
+    @property
+    def frame_id(self) -> str:
+        """The settled frame: world or body axes, and the point in mesh coordinates."""
+        axes = "world" if self.axes == "world" else "body"
+        point = ("com",) if self.mesh_point is None else ("point", self.mesh_point)
+        return f"{axes}@{point_text(point)}"
+
+    def arm(self, body: Body) -> np.ndarray:
+        """From the COM to the point of attack (3,) [m, body axes]."""
+        return np.array(arm_of(self.row, body.row))
+
+    def force_body(self, body: Body, state: State) -> np.ndarray:
+        """The force (3,) in body axes at this state."""
+        if self.axes == "world":
+            return _transposed_times(state.rotation, np.asarray(self.force))
+        return self.own_force(body)
+
+    def own_force(self, body: Body) -> np.ndarray:
+        """The force (3,) in body axes, of a load whose axes turn with the body."""
+        return np.array(own_force(self.row, body.row))
+
+    def check_magnitude(self, body: Body) -> None:
+        """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
+        row = np.frombuffer(self.packed)
+        if not _within_magnitude()(row, body.row):
+            linear, angular = magnitudes(row, body.row)
+            raise CommandRefused(
+                "magnitude",
+                "wrench",
+                f"{linear:.3g} m/s2 and {angular:.3g} rad/s2",
+                f"at most {MAX_ACCELERATION:g} of each for a body of {body.mass:g} kg",
+            )
+
+
+def load_of_row(row: np.ndarray) -> Load:
+    """The load whose row (LOAD,) this is."""
+    return load_of_bytes(row.tobytes())
+
+
+def load_of_bytes(row: bytes) -> Load:
+    """The load whose row these are."""
+    axes, has_point, *numbers = _ROW.unpack(row)
+    point, force, torque, normal = (tuple(numbers[k : k + 3]) for k in range(0, 12, 3))
+    named = _AXES[int(axes)]
+    return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
+
+
+class LoadSum:
+    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F world).
+
+    All are parts of ``values`` (LOADS_SIZE,), in the order of ``share_of``.
+    """
+
+    def __init__(self, values: np.ndarray | None = None) -> None:
+        self.values = np.zeros(LOADS_SIZE) if values is None else values
+        self.force_world = self.values[FORCE_WORLD : FORCE_WORLD + 3]
+        self.force_body = self.values[FORCE_BODY : FORCE_BODY + 3]
+        self.torque_world = self.values[TORQUE_WORLD : TORQUE_WORLD + 3]
+        self.torque_body = self.values[TORQUE_BODY : TORQUE_BODY + 3]
+        self.moment = self.values[MOMENT:].reshape(3, 3)
+
+
+def light_amount(body: Body) -> float:
+    """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh coordinates."""
+    largest = max(*map(abs, body.scale.tolist()), *map(abs, body.center_of_mass.tolist()))
+    return 0.1 * MAX_ACCELERATION * min(body.mass, float(body.principal_moments[0]) / (1.0 + 3.0 * largest))
+
+
+def light_row(frame: Frame, force, torque, most: float) -> bytes:
+    """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its amount no more
+    than ``most`` (of ``light_amount``). Empty for any other: ``settle`` says what it is, or what is wrong with it.
+    """
+    word, axes = frame.point[0], frame.axes
+    fx, fy, fz = force
+    tx, ty, tz = torque
+    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
+    if axes == "normal":
+        return b""
+    if word == "com":
+        has_point, x, y, z = 0.0, 0.0, 0.0, 0.0
+    elif word == "point":
+        has_point, (x, y, z) = 1.0, frame.point[1]
+    else:
+        return b""
+    # Of what isn't finite this doesn't hold.
+    if amount * (1.0 + abs(x) + abs(y) + abs(z)) <= most:
+        return _ROW.pack(_AXES_NUMBERS[axes], has_point, x, y, z, fx, fy, fz, tx, ty, tz, 0.0, 0.0, 0.0)
+    return b""
+
+
+def settle(
+    frame: Frame, force, torque, body: Body, surface: Surface | None, contacts: dict, state: State | None
+) -> Load:
+    """Settle a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
+
+    state None leaves a ray unsettled: it is checked again when it takes effect.
+    """
+    force, torque = tuple(map(float, force)), tuple(map(float, torque))
+    # Of finite numbers a sum that isn't finite overflowed; only then each is looked at.
+    if not math.isfinite(sum(force) + sum(torque)) and not all(map(math.isfinite, (*force, *torque))):
+        raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
+    if frame.axes != "normal":
+        return Load(frame.axes, _mesh_point(frame, body, surface, contacts, state), force, torque)
+    if any(force[1:]) or any(torque):
+        raise CommandRefused("frame", "wrench", [*force, *torque], "force.x alone in normal axes")
+    mesh_point = _mesh_point(frame, body, surface, contacts, state)
+    mesh_normal = None
+    if mesh_point is not None:
+        if surface is None:
+            raise CommandRefused("frame", "frame_id", frame.text, "normal axes only on a body with a mesh")
+        normal = surface.inward_normal(mesh_point)
+        if not normal.any():
+            raise CommandRefused("frame", "frame_id", frame.text, "a point where the surface has a normal")
+        mesh_normal = tuple(float(n) for n in normal)
+    return Load(frame.axes, mesh_point, force, torque, mesh_normal)
+
+
+def _mesh_point(frame, body, surface, contacts, state):
+    word, *values = frame.point
+    if word == "com":
+        return None
+    if word == "origin":
+        return (0.0, 0.0, 0.0)
+    if word == "contact":
+        return tuple(float(x) for x in contacts[values[0]])
+    if word == "point":
+        return values[0]
+    if surface is None:
+        raise CommandRefused("frame", "frame_id", frame.text, "this point only on a body with a mesh")
+    if word == "vertex":
+        if values[0] >= len(surface.vertices):
+            raise CommandRefused("frame", "frame_id", frame.text, f"vertex/0 to vertex/{len(surface.vertices) - 1}")
+        return tuple(float(x) for x in surface.vertices[values[0]])
+    if state is None:
+        return None
+    R = state.rotation
+    origin = body.mesh_point(_transposed_times(R, np.asarray(values[0]) - state.position))
+    direction = _transposed_times(R, np.asarray(values[1]) / np.abs(values[1]).max()) / body.scale
+    hit = surface.ray_hit(origin, direction)
+    if hit is None:
+        raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
+    return tuple(float(x) for x in hit[0])
+
+
+def cross(a, b) -> np.ndarray:
+    """a × b of two (3,) arrays."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _transposed_times(R, v) -> np.ndarray:
+    return R[0] * v[0] + R[1] * v[1] + R[2] * v[2]

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Recorded sessions in whatever file they lie: read, repaired, and played into another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+from ..base.errors import InputError
+from ..base.output_file import output_file
+from ..scene.scenario import Scenario
+from ..session.playback import play
+from ..session.recorded_session import RecordedSession
+from .recorder import make_recorder
+
+
+def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
+    """The runs of a session, the newest last: an .rrd or .mcap recording, or a bag of ``ros2 bag record``.
+
+    node chooses the body in a bag with several. Raises InputError for what isn't there or can't be decoded.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("session", str(path), "an .rrd or .mcap recording, or the folder of a bag")
+    if not is_bag(path):
+        return [_rerun_reader(path).read_session(path)]
+    bags = _bag_reader(path)
+    from ..session.runs import is_session_topic, session_runs
+
+    return session_runs(bags.read_bag(path, is_session_topic), path, node)
+
+
+def repair(path: str | Path, repaired: str | Path) -> None:
+    """Write a whole file with all that is whole in a session that was cut; InputError where that can't be."""
+    path, repaired = Path(path), Path(repaired)
+    bag = path.exists() and is_bag(path)
+    ending = ".mcap" if bag else ".rrd"
+    if repaired.suffix != ending:
+        raise InputError("--repair", str(repaired), f"a file that ends in {ending}, as the session's kind does")
+    if repaired.exists() and path.exists() and repaired.samefile(path):
+        raise InputError("--repair", str(repaired), "another file than the one that is repaired")
+    output_file("--repair", repaired)
+    if not bag:
+        from .rrd_file import repair as repair_rrd
+
+        repair_rrd(path, repaired)
+        return
+    bags = _bag_reader(path)
+    files = bags.bag_files(path)
+    if len(files) > 1:
+        raise InputError("--repair", f"the bag has {len(files)} files; name one of them")
+    bags.repair_mcap(bags.bag_bytes(files[0]), repaired, str(files[0]))
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is to be read as a bag: a folder, or a file that begins as an MCAP file does, or is named so."""
+    if path.is_dir() or ".mcap" in path.suffixes:
+        return True
+    try:
+        with open(path, "rb") as stream:
+            return stream.read(5) == b"\x89MCAP"
+    except OSError:
+        return False
+
+
+def _bag_reader(path: Path) -> ModuleType:
+    try:
+        from ..session import bag as session_bag
+    except ImportError as error:
+        raise InputError("session", str(path), f"mcap to be installed: pip install mcap ({error})") from None
+    return session_bag
+
+
+def _rerun_reader(path: Path) -> ModuleType:
+    if find_spec("rerun") is None:
+        raise InputError("session", str(path), "rerun to be installed: pip install rerun-sdk")
+    from . import reader
+
+    return reader
+
+
+def record(
+    runs: list[RecordedSession],
+    path: str | Path,
+    given: Scenario | None = None,
+    progress: Callable[[float, float], None] = lambda done, total: None,
+) -> None:
+    """Play all runs of a session into a recording, .rrd or .mcap; given: the scene of a session that lacks it. ``progress`` is
+    called with (states told, all states).
+
+    Raises InputError for a session without a scene and a file that can't be written.
+    """
+    for session in runs:
+        if not session.scene and given is None:
+            raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
+    recorder = make_recorder(str(path), runs[-1].node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
+    total = sum(len(session.times) for session in runs)
+    before = 0
+    try:
+        for number, session in enumerate(runs):
+            if number:
+                recorder.reset()
+            play(session, recorder, given, lambda done, _, before=before: progress(before + done, total))
+            before += len(session.times)
+    finally:
+        recorder.close()
+    if error := getattr(recorder, "error", ""):
+        raise InputError("--record", str(path), f"a file that can be written ({error})")

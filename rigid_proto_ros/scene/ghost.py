@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""The ghost: a second body that gets the same commands under another tensor or integrator, to be seen beside the first.
+
+True against box, exact against rk4: where the two part is the lesson. It never acts back, and a run without a viewer
+doesn't carry it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..base.errors import InputError
+from ..simulation.commands import Change, Command, Listed
+from ..simulation.observer import Observer
+from ..simulation.simulation import Simulation
+from .scenario import Scenario
+
+
+class Refusals(Observer):
+    """Hears of commands that a ghost's simulation refused when they came to act: on_refusal(text)."""
+
+    def __init__(self, on_refusal: Callable[[str], None]) -> None:
+        self._on_refusal = on_refusal
+
+    def refused(self, time_ns: int, reason: str, message: str) -> None:
+        """A command was refused."""
+        self._on_refusal(message)
+
+
+class Ghost:
+    """The simulation of ``scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told of what the
+    ghost can't carry, once until the next reset.
+    """
+
+    def __init__(self, scenario: Scenario, observer: Observer) -> None:
+        self.simulation = Simulation(scenario.ghost, Refusals(self._goes_without))
+        self._observer = observer
+        self._shown = True
+        self._refused = False
+
+    def announce(self) -> None:
+        """Tell the observer what the ghost is."""
+        self._observer.ghost_began(self.simulation.time_ns, self.simulation.snapshot())
+
+    def watch(self, observer: Observer) -> None:
+        """Tell another observer from now on."""
+        self._observer = observer
+        self.announce()
+
+    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
+        """Take a command of the followed simulation; what the ghost can't carry passes it by, and the observer is told."""
+        if isinstance(command, Change):
+            return  # ``change`` brings its own setup
+        # A change before it in its list may allow what the present setup doesn't: then it is judged when it acts.
+        judged = None if listed is None else (b"", self.simulation.setup)
+        try:
+            self.simulation.submit(command, when_ns, listed, judged)
+        except InputError as error:
+            self._goes_without(str(error))
+
+    def _goes_without(self, reason: str) -> None:
+        if self._shown and not self._refused:
+            self._refused = True
+            self._observer.refused(self.simulation.time_ns, "ghost", f"the ghost goes on without a command: {reason}")
+
+    def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
+        """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one out of
+        sight.
+        """
+        setup = scenario.ghost
+        self._shown = setup is not None
+        if setup is not None:
+            self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
+            self._observer.ghost_began(time_ns, self.simulation.snapshot(setup))
+
+    def reset(self, scenario: Scenario) -> None:
+        """Time 0 and the initial state."""
+        self.simulation.reset(scenario.ghost)
+        self._refused = False
+        self.announce()
+
+    def advance(self, until_ns: int) -> None:
+        """Carry the ghost along and tell the observer where it is."""
+        state = self.simulation.advance(until_ns)
+        if self._shown and not self.simulation.failure:
+            self._observer.ghost_state(until_ns, state.row)
+
+
+def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | None) -> Ghost | None:
+    """The ghost that a scenario asks for, following the simulation; None when nobody would see it."""
+    if scenario.ghost is None or observer is None:
+        return None
+    ghost = Ghost(scenario, observer)
+    simulation.follower = ghost
+    ghost.announce()
+    return ghost

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""Lessons: the bundled scenes, each with a title, three sentences of what to try and what to see, and why.
+
+All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the three sentences,
+the reason, and how to fly it. Pages and documents take it from there.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..base.bundled import scene_names, scene_path
+from ..base.errors import InputError
+
+SENTENCES = 3
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """name: of the scene. sentences: what to try and what to see. reason: why, in a paragraph. commands: how to fly it.
+    script: name of the bundled example that goes with it, or empty.
+    """
+
+    name: str
+    title: str
+    sentences: tuple[str, ...]
+    reason: str
+    commands: str
+    script: str
+    path: Path
+
+
+def lessons() -> list[Lesson]:
+    """All bundled lessons, by name."""
+    return [lesson(name) for name in scene_names()]
+
+
+def lesson(name: str) -> Lesson:
+    """The lesson of a bundled scene; raises InputError for one that is none, or whose head isn't a lesson's."""
+    path = scene_path(name)
+    return read_lesson(path)
+
+
+def read_lesson(path: Path) -> Lesson:
+    """The lesson at the head of a scene file; raises InputError."""
+    head: list[str] = []
+    for line in path.read_text("utf-8").splitlines():
+        if not line.startswith("#"):
+            break
+        head.append(line.removeprefix("#").strip())
+    paragraphs = [" ".join(part.split("\n")) for part in "\n".join(head).split("\n\n")]
+    if len(paragraphs) < 5:
+        accepted = "a comment of five paragraphs: licence, title, three sentences, reason, how to fly it"
+        raise InputError(str(path), f"{len(paragraphs)} paragraphs", accepted)
+    _, title, trials, *reasons, commands = paragraphs
+    sentences = tuple(re.split(r"(?<=[.!?]) (?=[A-Z])", trials))
+    if len(sentences) != SENTENCES:
+        raise InputError(str(path), f"{len(sentences)} sentences", f"{SENTENCES} on what to try and what to see")
+    script = re.search(r"msg_examples/(\w+)\.yaml", commands)
+    return Lesson(path.stem, title, sentences, " ".join(reasons), commands, script[1] if script else "", path)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""A scene and a script without ROS: the very steps that the node takes, as fast as the machine goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from ..base.bundled import scene_names, scene_path
+from ..base.errors import CommandRefused, InputError
+from ..base.nearest_name import did_you_mean
+from ..base.progress import Progress
+from ..simulation.observer import Observer
+from ..simulation.simulation import Simulation, judge
+from .command_codec import ScriptCommand, core_command
+from .ghost import ghost_of
+from .parameters import is_ros_parameter, parameter_named
+from .scenario import Scenario, make_scenario, publication_ns
+from .scene_file import read_scene_file, scalar
+from .script import with_contacts
+
+
+def scene_file(name: str) -> Path:
+    """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
+    path = Path(name)
+    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
+        return scene_path(name.removesuffix(".yaml"))
+    if not path.exists():
+        hint = did_you_mean(Path(name).stem, scene_names())
+        known = f"the bundled scenes are {', '.join(scene_names())}"
+        raise InputError(
+            "scene", f"there is no file and no bundled scene {name!r}; {' '.join(filter(None, [hint, known]))}"
+        )
+    return path
+
+
+def read_scene(
+    name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print
+) -> Scenario:
+    """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
+
+    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the settings
+    sets the scene's mass, which would win, to 0, as it does in flight.
+    """
+    values = {**scene_values(scene_file(name), warn), **(settings or {})}
+    if settings and "density" in settings and "mass" not in settings:
+        values["mass"] = 0.0
+    return make_scenario(values)
+
+
+def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, object]:
+    """The parameters that a scene file gives this node; unknown names as ``read_scene`` has it."""
+    scene = read_scene_file(path)
+    values: dict[str, object] = {}
+    for parameter, value in scene.values.items():
+        if is_ros_parameter(parameter):
+            continue
+        try:
+            parameter_named(parameter)
+        except InputError as error:
+            if parameter not in scene.wildcard:
+                raise InputError(f"{path}, {parameter}", error.received, error.accepted) from None
+            warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
+            continue
+        values[parameter] = value
+    return values
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """``name=value`` with the value typed as on a ROS command line."""
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InputError("--set", text, "name=value")
+    return name.strip(), scalar(value.strip())
+
+
+def tell_start(observer: Observer, scenario: Scenario) -> None:
+    """Tell an observer what flies."""
+    mesh = scenario.body_mesh
+    if mesh is None:
+        observer.started(scenario.text, None, None, "")
+    else:
+        observer.started(scenario.text, mesh.surface.vertices, mesh.surface.triangles, mesh.mesh.sha256)
+
+
+class OfflineRun:
+    """A simulation with its script submitted; ``advance`` carries it from publication to publication."""
+
+    def __init__(self, scenario: Scenario, script: list[ScriptCommand] | None = None, observer: Observer | None = None):
+        self.scenario = scenario
+        self.observer = observer
+        self.simulation = Simulation(scenario.setup, observer)
+        self._next_publication = 0
+        if observer is not None:
+            tell_start(observer, scenario)
+            self.simulation.announce()
+        self._ghost = ghost_of(scenario, self.simulation, observer)
+        script = with_contacts(script or [], scenario.setup.contacts)
+        planned = scenario
+        for number, command in enumerate(script):
+            try:
+                core = core_command(command, command.t_ns, scenario.setup.contacts, self._apply_changes)
+                # A command is judged in the scene that the script has made by then.
+                if command.kind == "set":
+                    planned = planned.with_changes(command.changes)
+                judged = (judge(core, planned.setup), planned.setup)
+                self.simulation.submit(core, command.t_ns, (b"", number), judged)
+            except CommandRefused as refusal:
+                raise InputError(
+                    f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
+                ) from None
+
+    def _apply_changes(self, changes: dict):
+        self.scenario = self.scenario.with_changes(changes)
+        if self.observer is not None:
+            self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
+        if self._ghost is not None:
+            self._ghost.change(self.simulation.time_ns, self.scenario, self.simulation.listed)
+        return self.scenario.setup
+
+    def advance(self, until_ns: int) -> bool:
+        """Carry the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
+        if self.observer is not None:
+            rate = self.scenario.values["publish_rate"]
+            while (next_ns := publication_ns(self._next_publication, rate)) <= until_ns:
+                state = self.simulation.advance(next_ns)
+                if self.simulation.failure:
+                    return False
+                self.observer.state(next_ns, state.row)
+                self.simulation.tell_status()
+                if self._ghost is not None:
+                    self._ghost.advance(next_ns)
+                self._next_publication += 1
+        self.simulation.advance(until_ns)
+        return not self.simulation.failure
+
+
+def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
+    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s]."""
+    start = time.perf_counter()
+    with Progress(f"simulating {duration_ns / 1e9:g} s") as progress:
+        for part in range(1, 101):
+            if not run.advance(duration_ns * part // 100):
+                break
+            progress.fraction(part, 100)
+    return time.perf_counter() - start
+
+
+def summary(run: OfflineRun, wall_time: float) -> dict:
+    """What ``simulate --json`` prints: the final state, energies and what the run cost."""
+    simulation = run.simulation
+    state = simulation.state
+    return {
+        "time_ns": state.time_ns,
+        "position": state.position.tolist(),
+        "orientation_xyzw": state.orientation_xyzw.tolist(),
+        "linear_velocity": state.linear_velocity.tolist(),
+        "angular_velocity": state.angular_velocity.tolist(),
+        "angular_velocity_body": state.angular_velocity_body.tolist(),
+        "kinetic_energy": simulation.kinetic_energy,
+        "potential_energy": simulation.potential_energy,
+        "angular_momentum": simulation.angular_momentum.tolist(),
+        "integrator": simulation.setup.integrator.name,
+        "steps": simulation.steps,
+        "force_evaluations": simulation.force_evaluations,
+        "wall_time": wall_time,
+        "state_hash": state.sha256(),
+    }

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: MIT
+"""Scene files: ROS parameter files, read without ROS and typed as rcl types them.
+
+A scene is the same file that starts the node with ``--params-file``. Plain scalars are a bool, an integer (also 0x10
+and 010), a double (also 1e-3, .inf, nan) or else text; quoted ones are text; a list must hold one type, as rcl wants it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+
+from ..base.errors import InputError
+
+_TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
+_FALSE = {"N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
+_INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
+_DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
+_SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
+_HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\Z")
+
+MAX_BYTES = 16 << 20
+"""Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Without aliases, which rcl doesn't read either: one that holds itself has no end."""
+
+    def compose_node(self, parent, index):
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            raise yaml.MarkedYAMLError(problem=f"the alias *{event.anchor}", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
+
+
+@dataclass
+class SceneFile:
+    """values: parameters by name for the node; wildcard: names that only ``/**`` sections gave."""
+
+    values: dict[str, object] = field(default_factory=dict)
+    wildcard: set[str] = field(default_factory=set)
+
+
+def scalar(text: str):
+    """A plain YAML scalar as rcl types it."""
+    if text in _TRUE:
+        return True
+    if text in _FALSE:
+        return False
+    if _INTEGER.match(text):
+        digits = text.lstrip("+-")
+        base = 16 if digits[:2] in ("0x", "0X") else 8 if digits[0] == "0" and len(digits) > 1 else 10
+        try:
+            value = int(digits, base) * (-1 if text[0] == "-" else 1)
+        except ValueError:  # 09 is no octal number; strtod then reads it as 9.0
+            return float(text)
+        return value if -(1 << 63) <= value < 1 << 63 else float(value)
+    if _DOUBLE.match(text):
+        value = float(text)
+        return text if math.isinf(value) else value  # out of a double's range: rcl keeps the text
+    if _SPECIAL.match(text):
+        return float(text.replace(".", ""))
+    if _HEX_DOUBLE.match(text):
+        try:
+            return float.fromhex(text)
+        except ValueError:
+            return text
+    return text
+
+
+def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
+    """Read the sections for this node, later ones winning; raises InputError naming file, line and remedy."""
+    return _read_sections(compose_yaml(Path(path)), str(path), node_name)
+
+
+def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
+    """As ``read_scene_file``, from text; ``name`` stands in errors."""
+    return _read_sections(compose_text(text, name), name, node_name)
+
+
+def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFile:
+    scene = SceneFile()
+    if root is None:
+        return scene
+    if not isinstance(root, yaml.MappingNode):
+        raise _refused(path, root, "a mapping such as rigid_body: {ros__parameters: {...}}")
+    sections = {"/**", node_name, f"/{node_name}", f"/**/{node_name}"}
+    named: set[str] = set()
+    for key, section in root.value:
+        name = _name(path, key)
+        if not isinstance(section, yaml.MappingNode):
+            raise _refused(path, section, "a section such as rigid_body: {ros__parameters: {...}}")
+        for inner, parameters in section.value:
+            if _name(path, inner) != "ros__parameters":
+                if isinstance(parameters, yaml.MappingNode):
+                    continue  # a node in a namespace: not this one
+                raise _refused(path, inner, "ros__parameters: under the node's name")
+            values: dict[str, object] = {}
+            _collect(path, parameters, "", values)
+            if name not in sections:
+                continue
+            scene.values.update(values)
+            if name != "/**":
+                named |= values.keys()
+    scene.wildcard = scene.values.keys() - named
+    return scene
+
+
+def compose_yaml(path: Path) -> yaml.Node | None:
+    """The YAML tree of a file, with lines; raises InputError when it can't be read."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a scene has at most {MAX_BYTES}")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), error.strerror, "a readable YAML file") from None
+    except UnicodeDecodeError:
+        raise InputError(str(path), "the file isn't UTF-8 text") from None
+    return compose_text(text, str(path))
+
+
+def compose_text(text: str, name: str) -> yaml.Node | None:
+    """The YAML tree of a text; ``name`` stands in errors."""
+    try:
+        return yaml.compose(text, Loader=_Loader)
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        where = f"{name}, line {mark.line + 1}" if mark else name
+        raise InputError(where, problem, "valid YAML without aliases") from None
+
+
+def typed_value(text: str, name: str):
+    """A value as rcl types it on a command line; raises InputError for what rcl refuses."""
+    node = compose_text(text, name)
+    if isinstance(node, yaml.SequenceNode):
+        return _sequence(name, node)
+    if not isinstance(node, yaml.ScalarNode):
+        raise InputError(name, text, "a plain value or a list")
+    return _typed(node)
+
+
+def _collect(path, node, prefix, values) -> None:
+    if not isinstance(node, yaml.MappingNode):
+        raise _refused(path, node, "name: value lines under ros__parameters")
+    for key, value in node.value:
+        name = f"{prefix}{_name(path, key)}"
+        if isinstance(value, yaml.MappingNode):
+            _collect(path, value, f"{name}.", values)
+        elif isinstance(value, yaml.SequenceNode):
+            values[name] = _sequence(path, value)
+        elif value.style is None and value.value == "":
+            raise _refused(path, key, f"a value behind {name}:")
+        else:
+            values[name] = _typed(value)
+
+
+def _name(path, key: yaml.Node) -> str:
+    if not isinstance(key, yaml.ScalarNode):
+        raise _refused(path, key, "a name")
+    return key.value
+
+
+def _typed(node: yaml.ScalarNode):
+    return scalar(node.value) if node.style is None else node.value
+
+
+def _sequence(path, node) -> list:
+    items = []
+    for item in node.value:
+        if isinstance(item, yaml.MappingNode):
+            raise _refused(path, item, "a list of plain values")
+        # rcl reads nested lists as one long list.
+        items.extend(_sequence(path, item) if isinstance(item, yaml.SequenceNode) else [_typed(item)])
+    if len({type(item) for item in items}) > 1:
+        raise _refused(path, node, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]")
+    return items
+
+
+def _refused(path, node, accepted) -> InputError:
+    received = node.value if isinstance(node, yaml.ScalarNode) else node.tag.rsplit(":", 1)[-1]
+    if isinstance(node, yaml.SequenceNode):
+        received = "[" + ", ".join(str(item.value) for item in node.value) + "]"
+    # A value from the command line has no lines to count.
+    where = path if str(path).startswith("-") else f"{path}, line {node.start_mark.line + 1}"
+    return InputError(str(where), received, accepted)

@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: MIT
+"""Poke scripts: a YAML list of timed commands, expanded to the very messages that go over the topics.
+
+``poke_client`` sends them and ``simulate`` applies them, from one expansion, so that both give one motion.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from ..base.errors import InputError
+from ..base.nearest_name import did_you_mean
+from ..motion.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
+from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
+from .plain_yaml import load_plain_yaml
+from .scenario import nanoseconds
+from .scene_file import MAX_BYTES
+
+MAX_TIME_S = 1e9
+MAX_ENTRIES = 1_000_000
+"""Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
+
+MAX_SCHEDULE_LENGTH = 1_000_000
+"""Characters of a message on the schedule topic: 5000 entries and some."""
+
+MAX_YAML_LENGTH = 10_000
+MAX_BRACKETS = 100
+"""Of a message that isn't JSON as well: the YAML reader takes seconds over thousands of brackets, and the body would wait."""
+
+_FORCES = ("force", "push", "impulse")
+_POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
+_TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}
+_WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
+
+
+def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCommand]:
+    """The commands of a script file in order of time; raises InputError naming file, entry and what is accepted.
+
+    wrench_timeout [s]: held wrenches are repeated every half of it.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a script has at most {MAX_BYTES}")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), error.strerror, "a readable poke script") from None
+    except UnicodeDecodeError:
+        raise InputError(str(path), "the file isn't UTF-8 text") from None
+    return parse_script(text, str(path), wrench_timeout)
+
+
+def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -> list[ScriptCommand]:
+    """As ``read_script``, from text."""
+    return expand_script(script_entries(text, name), name, wrench_timeout)
+
+
+def script_entries(text: str, name: str = "script"):
+    """What a script's YAML says, nothing of it checked yet; raises InputError for what is no plain YAML."""
+    return load_plain_yaml(text, name)
+
+
+def read_schedule(text: str):
+    """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and is read
+    faster. Raises InputError.
+    """
+    if len(text) > MAX_SCHEDULE_LENGTH:
+        raise InputError("schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
+    try:
+        entries = json.loads(text, parse_constant=_no_number)
+    except (ValueError, RecursionError):
+        if len(text) > MAX_YAML_LENGTH:
+            raise InputError(
+                "schedule", f"{len(text)} characters", f"JSON, or at most {MAX_YAML_LENGTH} characters of other YAML"
+            ) from None
+        if text.count("[") + text.count("{") > MAX_BRACKETS:
+            raise InputError("schedule", text[:80], f"at most {MAX_BRACKETS} opening brackets, or JSON") from None
+        entries = load_plain_yaml(text, "schedule")
+    if not entries or not isinstance(entries, (dict, list)):
+        raise InputError("schedule", text[:80], "an entry such as {t: 0.5, force: [0, 0, 1]}, or a list of entries")
+    return entries
+
+
+def _no_number(text: str):
+    raise ValueError(text)
+
+
+def expand_schedule(entries, wrench_timeout: float) -> list[ScriptCommand]:
+    """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
+    listed = entries if isinstance(entries, list) else [entries]
+    if any(isinstance(entry, dict) and "script" in entry for entry in listed):
+        raise InputError("schedule", "script", "entries alone, without a script around them")
+    commands = expand_script(listed, "schedule", wrench_timeout, MAX_SCHEDULED)
+    # As listed, which only matters among those that act at once because their time is past.
+    return sorted(commands, key=lambda command: command.entry)
+
+
+def expand_script(
+    entries, name: str = "script", wrench_timeout: float = 1.5, max_commands: int = MAX_ENTRIES
+) -> list[ScriptCommand]:
+    """As ``parse_script``, from what its YAML says: a list of entries, or a mapping that holds one as ``script``."""
+    whole: dict = {}
+    if isinstance(entries, dict) and "script" in entries:
+        whole = {key: value for key, value in entries.items() if key != "script"}
+        _check_keys(whole, _TIMING_KEYS - {"t"}, name)
+        entries = entries["script"]
+    if entries is None:
+        entries = []
+    if not isinstance(entries, list):
+        raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
+    commands: list[ScriptCommand] = []
+    for number, entry in enumerate(entries, 1):
+        where = f"{name}, entry {number}"
+        for k, offset_ns in enumerate(_offsets_ns(whole, name, max_commands)):
+            for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}", max_commands):
+                jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
+                at_ns = max(0, t_ns + offset_ns + jitter_ns)
+                expanded = _expand(entry, at_ns, where, wrench_timeout, max_commands)
+                commands += [replace(command, entry=number) for command in expanded]
+            if len(commands) > max_commands:
+                raise InputError(where, f"more than {max_commands} commands")
+    return sorted(commands, key=lambda command: command.t_ns)
+
+
+def _times_ns(entry, where: str, seed: str, max_commands: int) -> list[int]:
+    """When an entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up to ±``jitter``."""
+    if not isinstance(entry, dict):
+        raise InputError(where, entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
+    if "t" not in entry:
+        raise InputError(f"{where}, t", None, "the time in seconds")
+    t_ns = nanoseconds(_number(entry["t"], f"{where}, t", 0.0, MAX_TIME_S))
+    offsets = _offsets_ns(entry, where, max_commands)
+    return [max(0, t_ns + offset + _jitter_ns(entry, where, f"{seed}/{k}")) for k, offset in enumerate(offsets)]
+
+
+def _offsets_ns(timing: dict, where: str, max_commands: int) -> list[int]:
+    repeat = _number(timing.get("repeat", 1), f"{where}, repeat", 1, max_commands)
+    if repeat != int(repeat):
+        raise InputError(f"{where}, repeat", repeat, "a whole number of times")
+    if repeat > 1 and "every" not in timing:
+        raise InputError(f"{where}, every", None, "the seconds between repeats")
+    every = _number(timing.get("every", 0.0), f"{where}, every", 0.0, MAX_TIME_S)
+    return [nanoseconds(k * every) for k in range(int(repeat))]
+
+
+def _jitter_ns(timing: dict, where: str, seed: str) -> int:
+    """A uniform random shift, the same for the same seed wherever and whenever the script is read."""
+    jitter = _number(timing.get("jitter", 0.0), f"{where}, jitter", 0.0, MAX_TIME_S)
+    if jitter == 0.0:
+        return 0
+    own = _number(timing.get("seed", 0), f"{where}, seed", 0, 2**63)
+    return nanoseconds(random.Random(f"{int(own)}/{seed}").uniform(-jitter, jitter))
+
+
+def _expand(
+    entry: dict, t_ns: int, where: str, wrench_timeout: float, max_commands: int = MAX_ENTRIES
+) -> list[ScriptCommand]:
+    if "wrench" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"wrench"}, where)
+        return _expand_wrench(entry["wrench"], t_ns, f"{where}, wrench", wrench_timeout, max_commands)
+    if "string" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"string"}, where)
+        return _expand_string(entry["string"], t_ns, f"{where}, string")
+    if "set" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"set"}, where)
+        if not isinstance(entry["set"], dict) or not entry["set"]:
+            raise InputError(f"{where}, set", entry["set"], "{parameter: value, ...}")
+        if "record" in entry["set"]:
+            raise InputError(
+                f"{where}, set, record",
+                entry["set"]["record"],
+                "parameters of the motion; ros2 param set switches record",
+            )
+        return [ScriptCommand(t_ns, "set", changes={str(k): v for k, v in entry["set"].items()})]
+    if "service" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"service"}, where)
+        if entry["service"] != "clear_wrench":
+            raise InputError(f"{where}, service", entry["service"], "clear_wrench")
+        return [ScriptCommand(t_ns, "clear_wrench")]
+    _check_keys(entry, _TIMING_KEYS | _POKE_KEYS, where)
+    return [_poke(entry, t_ns, where)]
+
+
+def _poke(entry: dict, t_ns: int, where: str) -> ScriptCommand:
+    impulsive = "impulse" in entry or "angular_impulse" in entry
+    lasting = "force" in entry or "push" in entry or "torque" in entry
+    if impulsive and (lasting or "duration" in entry):
+        raise InputError(where, sorted(entry), "impulses alone, or force, push and torque with a duration")
+    option = ";impulse" if impulsive else ""
+    if "duration" in entry:
+        option = f";duration={_number(entry['duration'], f'{where}, duration', 1e-9, MAX_TIME_S)!r}"
+    frame, force, torque = _wrench_fields(entry, where)
+    return ScriptCommand(t_ns, "poke", _checked_frame(frame + option, where), force, torque)
+
+
+def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float, max_commands: int) -> list[ScriptCommand]:
+    if not isinstance(entry, dict):
+        raise InputError(where, entry, "{at, force or push, torque, axes, duration}")
+    _check_keys(entry, _WRENCH_KEYS, where)
+    frame, force, torque = _wrench_fields(entry, where)
+    first = ScriptCommand(t_ns, "wrench", _checked_frame(frame, where), force, torque)
+    if "duration" not in entry:
+        return [first]
+    duration_ns = nanoseconds(_number(entry["duration"], f"{where}, duration", 1e-9, MAX_TIME_S))
+    repeats = [first]
+    if wrench_timeout > 0.0:
+        every_ns = max(1, nanoseconds(wrench_timeout / 2.0))
+        if duration_ns // every_ns > max_commands:
+            raise InputError(f"{where}, duration", duration_ns * 1e-9, f"at most {max_commands} repeats")
+        times = range(t_ns + every_ns, t_ns + duration_ns, every_ns)
+        repeats += [ScriptCommand(t, "wrench", first.frame_id, force, torque) for t in times]
+    # The last message holds no axes to misread: no wrench at all.
+    return [*repeats, ScriptCommand(t_ns + duration_ns, "wrench", "world@com")]
+
+
+def _expand_string(entry, t_ns: int, where: str) -> list[ScriptCommand]:
+    if entry == "release":
+        return [ScriptCommand(t_ns, "string_release")]
+    accepted = "release, or {attach: contact or [x, y, z] in mesh coordinates, target: [x, y, z] in the world}"
+    if not isinstance(entry, dict) or not entry or not set(entry) <= {"attach", "target"}:
+        raise InputError(where, entry, accepted)
+    commands = []
+    if "attach" in entry:
+        attach = entry["attach"]
+        if isinstance(attach, dict) and set(attach) == {"point"}:
+            attach = attach["point"]
+        if isinstance(attach, str) and CONTACT_NAME.match(attach):
+            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, contact=attach))
+        else:
+            point = _vector(attach, f"{where}, attach")
+            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, point=point))
+    if "target" in entry:
+        target = _vector(entry["target"], f"{where}, target")
+        commands.append(ScriptCommand(t_ns, "string_target", "world", point=target))
+    return commands
+
+
+def with_contacts(script: list[ScriptCommand], contacts: Mapping[str, tuple]) -> list[ScriptCommand]:
+    """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
+    settled = []
+    for command in script:
+        if command.contact:
+            if command.contact not in contacts:
+                known = ", ".join(sorted(contacts)) or "none"
+                raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
+            command = replace(command, point=tuple(float(x) for x in contacts[command.contact]), contact="")
+        settled.append(command)
+    return settled
+
+
+def _wrench_fields(entry: dict, where: str) -> tuple[str, tuple, tuple]:
+    given = [key for key in _FORCES if key in entry]
+    if len(given) > 1:
+        raise InputError(where, given, "one of force, push, impulse")
+    if not given and "torque" not in entry and "angular_impulse" not in entry:
+        raise InputError(where, sorted(entry), "force, push, impulse, torque or angular_impulse")
+    axes = entry.get("axes", "world")
+    if axes not in ("world", "body"):
+        raise InputError(f"{where}, axes", axes, "world, body")
+    zero = (0.0, 0.0, 0.0)
+    torque_key = "angular_impulse" if "angular_impulse" in entry else "torque"
+    torque = _vector(entry[torque_key], f"{where}, {torque_key}") if torque_key in entry else zero
+    force = zero
+    if "push" in entry:
+        if "axes" in entry or torque_key in entry:
+            raise InputError(where, sorted(entry), "push without axes and torque: it acts along the inward normal")
+        axes, force = "normal", (_number(entry["push"], f"{where}, push"), 0.0, 0.0)
+    elif given:
+        force = _vector(entry[given[0]], f"{where}, {given[0]}")
+    return f"{axes}@{_at(entry.get('at', 'com'), where)}", force, torque
+
+
+def _at(at, where: str) -> str:
+    field = f"{where}, at"
+    accepted = "com, origin, a contact's name, {vertex: i}, {point: [x, y, z]} or {ray: {origin, direction}}"
+    if isinstance(at, str) and (at in FIXED_POINTS or CONTACT_NAME.match(at)):
+        return at
+    if isinstance(at, dict) and len(at) == 1:
+        ((word, value),) = at.items()
+        if word == "vertex" and isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+            return point_text(("vertex", value))
+        if word == "point":
+            return point_text(("point", _vector(value, f"{field}, point")))
+        if word == "ray" and isinstance(value, dict) and set(value) == {"origin", "direction"}:
+            return point_text(("ray", *(_vector(value[k], f"{field}, ray, {k}") for k in ("origin", "direction"))))
+    raise InputError(field, at, accepted)
+
+
+def _checked_frame(frame: str, where: str) -> str:
+    """The frame, readable by the node's own grammar; contact names are checked by the node that has them."""
+    axes_point = frame.split(";")[0]
+    contact = {axes_point.split("@")[1]} if CONTACT_NAME.match(axes_point.split("@")[1]) else set()
+    try:
+        parse_frame(frame, contact)
+    except InputError as error:
+        raise InputError(where, error.received, error.accepted) from None
+    return frame
+
+
+def _check_keys(entry: dict, known: set, where: str) -> None:
+    unknown = [str(key) for key in entry if key not in known]
+    if unknown:
+        hint = did_you_mean(unknown[0], known)
+        keys = f"the keys here are {', '.join(sorted(known))}"
+        raise InputError(where, f"there is no key {', '.join(unknown)}; {' '.join(filter(None, [hint, keys]))}")
+
+
+def _number(value, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
+    if isinstance(value, str):
+        # YAML reads 1e-3 without a point as text.
+        try:
+            value = float(value)
+        except ValueError:
+            pass
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not lower <= value <= upper:
+        raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
+    return float(value)
+
+
+def _vector(value, field: str) -> tuple[float, float, float]:
+    if not isinstance(value, (list, tuple)) or len(value) != 3:
+        raise InputError(field, value, "three numbers [x, y, z]")
+    return tuple(_number(v, field) for v in value)

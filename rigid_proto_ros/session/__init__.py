@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Recorded flights: written, read, verified, replayed and branched."""

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: MIT
+"""The observer that records a flight as an MCAP file: the node's topics as a bag has them, and the mesh's file inside.
+
+The stepping thread only copies into a mailbox; a thread of our own empties it and writes whole chunks. All runs go into
+one file: a reset begins the next one, as in a bag of the topics.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import logging
+import platform
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.output_file import output_file
+from ..mesh.reading import resolve_mesh
+from ..messages import cdr, session_messages
+from ..motion.body import Body
+from ..motion.loads import Load
+from ..scene.scene_file import read_scene_text
+from ..simulation.commands import WrenchCommand
+from ..simulation.mailbox import Block, Mailbox, Mark
+from ..simulation.observer import BodySnapshot, Observer
+from .mesh import file_sha256, scene_sha256
+
+FLUSH_PERIOD_S = 0.4
+"""What a kill -9 loses at most."""
+
+CHUNK_NS = 500_000_000
+"""Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
+
+CLOSE_TIMEOUT_S = 10.0
+"""A disk that doesn't take the rest in this time is given up."""
+
+_logger = logging.getLogger(__name__)
+
+
+class McapObserver(Observer):
+    """Records to ``path``; topics are named after the node, frames as its messages name them.
+
+    Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run behind
+    the one before. on_error gets one line when recording has stopped because the file can't be written, from another thread; ``error``
+    keeps it. Raises InputError where the file can't be opened.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        node_name: str = "rigid_body",
+        values: Mapping[str, object] | None = None,
+        on_error: Callable[[str], None] | None = None,
+        simulated_log: bool = False,
+    ) -> None:
+        from .mcap_file import McapFile
+
+        values = values or {}
+        self.error = ""
+        self._path = path
+        self._on_error = on_error or _logger.error
+        self._simulated_log = simulated_log
+        self._run_begins_ns = self._latest_log_ns = 0
+        world = str(values.get("world_frame") or "world")
+        self._body_frame = str(values.get("body_frame") or node_name)
+        self._templates = {
+            name: np.frombuffer(bytes(cdr.StampedTemplate(world, count).buffer), np.uint8)
+            for name, count in (("pose", 7), ("twist", 6))
+        }
+        self._scene = ""
+        self._attached: set[str] = set()
+        self._closed = False
+        self._file: McapFile | None = None
+        try:
+            self._file = McapFile(output_file("record", path))
+            self._file.add_metadata("rigid_proto_ros", _made_with())
+            self._channels = {
+                name: self._file.add_channel(
+                    f"/{node_name.strip('/')}/{name}",
+                    message_type,
+                    session_messages.DEFINITIONS[message_type],
+                    {"offered_qos_profiles": _offered(name in session_messages.LATCHED)},
+                )
+                for name, message_type in session_messages.TOPICS.items()
+            }
+        except OSError as error:
+            accepted = f"a file that can be written ({error.strerror})"
+            raise InputError("record", str(path), accepted) from None
+        self._mailbox = Mailbox(lambda: self._stopped("nothing can be written to the disk any more"))
+        self._thread = threading.Thread(target=self._write_until_closed, name="mcap", daemon=True)
+        self._thread.start()
+
+    @property
+    def recording(self) -> str:
+        """Path of the file that is being written, or ""."""
+        file = self._file
+        return str(file.path) if file is not None and not self._closed else ""
+
+    # The Observer's interface: called from the stepping thread
+
+    def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
+        """Write the scene, and the mesh's file once."""
+        self._mailbox.mark(0, "scene", scene)
+        self._mailbox.hurry()
+
+    def scene_changed(self, time_ns: int, scene: str) -> None:
+        """Write the scene unless it is the one written last."""
+        self._mailbox.mark(time_ns, "scene", scene)
+
+    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
+        """Write the inertia."""
+        I = body.inertia
+        tensor = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
+        frame = f"{self._body_frame}/mesh"
+        self._message(
+            time_ns,
+            "inertia",
+            session_messages.inertia_bytes(time_ns, frame, body.mass, body.center_of_mass.tolist(), tensor),
+        )
+
+    def state(self, time_ns: int, row: np.ndarray) -> None:
+        """Copy one state row (13,)."""
+        self._mailbox.put(time_ns, row)
+
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
+        """Write a wrench or poke as it took effect, as the node publishes it."""
+        force = load.force if load.axes == "world" else load.own_force(body).tolist()
+        frame_id = load.frame_id + command.frame.options
+        self._message(time_ns, "applied", cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
+
+    def event(self, time_ns: int, line: str) -> None:
+        """Write a line of the event log."""
+        self._message(time_ns, "events", cdr.string(line))
+
+    def reset(self) -> None:
+        """The next run begins; its first event says so."""
+        self._mailbox.mark(0, "reset")
+        self._mailbox.hurry()
+
+    def close(self) -> None:
+        """Write what is buffered and finish the file."""
+        if self._closed:
+            return
+        self._closed = True
+        self._mailbox.close()
+        self._thread.join(CLOSE_TIMEOUT_S)
+        if self._thread.is_alive():
+            self._stopped("the last states could not be written")
+
+    # The writing thread
+
+    def _message(self, time_ns: int, name: str, data: bytes) -> None:
+        self._mailbox.mark(time_ns, "message", name, data)
+
+    def _write_until_closed(self) -> None:
+        mailbox = self._mailbox
+        while True:
+            closing = mailbox.closed
+            try:
+                self._write_waiting()
+                if closing and self._file is not None:
+                    self._file.close()
+            except Exception as error:  # noqa: BLE001
+                # Whatever goes wrong here must not reach the flight: go on without a recording.
+                self._lost(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
+            if closing:
+                return
+            mailbox.wait(FLUSH_PERIOD_S)
+
+    def _write_waiting(self) -> None:
+        more = True
+        while more:
+            block, _ = self._mailbox.take()
+            if block is None:
+                break
+            more = block.handed_over
+            if self._file is not None:
+                self._write(block)
+                self._file.flush()
+            self._mailbox.give_back(block)
+        if self._file is not None:
+            self._file.flush()
+
+    def _write(self, block: Block) -> None:
+        sent = 0
+        for mark in block.marks:
+            self._write_rows(block, sent, mark.after_rows)
+            sent = mark.after_rows
+            self._write_mark(mark)
+        self._write_rows(block, sent, block.count)
+
+    def _log_time(self, simulated_ns: int, wall_ns: int) -> int:
+        log_time = self._run_begins_ns + simulated_ns if self._simulated_log else wall_ns
+        self._latest_log_ns = max(self._latest_log_ns, log_time)
+        return log_time
+
+    def _write_mark(self, mark: Mark) -> None:
+        if mark.kind == "reset":
+            self._run_begins_ns = self._latest_log_ns + 1
+            return
+        log_time = self._log_time(mark.time_ns, mark.wall_ns)
+        if mark.kind == "message":
+            name, data = mark.content
+            self._file.add_message(self._channels[name], log_time, data)
+            return
+        (scene,) = mark.content
+        if scene != self._scene:
+            self._scene = scene
+            self._attach_mesh(scene, log_time)
+            self._file.add_message(self._channels["scene"], log_time, cdr.string(scene))
+
+    def _attach_mesh(self, scene: str, log_time: int) -> None:
+        sha256 = scene_sha256(scene)
+        if not sha256 or sha256 in self._attached:
+            return
+        self._attached.add(sha256)
+        try:
+            path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
+            data = path.read_bytes()
+        except (InputError, OSError):
+            return
+        # A file that was changed since it was loaded isn't the one that flies.
+        if file_sha256(data) == sha256:
+            self._file.flush()
+            self._file.add_attachment(path.name, "application/octet-stream", data, log_time)
+
+    def _write_rows(self, block: Block, begin: int, end: int) -> None:
+        if begin == end:
+            return
+        chunk_of_row = block.times[begin:end] // CHUNK_NS
+        cuts = (begin + 1 + np.flatnonzero(np.diff(chunk_of_row))).tolist()
+        for first, last in zip([begin, *cuts], [*cuts, end], strict=True):
+            if first > begin:
+                self._file.flush()
+            self._add_rows(block.times[first:last], block.walls[first:last], block.rows[first:last])
+
+    def _add_rows(self, times: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
+        log_times = self._run_begins_ns + times if self._simulated_log else walls.copy()
+        self._latest_log_ns = max(self._latest_log_ns, int(log_times.max()))
+        listed = rows.tolist()
+        for name in ("pose", "twist"):
+            project = session_messages.PROJECTIONS[name]
+            doubles = rows[:, :7] if name == "pose" else np.array([project(row) for row in listed])
+            self._file.add_rows(self._channels[name], log_times, _stamped(self._templates[name], times, doubles))
+
+    def _lost(self, reason: str) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.abandon()
+            self._stopped(reason)
+
+    def _stopped(self, reason: str) -> None:
+        self.error = f"recording stopped: {self._path}: {reason}"
+        self._on_error(self.error)
+
+
+def _stamped(template: np.ndarray, times: np.ndarray, doubles: np.ndarray) -> np.ndarray:
+    """Messages (n, length) uint8 of stamps (n,) and doubles (n, k) that end them."""
+    messages = np.tile(template, (len(times), 1))
+    stamps = np.stack(np.divmod(times, 1_000_000_000), axis=1).astype("<i4")
+    messages[:, 4:12] = stamps.view(np.uint8).reshape(len(times), 8)
+    data = np.ascontiguousarray(doubles, dtype="<f8").view(np.uint8)
+    messages[:, -data.shape[1] :] = data
+    return messages
+
+
+def _offered(latched: bool) -> str:
+    """The publisher's quality of service as bags keep it: reliable, and transient local where latched."""
+    none = "sec: 9223372036\n    nsec: 854775807"
+    return (
+        f"- history: 1\n  depth: {1 if latched else 10}\n  reliability: 1\n  durability: {1 if latched else 2}\n"
+        f"  deadline:\n    {none}\n  lifespan:\n    {none}\n  liveliness: 1\n"
+        f"  liveliness_lease_duration:\n    {none}\n  avoid_ros_namespace_conventions: false"
+    )
+
+
+def _made_with() -> dict[str, str]:
+    made = {"cpu": platform.processor() or platform.machine(), "python": platform.python_version()}
+    for package in ("rigid_proto_ros", "numpy", "numba", "mcap"):
+        try:
+            made[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    made["began"] = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    return made

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""A recorded session told to an observer once more: the states as recorded, with the loads computed anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..messages.session_messages import PROJECTIONS
+from ..scene.ghost import ghost_of
+from ..scene.offline import tell_start
+from ..scene.scenario import Scenario
+from ..simulation.observer import BodySnapshot, Observer
+from ..simulation.simulation import Simulation
+from .recorded_session import RecordedSession
+from .replay import resimulation
+
+
+def play(
+    session: RecordedSession,
+    observer: Observer,
+    given: Scenario | None = None,
+    progress: Callable[[float, float], None] = lambda done, total: None,
+) -> None:
+    """Tell ``observer`` the session from its start to its last state; ``progress`` is called with (states told, all states).
+
+    given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
+    decoded, and for a session without a scene.
+    """
+    if given is not None or session.missing:
+        _play_states(session, observer, given)
+        return
+    again = resimulation(session, observer)
+    tell_start(observer, again.scenario)
+    again.simulation.announce()
+    again.ghost = ghost_of(again.scenario, again.simulation, observer)
+    for count, (time_ns, row) in enumerate(sorted_states(session)):
+        progress(count, len(session.times))
+        try:
+            computed = again.advance(time_ns)
+        except InputError:
+            # A command that can't have been taken: from here on what was recorded is all there is.
+            computed = row
+        observer.state(time_ns, computed if _published_alike(session, computed, row) else row)
+        again.simulation.tell_status()
+        if again.ghost is not None:
+            again.ghost.advance(time_ns)
+
+
+def sorted_states(session: RecordedSession):
+    """(time_ns, row) of every state in the order of time."""
+    for k in np.argsort(session.times, kind="stable").tolist():
+        yield int(session.times[k]), session.rows[k]
+
+
+def _published_alike(session: RecordedSession, computed: np.ndarray, row: np.ndarray) -> bool:
+    """Whether a computed state is the recorded one, of which a bag holds what was published, and no more."""
+    if not session.published:
+        return False
+    return all(
+        np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
+        for name in session.published
+    )
+
+
+def _play_states(session: RecordedSession, observer: Observer, given: Scenario | None) -> None:
+    if given is None:
+        raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
+    tell_start(observer, given)
+    observer.body_changed(0, _snapshot(given))
+    for time_ns, row in sorted_states(session):
+        observer.state(time_ns, row)
+
+
+def _snapshot(scenario: Scenario) -> BodySnapshot:
+    told: list[BodySnapshot] = []
+
+    class _Asked(Observer):
+        def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
+            told.append(body)
+
+    Simulation(scenario.setup, _Asked()).announce()
+    return told[0]

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""A recorded flight as plain arrays and text, whatever file it was read from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..messages.session_messages import StampedRows
+
+
+@dataclass
+class RecordedSession:
+    """One run, as its recording holds it.
+
+    scene: the parameters at the run's start as a params file. events: (time_ns, JSON line) in order, lines as logged.
+    refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states in
+    ``simulation/observer.py``'s ``STATE_FIELDS`` order. vertices (p, 3) float64 and triangles (m, 3) int64 as loaded, None without a
+    mesh; mesh_sha256 of the mesh file; mesh_chunks counts how often the drawn mesh was logged.
+    complete: the file was finished properly. readable_bytes of file_bytes hold whole pieces.
+
+    A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
+    those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics' names.
+    missing: topics that a check would need. attachments: (name, bytes) of files inside; folder: where the session lies.
+    """
+
+    scene: str = ""
+    events: list[tuple[int, str]] = field(default_factory=list)
+    refusals: list[tuple[int, str]] = field(default_factory=list)
+    times: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    rows: np.ndarray = field(default_factory=lambda: np.empty((0, 13)))
+    vertices: np.ndarray | None = None
+    triangles: np.ndarray | None = None
+    mesh_sha256: str = ""
+    mesh_chunks: int = 0
+    complete: bool = True
+    readable_bytes: int = 0
+    file_bytes: int = 0
+    published: dict[str, StampedRows] = field(default_factory=dict)
+    scenes: list[str] = field(default_factory=list)
+    node_name: str = "rigid_body"
+    missing: tuple[str, ...] = ()
+    attachments: list[tuple[str, bytes]] = field(default_factory=list)
+    folder: Path | None = None
+
+    @property
+    def lines(self) -> list[str]:
+        """The event lines as logged."""
+        return [line for _, line in self.events]
+
+    @property
+    def end_ns(self) -> int:
+        """Simulated time [ns] of the last state; 0 without states."""
+        return int(self.times[-1]) if len(self.times) else 0
+
+    def summary(self) -> str:
+        """What there is, in one line."""
+        text = f"{len(self.times)} states to {1e-9 * self.end_ns:g} s, {len(self.events)} events"
+        if not self.complete:
+            text += f"; not finished properly, {self.readable_bytes} of {self.file_bytes} bytes are complete"
+        return text

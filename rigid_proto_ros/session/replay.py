@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""A recorded session computed anew from its scene and its events."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..mesh.reading import Mesh, load_mesh
+from ..scene.command_codec import command_of_event, frame_names
+from ..scene.ghost import Ghost
+from ..scene.parameters import convert_all
+from ..scene.scenario import Scenario, check_inertia, make_scenario
+from ..scene.scene_file import read_scene_text
+from ..simulation.commands import Change, Command
+from ..simulation.observer import Observer
+from ..simulation.simulation import Simulation
+from .mesh import find_mesh, scene_sha256
+from .recorded_session import RecordedSession
+from .runs import decode_event
+
+
+def session_scenario(session: RecordedSession) -> Scenario:
+    """The scenario that the session began with; the mesh by name if its content is the same, else the recorded one."""
+    if not session.scene:
+        raise InputError("session", "the recording has no scene; give one with --scene FILE")
+    values = read_scene_text(session.scene, "the recorded scene").values
+    if not session.mesh_sha256:
+        return make_scenario(values)
+    name = str(values.get("mesh", ""))
+    if session.vertices is None:
+        return make_scenario(values, find_mesh(name, session.mesh_sha256, session.attachments, session.folder))
+    try:
+        mesh = load_mesh(name)
+    except InputError:
+        mesh = None
+    if mesh is None or mesh.sha256 != session.mesh_sha256:
+        mesh = Mesh(name, name, session.vertices, session.triangles, None, session.mesh_sha256)
+    return make_scenario(values, mesh)
+
+
+def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
+    """By name, the meshes that later scenes of the session say were flown; None for those that none speaks of."""
+    hashes: dict[str, str] = {}
+    for scene in session.scenes:
+        if scene_sha256(scene):
+            hashes[str(read_scene_text(scene, "a recorded scene").values.get("mesh", ""))] = scene_sha256(scene)
+
+    def find(name: str) -> Mesh | None:
+        return find_mesh(name, hashes[name], session.attachments, session.folder) if name in hashes else None
+
+    return find
+
+
+class Resimulation:
+    """A session's simulation; its commands are submitted when their time has come, as they were then.
+
+    ``scenario`` is the one in force; ``ghost`` is told of its changes. mesh_of(name) gives the mesh that a change names, or None to load it.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        event_lines: Sequence[str],
+        observer: Observer | None = None,
+        mesh_of: Callable[[str], Mesh | None] = lambda name: None,
+        node_name: str = "rigid_body",
+    ) -> None:
+        self.scenario = scenario
+        self.simulation = Simulation(scenario.setup, observer)
+        self._observer = observer or Observer()
+        self.ghost: Ghost | None = None
+        self._mesh_of = mesh_of
+        self._changes_ns = -1
+        self.node_name = node_name
+        waiting: list[tuple[int, str, dict, Command | None, int]] = []
+        for number, line in enumerate(event_lines, 1):
+            time_ns, kind, content = decode_event(line, number)
+            waiting.append((time_ns, kind, content, self._command(kind, content, number), number))
+        # Stable: what happened at one instant keeps its order.
+        self._waiting = deque(sorted(waiting, key=lambda event: event[0]))
+
+    def advance(self, until_ns: int) -> np.ndarray:
+        """Carry the body to ``until_ns``; returns its state row, before what acts at that very time.
+
+        Raises CommandRefused for a recorded command that can't be taken.
+        """
+        while self._waiting and self._waiting[0][0] < until_ns:
+            self._submit_next()
+        # Marks at the time asked for were made before anything else could act there.
+        while self._waiting and self._waiting[0][0] == until_ns and self._waiting[0][3] is None:
+            self._submit_next()
+        return self.simulation.advance(until_ns).row
+
+    def _submit_next(self) -> None:
+        time_ns, kind, content, command, number = self._waiting.popleft()
+        self.simulation.advance(max(time_ns, self.simulation.time_ns))
+        if command is None:
+            self.simulation.log(kind, content)
+        else:
+            if isinstance(command, Change):
+                self._changes_ns = time_ns
+            # What acts under a change of its own instant can't be judged before that acts.
+            judged = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
+            # What acted at one instant acts in the order of the log, whatever rule made it.
+            self.simulation.submit(command, time_ns, (b"", number), judged)
+
+    def _command(self, kind: str, content: dict, number: int) -> Command | None:
+        values = self.scenario.values
+        frames = frame_names(values, self.node_name)
+        try:
+            if kind == "set":
+                convert_all(content)
+            return command_of_event(
+                kind, content, self.scenario.setup.contacts, frames, self._change, self._change_inertia
+            )
+        except InputError as error:
+            raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+
+    def _change_inertia(self, content: dict):
+        return self._take_on(check_inertia(self.scenario, content))
+
+    def _change(self, changes: dict):
+        mesh = self._mesh_of(changes["mesh"]) if changes.get("mesh") else None
+        return self._take_on(self.scenario.with_changes(changes, mesh))
+
+    def _take_on(self, scenario: Scenario):
+        self.simulation.check_change(scenario.setup)
+        self.scenario = scenario
+        self._observer.scene_changed(self.simulation.time_ns, scenario.text)
+        if self.ghost is not None:
+            self.ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
+        return scenario.setup
+
+
+def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:
+    """The session's simulation at its start; raises InputError for events that can't be decoded."""
+    scenario = session_scenario(session)
+    return Resimulation(scenario, session.lines, observer, mesh_finder(session), session.node_name)

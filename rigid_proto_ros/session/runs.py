@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""From the messages of a bag to the runs in it: a reset starts simulated time again, and a bag holds it all in one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.rotation import rotate, rotate_inverse
+from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_text
+from .mcap_file import McapContent
+from .mesh import scene_sha256
+from .recorded_session import RecordedSession
+
+RESET_WINDOW_NS = 1_000_000_000
+"""Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
+
+
+def is_session_topic(topic: str) -> bool:
+    """Whether a topic may hold a part of a session."""
+    return topic.rpartition("/")[2] in READ
+
+
+def session_runs(content: McapContent, path: Path, node: str = "") -> list[RecordedSession]:
+    """The runs of one body in a bag, in their order; ``node`` chooses the body where there are several.
+
+    Raises InputError for a bag without states, and for messages that can't be decoded.
+    """
+    prefix = _prefix(content, str(path), node)
+    events = [(log, read_text(data, f"{prefix}/events")) for log, data in _messages(content, prefix, "events")]
+    scenes = [(log, read_text(data, f"{prefix}/scene")) for log, data in _messages(content, prefix, "scene")]
+    states = {name: _states(content, prefix, name) for name in PROJECTIONS}
+    states = {name: found for name, found in states.items() if len(found[0])}
+    # A topic without messages may be whole: nobody did anything. A latched one is never without.
+    there = {"scene": bool(scenes), "events": f"{prefix}/events" in content.types, "pose": bool(states)}
+    missing = [f"{prefix}/{name}" for name, is_there in there.items() if not is_there]
+    decoded = [decode_event(line, number) for number, (_, line) in enumerate(events, 1)]
+    resets = [log for (log, _), (_, kind, _) in zip(events, decoded, strict=True) if kind == "reset"]
+    if not events and states:
+        resets = _log_times_of_restarts(next(iter(states.values())))
+    whole = RecordedSession(
+        complete=content.complete,
+        readable_bytes=content.readable_bytes,
+        file_bytes=content.file_bytes,
+        node_name=prefix.strip("/"),
+        scenes=[text for _, text in scenes],
+        missing=tuple(missing),
+        attachments=content.attachments,
+        folder=path if path.is_dir() else path.parent,
+    )
+    cuts = {name: _cuts(logs, rows.times, resets) for name, (logs, rows) in states.items()}
+    runs = []
+    for k in range(len(resets) + 1):
+        run = replace(whole, scene=_scene_at(scenes, resets[k - 1] if k else None))
+        run.mesh_sha256 = scene_sha256(run.scene)
+        begin = resets[k - 1] if k else None
+        end = resets[k] if k < len(resets) else None
+        run.events = [
+            (time_ns, line)
+            for (log, line), (time_ns, _, _) in zip(events, decoded, strict=True)
+            if (begin is None or log >= begin) and (end is None or log < end)
+        ]
+        run.published = {
+            name: StampedRows(
+                rows.times[cuts[name][k] : cuts[name][k + 1]], rows.rows[cuts[name][k] : cuts[name][k + 1]]
+            )
+            for name, (_, rows) in states.items()
+        }
+        run.times, run.rows = _shown_rows(run.published)
+        if run.events or len(run.times):
+            runs.append(run)
+    return runs or [whole]
+
+
+def decode_event(line: str, number: int) -> tuple[int, str, dict]:
+    """time_ns, kind and content of a line of the event log; raises InputError naming the event by number."""
+    try:
+        event = json.loads(line)
+        time_ns, kind, content = event["time_ns"], event["kind"], event["content"]
+        if type(time_ns) is int and time_ns >= 0 and isinstance(kind, str) and isinstance(content, dict):
+            return time_ns, kind, content
+    except (ValueError, KeyError, TypeError, RecursionError):
+        pass
+    raise InputError(f"event {number}", line[:80], "a JSON line with time_ns, kind and content")
+
+
+def _prefix(content: McapContent, path: str, node: str) -> str:
+    """What stands before the topics' names: the node's name with a slash before it."""
+    kinds: dict[str, set[str]] = {}
+    for topic, message_type in content.types.items():
+        before, slash, name = topic.rpartition("/")
+        if slash and READ.get(name) == message_type:
+            kinds.setdefault(before, set()).add(name)
+    flown = sorted(p for p, names in kinds.items() if names & {"scene", "events"}) or sorted(kinds)
+    if node:
+        flown = [p for p in kinds if p.strip("/") == node.strip("/")]
+        if not flown:
+            raise InputError("--node", node, f"one of the bag's: {', '.join(sorted(kinds)) or 'it has none'}")
+    if not flown:
+        topics = ", ".join(sorted(content.types)[:5]) or "no topics"
+        raise InputError("session", f"{path} has {topics}, and no pose, twist or odom topic of a node")
+    if len(flown) > 1:
+        raise InputError("session", f"{path} has several bodies, {', '.join(flown)}; say which with --node NAME")
+    return flown[0]
+
+
+def _messages(content: McapContent, prefix: str, name: str) -> list[tuple[int, bytes]]:
+    """A topic's messages in the order they were logged."""
+    return sorted(content.messages.get(f"{prefix}/{name}", []), key=lambda message: message[0])
+
+
+def _states(content: McapContent, prefix: str, name: str) -> tuple[np.ndarray, StampedRows]:
+    messages = _messages(content, prefix, name)
+    read = [read_state(name, data, f"{prefix}/{name}") for _, data in messages]
+    logs = np.array([log for log, _ in messages], dtype=np.int64)
+    rows = np.array([row for _, row in read], dtype=float)
+    return logs, StampedRows(np.array([stamp for stamp, _ in read], dtype=np.int64), rows)
+
+
+def _log_times_of_restarts(state: tuple[np.ndarray, StampedRows]) -> list[int]:
+    logs, rows = state
+    return logs[1:][np.diff(rows.times) < 0].tolist()
+
+
+def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
+    """Where a topic's messages of each run begin, and the end: at the restart of the stamps nearest to each reset."""
+    restarts = np.flatnonzero(np.diff(stamps) < 0) + 1
+    cuts = [0]
+    for reset in resets:
+        # A reset of a body at time 0 shows in no stamp: there the log decides.
+        cut = int(np.searchsorted(logs, reset, side="right"))
+        near = [k for k in restarts.tolist() if abs(int(logs[k]) - reset) < RESET_WINDOW_NS and k >= cuts[-1]]
+        cuts.append(max(cuts[-1], min(near, key=lambda k: abs(int(logs[k]) - reset)) if near else cut))
+    return [*cuts, len(stamps)]
+
+
+def _scene_at(scenes: list[tuple[int, str]], reset: int | None) -> str:
+    """The scene in force at a reset; at the recording's own start the first one that it holds."""
+    before = [text for log, text in scenes if reset is not None and log <= reset]
+    return before[-1] if before else scenes[0][1] if scenes else ""
+
+
+def _shown_rows(published: dict[str, StampedRows]) -> tuple[np.ndarray, np.ndarray]:
+    """State rows (n, 13) and their times, one per stamp, from what was published; velocities that weren't are 0."""
+    merged: dict[int, list[float]] = {}
+    for name in ("odom", "pose"):
+        for time_ns, row in _listed(published.get(name)):
+            state = merged.setdefault(time_ns, [0.0] * 6 + [1.0] + [0.0] * 6)
+            state[:7] = row[:7]
+            if name == "odom":
+                state[7:10], state[10:13] = rotate(*row[3:7], *row[7:10]), row[10:13]
+    for time_ns, row in _listed(published.get("twist")):
+        if time_ns in merged:
+            state = merged[time_ns]
+            state[7:10], state[10:13] = row[:3], rotate_inverse(*state[3:7], *row[3:6])
+    times = sorted(merged)
+    return np.array(times, dtype=np.int64), np.array([merged[t] for t in times]).reshape(-1, 13)
+
+
+def _listed(rows: StampedRows | None):
+    return () if rows is None else zip(rows.times.tolist(), rows.rows.tolist(), strict=True)

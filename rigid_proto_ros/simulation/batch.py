@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""A block of variations in one compiled call without the interpreter's lock: bodies, flights and their measures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import boolean, float64, int64, types
+
+from ..base.compilation import njit
+from ..motion import problem as pr
+from ..motion.body import BODY, INERTIA, MASS
+from ..motion.integrators.integrator import Integrator
+from ..motion.integrators.stepping import COLUMNS, METHOD, ROWS, method_table, provide_kernel
+from ..motion.integrators.taylor_adaptive import MAX_DEGREE
+from ..motion.loads import LOAD, is_within_magnitude
+from . import batch_body as b
+from . import flight as fl
+from .batch_body import GYROSCOPIC, make_body_row
+from .flight_measures import measure_flight
+from .quantities import CONTEXT, STATE, begin, which_is_met
+
+
+@dataclass
+class Variants:
+    """Many variations of one scene. settings (n, SETTINGS), times (n, TIMES), ballast (n, k, 4), constants (CONSTANTS,):
+    simulation/batch_body.py. commands (n, c, 3), loads (n, c, LOAD): simulation/flight.py and motion/loads.py. Those alike in all have one row only.
+    """
+
+    settings: np.ndarray
+    times: np.ndarray
+    ballast: np.ndarray
+    constants: np.ndarray
+    integrator: Integrator
+    commands: np.ndarray
+    loads: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.settings)
+
+    @property
+    def arrays(self) -> tuple:
+        """What the compiled call takes of it."""
+        ints = (self.times, self.commands)
+        floats = (self.settings, self.ballast, self.constants, self.loads)
+        return (*map(np.ascontiguousarray, (*floats, *ints)), self.integrator.chooses, _methods(self.integrator))
+
+
+@dataclass
+class Results:
+    """status (n,): 1 done, 0 the simulation must do it. end_ns (n,), stop (n,): which condition ended it, −1 none.
+    measured (n, k); states (n, 13) at the end.
+    """
+
+    status: np.ndarray
+    end_ns: np.ndarray
+    stop: np.ndarray
+    measured: np.ndarray
+    states: np.ndarray
+
+
+def new_results(rows: int, measures: int) -> Results:
+    """Empty ones, as failed rows have them."""
+    unknown = np.full((rows, measures), np.nan)
+    state = np.full((rows, STATE - 1), np.nan)
+    return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, state)
+
+
+_VARIANTS = (
+    float64[:, ::1],  # settings
+    float64[:, :, ::1],  # ballast
+    float64[::1],  # constants
+    float64[:, :, ::1],  # loads
+    int64[:, ::1],  # times
+    int64[:, :, ::1],  # commands
+    boolean,  # the method is chosen by what a segment holds
+    int64[:, :, ::1],  # methods by degree
+)
+_LOOKS = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
+_RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1])
+
+
+@njit(cache=True, error_model="numpy")
+def _fly(
+    settings, times, body, gyroscopic, chooses, methods, commands, loads, looks_ns, stops, context, tables, states
+):
+    """One flight: fills states (m, STATE) at looks_ns (m,) ascending, each before what acts at that very time.
+
+    settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods: motion/integrators/stepping.py. commands
+    (c, 3) in the order in which they act and loads (c, LOAD). stops (k, 3): the flight ends at the first look at which one
+    holds. context: simulation/quantities.py, filled here. tables: arrays of simulation/flight.py with room for all. Returns how many looks
+    it reached, and which stop held or −1; 0 looks: the simulation must say what is wrong.
+    """
+    f, n, rows_ns, rows, events = tables
+    count = commands.shape[0]
+    for c in range(count):
+        if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
+            return 0, -1
+    n[:] = 0
+    n[fl.HELD] = fl.NOBODY
+    row = f[fl.ROW : fl.ROW + 13]
+    if not b.initial_row(settings, row):
+        return 0, -1
+    states[0, :13], states[0, 13] = row, 0.0
+    g = settings[b.GRAVITY : b.GRAVITY + 3]
+    begin(body[MASS], body[INERTIA : INERTIA + 9], g, states[0], context)
+    f[fl.START : fl.START + 13] = row
+    f[fl.BODY : fl.BODY + BODY] = body
+    damping = (settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING])
+    pr.begin_body(f[fl.COMMON : fl.COMMON + pr.SIZE], body, g, damping[0], damping[1], gyroscopic)
+    f[fl.ACCURACY], f[fl.DEGREE] = settings[b.ACCURACY], times[b.DEGREE]
+    n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
+    n[fl.CHOOSES] = 1 if chooses else 0
+    for c in range(count):
+        rows_ns[c, :3] = commands[c]
+        rows[c, :LOAD] = loads[c]
+    n[fl.DUE_END] = count
+    fl.begin_segment(f, n, rows, methods)
+    for look in range(looks_ns.shape[0]):
+        if fl.fly(f, n, rows_ns, rows, events, methods, looks_ns[look]) != fl.REACHED:
+            return 0, -1
+        states[look, :13], states[look, 13] = row, 0.0
+        stop = which_is_met(stops, states[look], context)
+        if stop >= 0:
+            return look + 1, stop
+    return looks_ns.shape[0], -1
+
+
+@njit(cache=True, error_model="numpy")
+def _one(
+    i,
+    settings,
+    ballast,
+    constants,
+    loads,
+    times,
+    commands,
+    chooses,
+    methods,
+    body,
+    looks_ns,
+    stops,
+    context,
+    tables,
+    states,
+):
+    """Body and flight of variation i; as ``_fly`` returns."""
+    own = settings[i if settings.shape[0] > 1 else 0]
+    if not make_body_row(own, ballast[i if ballast.shape[0] > 1 else 0], constants, body):
+        return 0, -1
+    command = commands[i if commands.shape[0] > 1 else 0]
+    load = loads[i if loads.shape[0] > 1 else 0]
+    own_times = times[i if times.shape[0] > 1 else 0]
+    method = methods[own_times[b.DEGREE]]
+    gyroscopic = constants[GYROSCOPIC]
+    return _fly(
+        own, own_times, body, gyroscopic, chooses, method, command, load, looks_ns, stops, context, tables, states
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _tables(variants, references):
+    """Arrays of simulation/flight.py with room for any of these flights."""
+    commands, room = 0, 0
+    for side in (variants, references):
+        commands = max(commands, side[5].shape[1])
+        for method in side[7].reshape((-1, METHOD)):
+            room = max(room, method[ROWS] * method[COLUMNS])
+    rows = commands + 1
+    f, n = np.zeros(fl.ROOM + room), np.zeros(fl.INTEGERS, np.int64)
+    events = np.zeros((4 * rows + 4, fl.EVENT), np.int64)
+    return f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
+
+
+def _fly_block(first, last, variants, references, has_references, looks_ns, watched, stops, measures, results):
+    """Variations first to last − 1."""
+    status, end_ns, stop, measured, finals = results
+    body, context, tables = np.zeros(BODY), np.zeros(CONTEXT), _tables(variants, references)
+    states = np.zeros((looks_ns.shape[0], STATE))
+    others = np.zeros((looks_ns.shape[0] if has_references else 1, STATE))
+    # One place that flies, whichever it is: a second one would be compiled a second time.
+    sides, kept, ends = (references, variants), (others, states), (np.zeros((0, 3)), stops)
+    for i in range(first, last):
+        status[i] = 0
+        reached = 0
+        for side in range(0 if has_references else 1, 2):
+            reached, stop[i] = _one(i, *sides[side], body, looks_ns, ends[side], context, tables, kept[side])
+            if reached == 0:
+                break
+        if reached == 0:
+            continue
+        status[i] = 1
+        end_ns[i] = looks_ns[reached - 1]
+        finals[i, :] = states[reached - 1, :13]
+        measure_flight(measures, states, others, looks_ns, watched, reached, context, measured[i])
+
+
+@cache
+def _compiled():
+    """``_fly_block`` compiled, or loaded from the cache: when it is first wanted and not at import."""
+    block = (types.Tuple(_VARIANTS), types.Tuple(_VARIANTS), boolean, *_LOOKS, types.Tuple(_RESULTS))
+    signature = types.void(int64, int64, *block)
+    return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_block)
+
+
+@cache
+def _methods(integrator: Integrator) -> np.ndarray:
+    """Tables of the integrator's methods by degree, with the kernels that a flight without a string calls."""
+    tables = [method_table(integrator, degree) for degree in range(MAX_DEGREE + 1)]
+    for table in tables:
+        for number, method in enumerate(integrator.methods):
+            if not method.on_string:
+                provide_kernel(integrator, table, number)
+    return np.array(tables)
+
+
+def fly_variants(
+    variants: Variants,
+    references: Variants | None,
+    looks_ns: np.ndarray,
+    watched: np.ndarray,
+    stops: np.ndarray,
+    measures: np.ndarray,
+) -> Results:
+    """Fly all variants, each beside its reference if there are any; the rows that it can't judge have status 0."""
+    rows = len(variants)
+    results = new_results(rows, len(measures))
+    filled = (results.status, results.end_ns, results.stop, results.measured, results.states)
+    own = variants.arrays
+    other = own if references is None else references.arrays
+    _compiled()(0, rows, own, other, references is not None, looks_ns, watched, stops, measures, filled)
+    return results

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""Bodies of many variations, compiled: from a row of settings and a mesh's ten numbers to what a flight needs.
+
+Every operation stands in the order in which ``scenario``, ``mass/properties.py`` and ``motion/body.py`` do it, so the bits are
+theirs. Whatever is out of the ordinary (a bound, a doubtful tensor) makes no body: the caller then goes their way, which
+knows what to say about it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..base.compilation import njit
+from ..base.rotation import normalize, quaternion_of_axes
+from ..mass.properties import SCALE_LIMITS, loaded, stretched
+from ..mass.tensor import (
+    MAX_MOMENT_RATIO,
+    TRIANGLE_SLACK_COMPUTED,
+    principal_axes_kernel,
+)
+from ..motion.body import (
+    AXES,
+    BODY_SCALE,
+    COM,
+    INERTIA,
+    LENGTH,
+    MASS,
+    MOMENTS,
+    QUATERNION,
+)
+
+# A row of settings.
+SCALE = 0  # (3,)
+BODY_MASS = 3  # [kg], 0: the density decides
+DENSITY = 4  # [kg/m³]
+GIVEN_MASS = 5  # of the explicit model [kg]
+GIVEN_CENTER = 6  # (3,) [mesh coordinates]
+GIVEN_TENSOR = 9  # (6,) ixx ixy ixz iyy iyz izz [kg m²]
+GRAVITY = 15  # (3,) [m/s², world]
+LINEAR_DAMPING = 18  # [N s/m]
+ANGULAR_DAMPING = 19  # [N m s]
+POSITION = 20  # (3,) at time 0 [m, world]
+ORIENTATION = 23  # (4,) at time 0, xyzw, of any length
+VELOCITY = 27  # (3,) at time 0 [m/s, world]
+ANGULAR_VELOCITY = 30  # (3,) at time 0 [rad/s, world]
+ACCURACY = 33  # local error rate
+SETTINGS = 34
+
+# A row of times.
+STEP_NS, TIMEOUT_NS, POKE_NS, DEGREE = range(4)
+TIMES = 4
+
+# What of a mesh doesn't change with the settings.
+SOLID_MEASURE = 0  # volume at unit scale; NaN when the surface bounds none
+MEASURE = 1  # of the model: volume, area or number of points
+REFERENCE = 2  # (3,)
+CENTER = 5  # (3,)
+CENTER_LOW = 8  # (3,)
+SECOND = 11  # (6,)
+EXTENT = 17  # (3,) of the bounding box
+HAS_SURFACE = 20
+MODEL = 21  # EXPLICIT, ORDINARY or SHELL
+GYROSCOPIC = 22
+CONSTANTS = 23
+
+EXPLICIT, ORDINARY, SHELL = 0, 1, 2
+
+
+@njit(cache=True, error_model="numpy")
+def divided(product, factor):
+    """x with x · factor == product where there is one, else the nearest; as ``scenario`` does it."""
+    x = product / factor
+    if x * factor == product:
+        return x
+    up, down = np.nextafter(x, np.inf), np.nextafter(x, -np.inf)
+    if up * factor == product:
+        return up
+    if down * factor == product:
+        return down
+    return x
+
+
+@njit(cache=True, error_model="numpy")
+def _plainly_good(a, b, c):
+    return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
+
+
+@njit(cache=True, error_model="numpy")
+def _points_with_mass(ballast):
+    """The rows of ``ballast`` (k, 4) with a mass; and whether all are in order."""
+    count = 0
+    for k in range(ballast.shape[0]):
+        if not ballast[k, 0] >= 0.0:
+            return ballast, False
+        for j in range(4):
+            if not math.isfinite(ballast[k, j]):
+                return ballast, False
+        if ballast[k, 0] > 0.0:
+            count += 1
+    points = np.empty((count, 4))
+    at = 0
+    for k in range(ballast.shape[0]):
+        if ballast[k, 0] > 0.0:
+            points[at, :] = ballast[k, :]
+            at += 1
+    return points, True
+
+
+@njit(cache=True, error_model="numpy")
+def _explicit(s, settings, points):
+    """Mass, COM (3,), inertia (3, 3) and whether the given numbers are plainly good."""
+    given = settings[GIVEN_TENSOR : GIVEN_TENSOR + 6]
+    inertia = np.empty((3, 3))
+    inertia[0, 0], inertia[1, 1], inertia[2, 2] = given[0], given[3], given[5]
+    inertia[0, 1] = inertia[1, 0] = given[1]
+    inertia[0, 2] = inertia[2, 0] = given[2]
+    inertia[1, 2] = inertia[2, 1] = given[4]
+    mass = settings[GIVEN_MASS]
+    center = settings[GIVEN_CENTER : GIVEN_CENTER + 3].copy()
+    com = s * center
+    principal = principal_axes_kernel(inertia)[0]
+    if not (0.0 < mass < math.inf and _plainly_good(principal[0], principal[1], principal[2])):
+        return mass, com, inertia, False
+    if points.shape[0] == 0:
+        return mass, com, inertia, True
+    second = -inertia
+    half_trace = 0.5 * (inertia[0, 0] + inertia[1, 1] + inertia[2, 2])
+    for k in range(3):
+        second[k, k] = half_trace - inertia[k, k]
+    total, moved, gathered, principal = loaded(mass, np.zeros(3), second, s, center, points)
+    return total, com + moved, gathered, _plainly_good(principal[0], principal[1], principal[2])
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(s, settings, points, constants):
+    """The same for a model whose mass is spread over a mesh."""
+    measure = constants[SOLID_MEASURE]
+    mass = settings[BODY_MASS]
+    if not mass > 0.0:
+        mass = settings[DENSITY] * measure * abs(s[0] * s[1] * s[2])
+    left = s.copy()
+    uniform = True
+    if constants[MODEL] == SHELL:
+        for k in range(3):
+            uniform = uniform and abs(s[k]) == abs(s[0])
+            left[k] = math.copysign(abs(s[0]), s[k])
+    reference = constants[REFERENCE : REFERENCE + 3].copy()
+    center = constants[CENTER : CENTER + 3].copy()
+    low = constants[CENTER_LOW : CENTER_LOW + 3].copy()
+    second = constants[SECOND : SECOND + 6].copy()
+    place, base, com, matrix = stretched(left, center, low, reference, second, mass / constants[MEASURE])
+    if constants[MODEL] == SHELL:
+        reference = reference * (left / s)
+    total, moved, inertia, principal = loaded(mass, place, matrix, s, reference, points)
+    if points.shape[0]:
+        com = base + moved
+    good = uniform and 1e-300 < mass < math.inf and _plainly_good(principal[0], principal[1], principal[2])
+    return total, com, inertia, good
+
+
+@njit(cache=True, error_model="numpy")
+def make_body_row(settings, ballast, constants, body):
+    """Fill ``body`` (BODY,) from settings (SETTINGS,), ballast (k, 4) and a mesh's constants; False when it takes a look."""
+    s = settings[SCALE : SCALE + 3].copy()
+    for k in range(3):
+        if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
+            return False
+    points, good = _points_with_mass(ballast)
+    if not good:
+        return False
+    if constants[MODEL] == EXPLICIT:
+        mass, com, inertia, good = _explicit(s, settings, points)
+    else:
+        mass, com, inertia, good = _spread(s, settings, points, constants)
+    if not good:
+        return False
+    moments, axes = principal_axes_kernel(inertia)
+    quaternion_of_axes(axes, body[QUATERNION : QUATERNION + 4])
+    body[MASS] = mass
+    diagonal = 0.0
+    for k in range(3):
+        body[COM + k] = divided(com[k], s[k]) * s[k]
+        body[MOMENTS + k] = moments[k]
+        body[BODY_SCALE + k] = s[k]
+        side = constants[EXTENT + k] * s[k]
+        diagonal += side * side
+        for j in range(3):
+            body[INERTIA + 3 * k + j] = inertia[k, j]
+            body[AXES + 3 * k + j] = axes[k, j]
+    body[LENGTH] = 0.5 * math.sqrt(diagonal) if constants[HAS_SURFACE] != 0.0 else 1.0
+    return math.isfinite(body[MASS] + body[COM] + body[COM + 1] + body[COM + 2] + body[LENGTH])
+
+
+@njit(cache=True, error_model="numpy")
+def initial_row(settings, row):
+    """The state row (13,) at time 0; False when the orientation has no length."""
+    q = settings[ORIENTATION : ORIENTATION + 4]
+    largest = max(abs(q[0]), abs(q[1]), abs(q[2]), abs(q[3]))
+    if not 0.0 < largest < math.inf:
+        return False
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    if not abs(x * x + y * y + z * z + w * w - 1.0) <= 1e-15:
+        x, y, z, w = normalize(x / largest, y / largest, z / largest, w / largest)
+    row[3], row[4], row[5], row[6] = x, y, z, w
+    a, b, c = (settings[ANGULAR_VELOCITY], settings[ANGULAR_VELOCITY + 1], settings[ANGULAR_VELOCITY + 2])
+    row[10] = (1 - 2 * (y * y + z * z)) * a + 2 * (x * y + w * z) * b + 2 * (x * z - w * y) * c
+    row[11] = 2 * (x * y - w * z) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z + w * x) * c
+    row[12] = 2 * (x * z + w * y) * a + 2 * (y * z - w * x) * b + (1 - 2 * (x * x + y * y)) * c
+    for k in range(3):
+        row[k] = settings[POSITION + k]
+        row[7 + k] = settings[VELOCITY + k]
+    return True

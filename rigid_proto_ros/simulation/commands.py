@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""Commands as the simulation takes them, and the order in which equal times act.
+
+Commands that act at the same nanosecond act in the order of ``order_key``, never by arrival: four publishers in any order give
+one trajectory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from ..base.errors import CommandRefused
+from ..motion.frames import Frame
+from ..motion.loads import Load, load_of_bytes
+from .flight import CLEAR
+from .setup import Setup
+
+FARTHEST = 1e100
+"""Metres: a place beyond it has no squared distance in a double."""
+
+
+class Rank(IntEnum):
+    """Order of single messages at one instant."""
+
+    CHANGE = 0  # parameter changes and services
+    INERTIA = 1
+    STRING = 2
+    WRENCH = 3
+    POKE = 4
+
+
+@dataclass(frozen=True)
+class WrenchCommand:
+    """One message of the wrench topic (``held``) or the poke topic.
+
+    force [N], torque [N m] as sent (N s and N m s for an impulse), frame already read; stamp_ns and frame_id as sent;
+    message: its serialized bytes, which settle the order among equal times.
+    """
+
+    held: bool
+    frame: Frame
+    force: tuple[float, float, float]
+    torque: tuple[float, float, float]
+    stamp_ns: int
+    frame_id: str
+    message: bytes
+
+    @property
+    def rank(self) -> Rank:
+        return Rank.WRENCH if self.held else Rank.POKE
+
+    @property
+    def kind(self) -> str:
+        return "wrench" if self.held else "poke"
+
+    @property
+    def content(self) -> dict:
+        """The message as the event log keeps it."""
+        return {
+            "stamp_ns": self.stamp_ns,
+            "frame_id": self.frame_id,
+            "force": list(self.force),
+            "torque": list(self.torque),
+        }
+
+    @property
+    def duration_ns(self) -> int:
+        """Of a poke that says how long it lasts, else −1."""
+        seconds = self.frame.duration_s
+        return -1 if seconds is None else round(seconds * 1e9)
+
+    def __post_init__(self) -> None:
+        if self.held and (self.frame.impulse or self.frame.duration_s is not None):
+            raise CommandRefused(
+                "frame", "frame_id", self.frame_id, "on the wrench topic no ;duration or ;impulse: those are pokes"
+            )
+
+
+@dataclass(frozen=True)
+class ClearWrench:
+    """End the held wrench and the running pulses; scheduled commands stay."""
+
+    message: bytes = b""
+    kind = "clear_wrench"
+    rank = Rank.CHANGE
+
+    @property
+    def content(self) -> dict:
+        return {}
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of parameters (kind ``set``) or of the whole inertia by message (``inertia``).
+
+    content: as the event log keeps it; apply() gives the new Setup from the values in force then, or raises InputError.
+    """
+
+    content: dict
+    apply: Callable
+    message: bytes = b""
+    kind: str = "set"
+    rank: Rank = Rank.CHANGE
+
+
+@dataclass(frozen=True)
+class TieString:
+    """Where on the body the string is, or will be, tied.
+
+    axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto the
+    surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent; message: serialized bytes.
+    """
+
+    axes: str
+    point: tuple[float, float, float]
+    stamp_ns: int = 0
+    frame_id: str = ""
+    message: bytes = b""
+    kind = "string_attach"
+    rank = Rank.STRING
+
+    def __post_init__(self) -> None:
+        if self.axes not in ("mesh", "body", "world"):
+            raise CommandRefused("frame", "frame_id", self.frame_id or self.axes, "axes mesh, body or world")
+        _check_point("string attach", self.point)
+
+    @property
+    def content(self) -> dict:
+        return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
+
+
+@dataclass(frozen=True)
+class MoveString:
+    """Where the string's free end goes, target (3,) [m, world]; the first one ties the string."""
+
+    target: tuple[float, float, float]
+    stamp_ns: int = 0
+    frame_id: str = ""
+    message: bytes = b""
+    kind = "string_target"
+    rank = Rank.STRING
+
+    def __post_init__(self) -> None:
+        _check_point("string target", self.target)
+
+    @property
+    def content(self) -> dict:
+        return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.target)}
+
+
+@dataclass(frozen=True)
+class ReleaseString:
+    """Let the string go."""
+
+    message: bytes = b""
+    kind = "string_release"
+    rank = Rank.CHANGE
+
+    @property
+    def content(self) -> dict:
+        return {}
+
+
+def _check_point(field: str, point) -> None:
+    if not all(math.isfinite(x) for x in point):
+        raise CommandRefused("nonfinite", field, list(point), "three finite numbers")
+    if not all(abs(x) <= FARTHEST for x in point):
+        raise CommandRefused("magnitude", field, list(point), f"at most {FARTHEST:g} m")
+
+
+def order_key(command: Command, listed: Listed | None) -> tuple:
+    """What decides among commands of one instant: first the entries of lists, each list's in its own order and lists by their
+    bytes; then single messages by rank and bytes.
+    """
+    return (0, *listed) if listed is not None else (1, command.rank, command.message)
+
+
+Listed = tuple[bytes, int]
+"""The bytes of the list that a command is an entry of, and its number there."""
+
+Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
+
+
+@dataclass(slots=True)
+class Pending:
+    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row as the flight's
+    tables hold them, the row empty until its load is settled, and the setup under which that was.
+    """
+
+    time_ns: int
+    command: Command
+    listed: Listed | None = None
+    settled_for: Setup | None = None
+    kind: int = CLEAR
+    duration_ns: int = -1
+    row: bytes = b""
+
+    @property
+    def load(self) -> Load | None:
+        """The load, where it is settled."""
+        return load_of_bytes(self.row) if self.row else None

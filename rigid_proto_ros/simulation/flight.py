@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: MIT
+"""A flight under commands, compiled: what live simulations, offline ones, replays and sweeps advance with.
+
+Everything a flight is stands in a few arrays: doubles ``f``, integers ``n``, and tables whose rows are loads (``times``,
+``loads``). Commands cut it into segments; ``fly`` goes from event to event until the time asked for, and writes down what began
+and ended on the way. What it can't do (a ray, a change of parameters, a string tied or let go) is brought about between two
+calls, by the same functions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.compilation import njit
+from ..motion import body as of_body
+from ..motion import problem as pr
+from ..motion.integrators import control as ctl
+from ..motion.integrators.auto import kind_of_segment
+from ..motion.integrators.integrator import MAX_SPEED
+from ..motion.integrators.stepping import ADAPTIVE, SLEEPS, WAY, commit, is_provided, reach
+from ..motion.integrators.stepping import EVALUATIONS as COST
+from ..motion.loads import LOAD, LOADS_SIZE, apply_impulse, is_zero, share_of
+from ..motion.variables import HAND_WORK, HEAT, STORED, to_good_row, to_variables
+
+# Doubles of a flight.
+ROW = 0  # (13,) state at NOW_NS
+START = ROW + 13  # (13,) state at the segment's start
+COMMON = START + 13  # (SIZE,) what the problems of all segments of this body have in common
+PROBLEM = COMMON + pr.SIZE  # (SIZE,) of the segment
+VARIABLES = PROBLEM + pr.SIZE  # (STORED,) at the last committed step
+TRIAL = VARIABLES + STORED  # (STORED,)
+FOLLOWING = TRIAL + STORED  # (STORED,) of an adaptive method
+CONTROL = FOLLOWING + STORED  # (ctl.SIZE,) of an adaptive method
+BODY = CONTROL + ctl.SIZE  # (BODY,)
+STRING = BODY + of_body.BODY  # (STRING,) while TIED
+SUMS = STRING + pr.STRING  # (LOADS_SIZE,) of the loads that act
+ACCURACY = SUMS + LOADS_SIZE
+DEGREE = ACCURACY + 1
+WORK, LOST = DEGREE + 1, DEGREE + 2  # of the string's hand and in its damper, from the segment's start to NOW_NS [J]
+WORK_BEFORE, LOST_BEFORE = DEGREE + 3, DEGREE + 4  # the same in the segments before
+ROOM = DEGREE + 5  # workspace of the adaptive methods, to the end
+
+# Integers of a flight.
+NOW_NS, START_NS, COMMITTED_NS = range(3)  # COMMITTED_NS: where the last full step of the segment ended
+STEP_NS, TIMEOUT_NS, POKE_NS = range(3, 6)  # settings; a timeout of 0 is none
+METHOD, CHOOSES, SEGMENTS = range(6, 9)  # CHOOSES: by what the segment holds, as auto does; SEGMENTS begun so far
+TAKEN = 9  # steps of the segment, but for those that an adaptive kernel counts
+STEPS_BEFORE, EVALUATIONS_BEFORE = 10, 11
+ACTING, HELD = (
+    12,
+    13,
+)  # the loads that act are rows 0 to ACTING − 1, in the order in which they began; which of them is held
+DUE, DUE_END = 14, 15  # rows of the commands that are to act next, in their order
+LOAD_IDS = 16  # given so far
+EVENTS = 17  # written so far in this call
+TIED, STRING_BEGIN_NS, STRING_END_NS = 18, 19, 20
+WAITS = 21  # for a kernel, in the middle of a call
+INTEGERS = 22
+
+NOBODY = -1
+"""HELD, when no held wrench acts."""
+
+# A row of times. AT_NS: when a command acts, or a load began. DURATION_NS of a pulse: −1 as the setting for pokes says.
+AT_NS, DURATION_NS, KIND, END_NS, ID, TIMES = range(6)
+HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
+"""Kinds of commands."""
+
+SHARE = LOAD
+"""A row of loads: the load itself (LOAD,), and while it acts what it adds to the sums (LOADS_SIZE,)."""
+LOAD_ROW = LOAD + LOADS_SIZE
+
+# A row of events: something became of a load. ROW_OF: the command's row in the tables.
+EVENT_NS, WHAT, LOAD_ID, ROW_OF, EVENT = range(5)
+APPLIED, BEGAN, ENDED, DONE = range(4)
+"""APPLIED: a command acts, before what it ends and begins. DONE: after that."""
+
+NEVER = 1 << 62
+"""Later than any simulated time [ns]."""
+
+REACHED, FAILED, NO_KERNEL = range(3)
+"""How a call came back. NO_KERNEL: the segment's method must be compiled first."""
+
+
+@njit(cache=True, error_model="numpy")
+def begin_segment(f, n, loads, methods):
+    """Begin a segment at START: what acts is summed afresh, in the order in which it began, and the method is chosen."""
+    sums, p = f[SUMS : SUMS + LOADS_SIZE], f[PROBLEM : PROBLEM + pr.SIZE]
+    start, body = f[START : START + 13], f[BODY : BODY + of_body.BODY]
+    sums[:] = 0.0
+    for row in range(n[ACTING]):
+        for k in range(LOADS_SIZE):
+            sums[k] += loads[row, SHARE + k]
+    p[:] = f[COMMON : COMMON + pr.SIZE]
+    pr.begin_problem(p, sums, start)
+    if n[TIED] != 0:
+        string = f[STRING : STRING + pr.STRING]
+        pr.begin_string(p, body, string, n[STRING_BEGIN_NS], n[STRING_END_NS], start, n[START_NS])
+    begin_variables(f, n, methods)
+
+
+@njit(cache=True, error_model="numpy")
+def begin_variables(f, n, methods):
+    """Begin a segment whose PROBLEM is made."""
+    p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
+    y[:] = 0.0
+    to_variables(f[START : START + 13], p, y)
+    before = n[METHOD]
+    if n[CHOOSES] != 0:
+        n[METHOD] = kind_of_segment(p, y, f[ACCURACY])
+    else:
+        n[METHOD] = 1 if p[pr.HAS_STRING] != 0.0 and methods.shape[0] > 1 else 0
+    if n[METHOD] != before and methods[n[METHOD], WAY] == ADAPTIVE:
+        # Kernels may count on zeros where they never write, and another method's were here.
+        f[ROOM:] = 0.0
+    control = f[CONTROL : CONTROL + ctl.SIZE]
+    control[:] = 0.0
+    control[ctl.ACCURACY], control[ctl.DEGREE] = f[ACCURACY], f[DEGREE]
+    f[WORK], f[LOST] = 0.0, 0.0
+    n[COMMITTED_NS], n[TAKEN] = n[START_NS], 0
+    n[SEGMENTS] += 1
+
+
+@njit(cache=True, error_model="numpy")
+def commit_until(f, n, methods, until_ns):
+    """Commit every full step of the segment that ends at or before ``until_ns``; whether all were good."""
+    if until_ns == n[COMMITTED_NS]:
+        return True
+    advanced, taken, good = commit(
+        methods[n[METHOD]],
+        f[VARIABLES : VARIABLES + STORED],
+        f[PROBLEM : PROBLEM + pr.SIZE],
+        f[CONTROL : CONTROL + ctl.SIZE],
+        f[FOLLOWING : FOLLOWING + STORED],
+        f[ROOM:],
+        n[STEP_NS],
+        until_ns - n[COMMITTED_NS],
+    )
+    n[COMMITTED_NS] += advanced
+    n[TAKEN] += taken
+    return good
+
+
+@njit(cache=True, error_model="numpy")
+def sample(f, n, methods, at_ns, row):
+    """The state at ``at_ns``, less than one step after the last committed one, into row; commits nothing. Whether it is good."""
+    if at_ns == n[START_NS]:
+        row[:] = f[START : START + 13]
+        return True
+    p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
+    rest_ns = at_ns - n[COMMITTED_NS]
+    if rest_ns > 0:
+        trial = f[TRIAL : TRIAL + STORED]
+        trial[:] = y
+        y = trial
+        control, following = f[CONTROL : CONTROL + ctl.SIZE], f[FOLLOWING : FOLLOWING + STORED]
+        if not reach(methods[n[METHOD]], y, p, control, following, f[ROOM:], rest_ns):
+            return False
+    if not to_good_row(y, p, (at_ns - n[START_NS]) * 1e-9, row, MAX_SPEED):
+        return False
+    f[WORK], f[LOST] = y[HAND_WORK], y[HEAT]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def carry(f, n, methods, until_ns):
+    """Go on in the segment to ``until_ns``: full steps, then one shorter step that ends exactly there, on a copy."""
+    n[WAITS] = 0 if is_provided(methods, n[METHOD]) else 1
+    if n[WAITS] != 0:
+        return NO_KERNEL
+    if not (commit_until(f, n, methods, until_ns) and sample(f, n, methods, until_ns, f[ROW : ROW + 13])):
+        stop_in_last_good_state(f, n)
+        return FAILED
+    n[NOW_NS] = until_ns
+    return REACHED
+
+
+@njit(cache=True, error_model="numpy")
+def last_good_state(f, n, row):
+    """The state at the last committed step, into row."""
+    if n[COMMITTED_NS] == n[START_NS]:
+        row[:] = f[START : START + 13]
+        return
+    y, p = f[VARIABLES : VARIABLES + STORED], f[PROBLEM : PROBLEM + pr.SIZE]
+    to_good_row(y, p, (n[COMMITTED_NS] - n[START_NS]) * 1e-9, row, MAX_SPEED)
+
+
+@njit(cache=True, error_model="numpy")
+def stop_in_last_good_state(f, n):
+    """Stay where the last good step ended, or at NOW_NS where that is later."""
+    row = f[TRIAL : TRIAL + 13]
+    last_good_state(f, n, row)
+    good = n[COMMITTED_NS] >= n[NOW_NS]
+    for k in range(13):
+        good = good and np.isfinite(row[k])
+    if good:
+        f[ROW : ROW + 13] = row
+        n[NOW_NS] = n[COMMITTED_NS]
+
+
+@njit(cache=True, error_model="numpy")
+def steps_of_segment(f, n):
+    """Steps committed in the segment."""
+    return n[TAKEN] + int(f[CONTROL + ctl.STEPS])
+
+
+@njit(cache=True, error_model="numpy")
+def evaluations_of_segment(f, n, methods):
+    """Evaluations of the equations of motion in them."""
+    # The step that ends a segment takes the series of the one that waits.
+    counted = f[CONTROL + ctl.EVALUATIONS] + f[CONTROL + ctl.PENDING]
+    return n[TAKEN] * methods[n[METHOD], COST] + int(counted)
+
+
+@njit(cache=True, error_model="numpy")
+def finish_segment(f, n, loads, methods):
+    """Keep the segment's counts and begin another from the state at NOW_NS."""
+    n[STEPS_BEFORE] += steps_of_segment(f, n)
+    n[EVALUATIONS_BEFORE] += evaluations_of_segment(f, n, methods)
+    f[WORK_BEFORE] += f[WORK]
+    f[LOST_BEFORE] += f[LOST]
+    f[START : START + 13] = f[ROW : ROW + 13]
+    n[START_NS] = n[NOW_NS]
+    begin_segment(f, n, loads, methods)
+
+
+@njit(cache=True, error_model="numpy")
+def cut_segment(f, n, loads, methods):
+    """End the segment at NOW_NS by the step that looking there took, and begin another."""
+    if n[NOW_NS] > n[COMMITTED_NS] and methods[n[METHOD], SLEEPS] == 0:
+        n[TAKEN] += 1
+    finish_segment(f, n, loads, methods)
+
+
+@njit(cache=True, error_model="numpy")
+def _write(n, events, what, load_id, row):
+    event = events[n[EVENTS]]
+    event[EVENT_NS], event[WHAT], event[LOAD_ID], event[ROW_OF] = n[NOW_NS], what, load_id, row
+    n[EVENTS] += 1
+
+
+@njit(cache=True, error_model="numpy")
+def _keep(n, times, loads, kept, row):
+    """Let the load of a row that acts go on as row ``kept``, which is not after it."""
+    if kept != row:
+        times[kept], loads[kept] = times[row], loads[row]
+        if n[HELD] == row:
+            n[HELD] = kept
+
+
+@njit(cache=True, error_model="numpy")
+def end_due(n, times, loads, events):
+    """End what ends at NOW_NS or should have before; whether anything did."""
+    kept = 0
+    for row in range(n[ACTING]):
+        if times[row, END_NS] > n[NOW_NS]:
+            _keep(n, times, loads, kept, row)
+            kept += 1
+            continue
+        _write(n, events, ENDED, times[row, ID], row)
+        if n[HELD] == row:
+            n[HELD] = NOBODY
+    ended = kept != n[ACTING]
+    n[ACTING] = kept
+    return ended
+
+
+@njit(cache=True, error_model="numpy")
+def end_held(n, times, loads, events):
+    """End the held wrench, if there is one."""
+    held = n[HELD]
+    if held == NOBODY:
+        return
+    _write(n, events, ENDED, times[held, ID], held)
+    n[HELD] = NOBODY
+    for row in range(held + 1, n[ACTING]):
+        _keep(n, times, loads, row - 1, row)
+    n[ACTING] -= 1
+
+
+@njit(cache=True, error_model="numpy")
+def end_all(n, times, events):
+    """End everything that acts."""
+    for row in range(n[ACTING]):
+        _write(n, events, ENDED, times[row, ID], row)
+    n[ACTING], n[HELD] = 0, NOBODY
+
+
+@njit(cache=True, error_model="numpy")
+def end_of_held(n, begin_ns):
+    """When a held wrench that began at ``begin_ns`` ends."""
+    return max(begin_ns + n[TIMEOUT_NS], n[NOW_NS]) if n[TIMEOUT_NS] != 0 else NEVER
+
+
+@njit(cache=True, error_model="numpy")
+def _begin(n, times, loads, body, row, end_ns):
+    """Let the load of a row act from NOW_NS until ``end_ns``, as the last of those that act."""
+    to = n[ACTING]
+    if to != row:
+        times[to], loads[to] = times[row], loads[row]
+    times[to, AT_NS], times[to, END_NS], times[to, ID] = n[NOW_NS], end_ns, n[LOAD_IDS]
+    share_of(loads[to, :LOAD], body, loads[to, SHARE:])
+    n[ACTING] += 1
+
+
+@njit(cache=True, error_model="numpy")
+def apply(f, n, times, loads, events, row):
+    """Bring about the command of a row at NOW_NS. Rows before it may be taken by loads that act."""
+    kind, body = times[row, KIND], f[BODY : BODY + of_body.BODY]
+    if kind != CLEAR:
+        n[LOAD_IDS] += 1
+    load_id = n[LOAD_IDS]
+    _write(n, events, APPLIED, load_id, row)
+    if kind == CLEAR:
+        end_all(n, times, events)
+    elif kind == IMPULSE:
+        apply_impulse(loads[row, :LOAD], body, f[ROW : ROW + 13])
+        _write(n, events, BEGAN, load_id, row)
+    elif kind == PULSE:
+        duration_ns = times[row, DURATION_NS]
+        _begin(n, times, loads, body, row, n[NOW_NS] + (n[POKE_NS] if duration_ns < 0 else duration_ns))
+        _write(n, events, BEGAN, load_id, row)
+    else:
+        end_held(n, times, loads, events)
+        if not is_zero(loads[row, :LOAD]):
+            n[HELD] = n[ACTING]
+            _begin(n, times, loads, body, row, end_of_held(n, n[NOW_NS]))
+            _write(n, events, BEGAN, load_id, row)
+    _write(n, events, DONE, load_id, row)
+
+
+@njit(cache=True, error_model="numpy")
+def next_event_ns(n, times):
+    """When the next load ends or command acts, or the string's free end arrives."""
+    event_ns = times[n[DUE], AT_NS] if n[DUE] < n[DUE_END] else NEVER
+    for row in range(n[ACTING]):
+        event_ns = min(event_ns, times[row, END_NS])
+    if n[TIED] != 0 and n[STRING_END_NS] > n[START_NS]:
+        event_ns = min(event_ns, n[STRING_END_NS])
+    return event_ns
+
+
+@njit(cache=True, error_model="numpy")
+def fly(f, n, times, loads, events, methods, until_ns):
+    """Carry the body to ``until_ns``; ROW is its state there, before what acts at that very time.
+
+    Returns REACHED, FAILED (ROW is the last good state), or NO_KERNEL: then call again with a kernel for METHOD.
+    """
+    if n[WAITS] == 0:
+        n[EVENTS] = 0
+    while True:
+        # 1. Until the next event: full steps, then one shorter step that ends exactly there.
+        event_ns = min(next_event_ns(n, times), until_ns)
+        came = carry(f, n, methods, event_ns)
+        if came != REACHED or event_ns == until_ns:
+            return came
+        # 2. What ends, then what begins; with new loads a new segment.
+        end_due(n, times, loads, events)
+        while n[DUE] < n[DUE_END] and times[n[DUE], AT_NS] == event_ns:
+            apply(f, n, times, loads, events, n[DUE])
+            n[DUE] += 1
+        cut_segment(f, n, loads, methods)

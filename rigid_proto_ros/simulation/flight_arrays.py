@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: MIT
+"""The arrays of one compiled flight (simulation/flight.py): made, filled from a setup, and read."""
+
+from __future__ import annotations
+
+import functools
+import struct
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numba import int64
+
+from ..base.arrays_at import address_of_array, doubles_at, integers_at
+from ..base.compilation import njit
+from ..base.kernel_calls import entry_of
+from ..motion.body import BODY
+from ..motion.integrators.stepping import METHOD, Method, provide_kernel
+from ..motion.loads import LOAD, LOADS_SIZE, Load, load_of_row, share_of
+from ..motion.problem import SIZE, STRING
+from ..motion.state import State
+from ..motion.string import Tied
+from . import flight as fl
+from .commands import Pending
+from .flight_start import FlightStart
+from .setup import Setup
+
+FIRST_ROWS = 8
+"""Of the tables at first; they double as needed."""
+
+_TIMES = struct.Struct("=5q")
+_LOAD_BYTES = 8 * fl.LOAD_ROW
+
+# Behind the integers of a flight: how many doubles there are, and where the tables are and of what size.
+DOUBLES, TABLES_AT, TABLE_ROWS, METHODS_AT, METHODS = range(fl.INTEGERS, fl.INTEGERS + 5)
+INTEGERS = fl.INTEGERS + 5
+
+_LINE = 8
+"""Doubles of a line of the processor's cache."""
+
+
+def _sizes(rows: int) -> tuple[int, int, int]:
+    """Numbers in the tables of times, loads and events, which stand one behind the other."""
+    return fl.TIMES * rows, fl.LOAD_ROW * rows, fl.EVENT * (4 * rows + 4)
+
+
+class Acting(NamedTuple):
+    """A load that acts from begin_ns until end_ns; held: it is the held wrench."""
+
+    load: Load
+    begin_ns: int
+    end_ns: int
+    load_id: int
+    held: bool
+
+
+@njit(cache=True, error_model="numpy")
+def _arrays(at):
+    """f, n, times, loads, events and methods of the flight whose integers are at this address, with its doubles behind them."""
+    n = integers_at(at, (INTEGERS,))
+    f = doubles_at(at + 8 * INTEGERS, (n[DOUBLES],))
+    rows, times_at = n[TABLE_ROWS], n[TABLES_AT]
+    loads_at = times_at + 8 * fl.TIMES * rows
+    events_at = loads_at + 8 * fl.LOAD_ROW * rows
+    times, loads = integers_at(times_at, (rows, fl.TIMES)), doubles_at(loads_at, (rows, fl.LOAD_ROW))
+    events, methods = integers_at(events_at, (4 * rows + 4, fl.EVENT)), integers_at(n[METHODS_AT], (n[METHODS], METHOD))
+    return f, n, times, loads, events, methods
+
+
+@njit(cache=True, error_model="numpy")
+def _fly_at(at, until_ns):
+    f, n, times, loads, events, methods = _arrays(at)
+    return fl.fly(f, n, times, loads, events, methods, until_ns)
+
+
+@njit(cache=True, error_model="numpy")
+def _begin_at(at):
+    f, n, _, loads, _, methods = _arrays(at)
+    fl.begin_segment(f, n, loads, methods)
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def _share_anew(at):
+    """What the loads that act add to the sums, for another body."""
+    f, n, times, loads, _, _ = _arrays(at)
+    for row in range(n[fl.ACTING]):
+        share_of(loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], loads[row, fl.SHARE :])
+    if n[fl.HELD] != fl.NOBODY:
+        times[n[fl.HELD], fl.END_NS] = fl.end_of_held(n, times[n[fl.HELD], fl.AT_NS])
+    return 0
+
+
+@functools.cache
+def _entries() -> tuple[Callable, Callable]:
+    return entry_of(_fly_at, int64(int64, int64)), entry_of(_begin_at, int64(int64))
+
+
+class FlightArrays:
+    """f, n, times, loads, events: as simulation/flight.py lays them out. What isn't a matter of arrays is the simulation's."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.first_due = 0
+        self._fly, self._begin = _entries()
+        start = setup.flight_start
+        self._make_room(start.room)
+        self._make_tables(FIRST_ROWS)
+        self._take_methods(setup, start)
+
+    def _take_methods(self, setup: Setup, start: FlightStart) -> None:
+        self.integrator, self.methods = setup.integrator, start.methods
+        if len(self.f) < fl.ROOM + start.room:
+            f, n, head = self.f[: fl.ROOM].copy(), self.n.copy(), self._head
+            table = head[TABLES_AT], head[TABLE_ROWS]
+            self._make_room(start.room)
+            self.f[: fl.ROOM], self.n[:] = f, n
+            self._head[TABLES_AT], self._head[TABLE_ROWS] = table
+        self._head[METHODS_AT], self._head[METHODS] = start.methods_at, len(start.methods)
+
+    def take(self, setup: Setup) -> None:
+        """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
+        start = setup.flight_start
+        self._take_methods(setup, start)
+        f, n = self.f, self.n
+        f[fl.ROOM :] = 0.0
+        f[fl.BODY : fl.BODY + BODY] = start.f[fl.BODY : fl.BODY + BODY]
+        f[fl.COMMON : fl.COMMON + SIZE] = start.f[fl.COMMON : fl.COMMON + SIZE]
+        f[fl.ACCURACY], f[fl.DEGREE] = start.f[fl.ACCURACY], start.f[fl.DEGREE]
+        for setting in (fl.STEP_NS, fl.TIMEOUT_NS, fl.POKE_NS, fl.CHOOSES):
+            n[setting] = start.n[setting]
+        _share_anew(self._at)
+
+    def start_over(self, setup: Setup, tied: Tied | None) -> None:
+        """Time 0, the initial state, and nothing that acts but a string."""
+        start, load_ids = setup.flight_start, self._head[fl.LOAD_IDS]
+        self._take_methods(setup, start)
+        self.f[: fl.ROOM] = start.f
+        self.n[:] = start.n
+        self._head[fl.LOAD_IDS] = load_ids
+        if tied is not None:
+            self.tie(tied)
+        self._begin(self._at)
+
+    def tie(self, tied: Tied | None) -> None:
+        """The string is tied like this, or not at all, from the next segment on."""
+        self.n[fl.TIED] = tied is not None
+        if tied is not None:
+            self.f[fl.STRING : fl.STRING + STRING] = tied.row
+            self.n[fl.STRING_BEGIN_NS], self.n[fl.STRING_END_NS] = tied.begin_ns, tied.end_ns
+
+    # Commands
+
+    def put(self, due: list[Pending]) -> None:
+        """Put commands into the tables, behind the loads that act, as those that act next."""
+        head = self._head
+        first = self.first_due = head[fl.ACTING]
+        last = first + len(due)
+        if last > head[TABLE_ROWS]:
+            self._make_tables(2 * last)
+        tables, pack = self._table_bytes, _TIMES.pack_into
+        at = 8 * fl.TIMES * head[TABLE_ROWS] + _LOAD_BYTES * first
+        for row, pending in enumerate(due, first):
+            bytes_of_load = pending.row
+            pack(tables, _TIMES.size * row, pending.time_ns, pending.duration_ns, pending.kind, 0, 0)
+            tables[at : at + len(bytes_of_load)] = bytes_of_load
+            at += _LOAD_BYTES
+        head[fl.DUE], head[fl.DUE_END] = first, last
+
+    @property
+    def waiting(self) -> int:
+        """How many of the commands put last haven't acted yet."""
+        return self._head[fl.DUE_END] - self._head[fl.DUE]
+
+    def fly(self, until_ns: int) -> bool:
+        """Advance to ``until_ns``; False when the motion failed."""
+        while (came := self._fly(self._at, until_ns)) == fl.NO_KERNEL:
+            provide_kernel(self.integrator, self.methods, self._head[fl.METHOD])
+        return came == fl.REACHED
+
+    def apply(self) -> None:
+        """Bring about the command due next, at the time of the flight."""
+        n = self.n
+        n[fl.EVENTS] = 0
+        fl.apply(self.f, n, self.times, self.loads, self.events, int(n[fl.DUE]))
+        n[fl.DUE] += 1
+
+    def end_due(self) -> bool:
+        """End what ends at the time of the flight; whether anything did."""
+        self.n[fl.EVENTS] = 0
+        return fl.end_due(self.n, self.times, self.loads, self.events)
+
+    def end_all(self) -> None:
+        """End the held wrench and the pulses."""
+        self._head[fl.EVENTS] = 0
+        if self._head[fl.ACTING]:
+            fl.end_all(self.n, self.times, self.events)
+
+    def last_events(self) -> list[list[int]]:
+        """What the last call began and ended: rows (EVENT,)."""
+        return self.events[: self.n[fl.EVENTS]].tolist()
+
+    # Segments
+
+    def cut_segment(self) -> None:
+        """End the segment at the time of the flight by the step that looking there took, and begin another."""
+        fl.cut_segment(self.f, self.n, self.loads, self.methods)
+
+    def finish_segment(self) -> None:
+        """Keep the segment's counts and begin another from the present state."""
+        fl.finish_segment(self.f, self.n, self.loads, self.methods)
+
+    # Readings
+
+    @property
+    def time_ns(self) -> int:
+        return self._head[fl.NOW_NS]
+
+    @property
+    def state(self) -> State:
+        """The state now."""
+        return State(self._head[fl.NOW_NS], self.row.copy())
+
+    @property
+    def acts(self) -> bool:
+        """Whether any load acts."""
+        return bool(self._head[fl.ACTING])
+
+    def acting(self) -> Iterator[Acting]:
+        """The loads that act, in the order in which they began."""
+        for row in range(self.n[fl.ACTING]):
+            begin_ns, _, _, end_ns, load_id = self.times[row].tolist()
+            yield Acting(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, row == self.n[fl.HELD])
+
+    @property
+    def sums(self) -> np.ndarray:
+        """All of them summed (LOADS_SIZE,), as motion/loads.py lays them out."""
+        return self.f[fl.SUMS : fl.SUMS + LOADS_SIZE].copy()
+
+    @property
+    def steps(self) -> int:
+        """Steps committed since time 0."""
+        return int(self.n[fl.STEPS_BEFORE]) + fl.steps_of_segment(self.f, self.n)
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the equations of motion in them."""
+        return int(self.n[fl.EVALUATIONS_BEFORE]) + fl.evaluations_of_segment(self.f, self.n, self.methods)
+
+    @property
+    def hand_work(self) -> float:
+        """Of the string's hand since time 0 [J]."""
+        return float(self.f[fl.WORK_BEFORE] + self.f[fl.WORK])
+
+    @property
+    def heat(self) -> float:
+        """In the string's damper since time 0 [J]."""
+        return float(self.f[fl.LOST_BEFORE] + self.f[fl.LOST])
+
+    @property
+    def method(self) -> Method:
+        """How the segment is stepped."""
+        return self.integrator.methods[int(self.n[fl.METHOD])]
+
+    # Memory
+
+    def _make_room(self, room: int) -> None:
+        """Integers and doubles, with so much workspace that begins a line of the processor's cache."""
+        doubles = fl.ROOM + room
+        whole = np.empty(INTEGERS + doubles + _LINE)
+        at = address_of_array(whole)
+        first = -(at // 8 + INTEGERS + fl.ROOM) % _LINE
+        self._at = at + 8 * first
+        integers = whole[first : first + INTEGERS].view(np.int64)
+        self._head = memoryview(integers)
+        self._head[DOUBLES], self._head[fl.ACTING] = doubles, 0
+        self.n = integers[: fl.INTEGERS]
+        self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
+        self.row = self.f[fl.ROW : fl.ROW + 13]
+
+    def _make_tables(self, rows: int) -> None:
+        """Tables of so many rows; what acts goes on."""
+        kept = self._head[fl.ACTING]
+        before = (self.times[:kept], self.loads[:kept]) if kept else None
+        self._tables = np.zeros(sum(_sizes(rows)), np.int64)
+        self._table_bytes = memoryview(self._tables).cast("B")
+        self._head[TABLES_AT], self._head[TABLE_ROWS] = address_of_array(self._tables), rows
+        if before is not None:
+            self.times[:kept], self.loads[:kept] = before
+
+    @property
+    def times(self) -> np.ndarray:
+        """(rows, TIMES)"""
+        times, _, _ = _sizes(self._head[TABLE_ROWS])
+        return self._tables[:times].reshape(-1, fl.TIMES)
+
+    @property
+    def loads(self) -> np.ndarray:
+        """(rows, LOAD_ROW)"""
+        times, loads, _ = _sizes(self._head[TABLE_ROWS])
+        return self._tables[times : times + loads].view(np.float64).reshape(-1, fl.LOAD_ROW)
+
+    @property
+    def events(self) -> np.ndarray:
+        """(4 rows + 4, EVENT)"""
+        times, loads, _ = _sizes(self._head[TABLE_ROWS])
+        return self._tables[times + loads :].reshape(-1, fl.EVENT)

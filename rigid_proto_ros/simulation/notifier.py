@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""What a simulation tells whoever watches it: the body, what acts on it, the string, and what the motion is doing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..motion.loads import Load
+from ..motion.string import Tied
+from .observer import BodySnapshot, Observer, ShownLoad, ShownString, listens
+from .setup import Setup
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+EFFORT_PERIOD_NS = 50_000_000
+"""[ns, simulated] How often observers are told what the motion has cost."""
+
+
+class Narrator:
+    """Tells one observer, and only what it listens to."""
+
+    def __init__(self, observer: Observer) -> None:
+        self.start_over()
+        self.watch_for(observer)
+
+    def watch_for(self, observer: Observer) -> None:
+        """Tell this observer from now on, and no other."""
+        self.observer = observer
+        self._told: dict[str, str] = {}
+        self.shows_loads = listens(observer, "load_began")
+        self.hears_loads = any(listens(observer, m) for m in ("applied", "load_began", "load_ended"))
+        self._shows_status = listens(observer, "status")
+        self._shows_string = listens(observer, "string_changed")
+
+    def start_over(self) -> None:
+        """Simulated time starts again at 0: nothing has been told of it."""
+        self._told = {}
+        self._told_string: Tied | None = None
+        self._next_effort_ns = 0
+
+    def introduce(self, simulation: Simulation) -> None:
+        """Tell an observer that comes in flight about the body, what acts on it and the string."""
+        self.body(simulation)
+        if self.shows_loads:
+            for acting in simulation.acting:
+                self.load_began(simulation, acting.load_id, "wrench" if acting.held else "poke", acting.load)
+        self.string(simulation)
+
+    def body(self, simulation: Simulation) -> None:
+        """The body as it is now."""
+        self.observer.body_changed(simulation.time_ns, snapshot(simulation.setup))
+
+    def status(self, simulation: Simulation, paused: bool) -> None:
+        """What the body is doing, where that changed since it was last told."""
+        if not self._shows_status:
+            return
+        motion = "paused" if paused else "sleeping" if simulation.at_rest else "flying"
+        tracks = {"motion": motion, "method": simulation.choice}
+        string = simulation.string
+        if string is not None:
+            slack = not string.bilateral and string.stretch(simulation.setup.body, simulation.state) < 0.0
+            tracks["string"] = "slack" if slack else "taut"
+        elif "string" in self._told:
+            tracks["string"] = "loose"
+        for track, value in tracks.items():
+            if self._told.get(track) != value:
+                self._told[track] = value
+                self.observer.status(simulation.time_ns, track, value)
+        if simulation.time_ns >= self._next_effort_ns:
+            self._next_effort_ns = simulation.time_ns + EFFORT_PERIOD_NS
+            self.observer.effort(simulation.time_ns, simulation.steps, simulation.force_evaluations)
+
+    def load_began(self, simulation: Simulation, load_id: int, kind: str, load: Load) -> None:
+        """A load begins to act; ``kind`` is wrench, poke or impulse."""
+        if self.shows_loads:
+            shown = _shown_load(kind, load, simulation.setup)
+            self.observer.load_began(simulation.time_ns, load_id, shown)
+
+    def string(self, simulation: Simulation) -> None:
+        """The string, where it changed since it was last told."""
+        tied = simulation.string
+        if tied is self._told_string:
+            return
+        self._told_string = tied
+        if not self._shows_string:
+            return
+        self.observer.string_changed(
+            simulation.time_ns, None if tied is None else _shown_string(tied, simulation.setup)
+        )
+
+
+def snapshot(setup: Setup) -> BodySnapshot:
+    """The body of a setup as observers are told of it."""
+    body = setup.body
+    return BodySnapshot(
+        body.mass,
+        body.center_of_mass,
+        body.inertia,
+        body.scale,
+        setup.gravity,
+        setup.inertia_model,
+        setup.integrator.name,
+        setup.gyroscopic,
+    )
+
+
+def _shown_load(kind: str, load: Load, setup: Setup) -> ShownLoad:
+    axes = "world" if load.axes == "world" else "body"
+    force = np.asarray(load.force) if axes == "world" else load.own_force(setup.body)
+    return ShownLoad(kind, axes, load.arm(setup.body), force, np.asarray(load.torque))
+
+
+def _shown_string(tied: Tied, setup: Setup) -> ShownString:
+    arm = np.asarray(tied.arm(setup.body))
+    ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
+    return ShownString(arm, *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)

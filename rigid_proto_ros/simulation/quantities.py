@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""Scalars of a flight by name: what measures take maxima of, what conditions compare, what samples hold.
+
+A quantity is a function of the state now and of the start, which is kept as a row (CONTEXT,): mass, tensor, gravity, the
+state row at time 0, its energy and angular momentum.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..base.compilation import njit
+from ..base.rotation import rotate
+
+QUANTITIES = {
+    "position.x": "m",
+    "position.y": "m",
+    "position.z": "m",
+    "orientation.x": "",
+    "orientation.y": "",
+    "orientation.z": "",
+    "orientation.w": "",
+    "velocity.x": "m/s",
+    "velocity.y": "m/s",
+    "velocity.z": "m/s",
+    "spin.x": "rad/s",
+    "spin.y": "rad/s",
+    "spin.z": "rad/s",
+    "speed": "m/s",
+    "spin": "rad/s",
+    "distance": "m",
+    "turned": "rad",
+    "kinetic_energy": "J",
+    "potential_energy": "J",
+    "energy": "J",
+    "energy_drift": "",
+    "angular_momentum": "N m s",
+    "momentum_turned": "rad",
+}
+"""Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are from the
+start, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the drift of L's direction."""
+
+NAMES = tuple(QUANTITIES)
+SPEED, SPIN, DISTANCE, TURNED, KINETIC, POTENTIAL, ENERGY, DRIFT, MOMENTUM, MOMENTUM_TURNED = range(13, 23)
+
+DIFFERENCES = {"attitude": "rad", "position": "m", "velocity": "m/s", "spin": "rad/s"}
+"""How far two states are apart; velocities and spins in world axes."""
+
+STATE = 14
+"""A state row (13,) and the string's energy [J]."""
+
+MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10, 13, 27, 28, 31
+
+
+@njit(cache=True, error_model="numpy")
+def _momentum(row, context):
+    """R I ω (3,)."""
+    I, x, y, z = INERTIA, row[10], row[11], row[12]
+    return rotate(
+        row[3],
+        row[4],
+        row[5],
+        row[6],
+        context[I] * x + context[I + 1] * y + context[I + 2] * z,
+        context[I + 3] * x + context[I + 4] * y + context[I + 5] * z,
+        context[I + 6] * x + context[I + 7] * y + context[I + 8] * z,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _kinetic(row, context):
+    I, x, y, z = INERTIA, row[10], row[11], row[12]
+    turning = (
+        x * (context[I] * x + context[I + 1] * y + context[I + 2] * z)
+        + y * (context[I + 3] * x + context[I + 4] * y + context[I + 5] * z)
+        + z * (context[I + 6] * x + context[I + 7] * y + context[I + 8] * z)
+    )
+    return 0.5 * context[MASS] * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning
+
+
+@njit(cache=True, error_model="numpy")
+def _potential(row, context):
+    g = GRAVITY
+    fallen = context[g] * row[0] + context[g + 1] * row[1] + context[g + 2] * row[2]
+    return row[13] - context[MASS] * fallen
+
+
+@njit(cache=True, error_model="numpy")
+def _length(x, y, z):
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, error_model="numpy")
+def attitude_angle(a, b):
+    """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
+    w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
+    y = a[3] * b[1] + a[0] * b[2] - a[1] * b[3] - a[2] * b[0]
+    z = a[3] * b[2] - a[0] * b[1] + a[1] * b[0] - a[2] * b[3]
+    return 2.0 * math.atan2(_length(x, y, z), abs(w))
+
+
+@njit(cache=True, error_model="numpy")
+def begin(mass, inertia, gravity, row, context):
+    """Fill the context (CONTEXT,) from mass, tensor (9,), gravity (3,) and the state row (STATE,) at time 0."""
+    context[MASS] = mass
+    context[INERTIA : INERTIA + 9] = inertia
+    context[GRAVITY : GRAVITY + 3] = gravity
+    context[START : START + STATE] = row
+    context[START_ENERGY] = _kinetic(row, context) + _potential(row, context)
+    lx, ly, lz = _momentum(row, context)
+    context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = lx, ly, lz
+
+
+@njit(cache=True, error_model="numpy")
+def quantity(code, row, context):
+    """The quantity NAMES[code] of a state row (STATE,)."""
+    if code < 13:
+        return row[code]
+    if code == SPEED:
+        return _length(row[7], row[8], row[9])
+    if code == SPIN:
+        return _length(row[10], row[11], row[12])
+    if code == DISTANCE:
+        return _length(row[0] - context[START], row[1] - context[START + 1], row[2] - context[START + 2])
+    if code == TURNED:
+        return attitude_angle(context[START + 3 : START + 7], row[3:7])
+    if code == KINETIC:
+        return _kinetic(row, context)
+    if code == POTENTIAL:
+        return _potential(row, context)
+    if code == ENERGY:
+        return _kinetic(row, context) + _potential(row, context)
+    if code == DRIFT:
+        return abs(_kinetic(row, context) + _potential(row, context) - context[START_ENERGY]) / abs(
+            context[START_ENERGY]
+        )
+    lx, ly, lz = _momentum(row, context)
+    if code == MOMENTUM:
+        return _length(lx, ly, lz)
+    ax, ay, az = context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2]
+    across = _length(ly * az - lz * ay, lz * ax - lx * az, lx * ay - ly * ax)
+    return math.atan2(across, lx * ax + ly * ay + lz * az)
+
+
+@njit(cache=True, error_model="numpy")
+def difference(code, a, b):
+    """The difference number ``code`` of DIFFERENCES between two state rows."""
+    if code == 0:
+        return attitude_angle(a[3:7], b[3:7])
+    if code == 1:
+        return _length(a[0] - b[0], a[1] - b[1], a[2] - b[2])
+    if code == 2:
+        return _length(a[7] - b[7], a[8] - b[8], a[9] - b[9])
+    ax, ay, az = rotate(a[3], a[4], a[5], a[6], a[10], a[11], a[12])
+    bx, by, bz = rotate(b[3], b[4], b[5], b[6], b[10], b[11], b[12])
+    return _length(ax - bx, ay - by, az - bz)
+
+
+STOP_CODE, STOP_SIGN, STOP_LIMIT = range(3)
+
+
+@njit(cache=True, error_model="numpy")
+def met(condition, row, context):
+    """Whether a condition (code, sign, limit) holds: the quantity is above the limit (sign 1) or below it (−1)."""
+    return condition[STOP_SIGN] * (quantity(int(condition[STOP_CODE]), row, context) - condition[STOP_LIMIT]) > 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def which_is_met(conditions, row, context):
+    """Number of the first condition (k, 3) that holds, or −1."""
+    for k in range(conditions.shape[0]):
+        if met(conditions[k], row, context):
+            return k
+    return -1

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""A stretch of simulated time in which all commands are constant, as it can be read off a flight.
+
+Steps count from the segment's start, and only full ones are committed; looking at a time in between takes one shorter step
+on a copy. So the motion depends on where segments begin and end, that is on commands and their times, and not on how often or
+in which portions it was asked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..motion.integrators import control as ctl
+from ..motion.integrators.stepping import NOTHING, ONE_STEP
+from ..motion.problem import SIZE
+from ..motion.state import State
+from ..motion.variables import STORED
+from . import flight as fl
+from .flight_arrays import FlightArrays
+
+
+class Segment:
+    """The segment that a flight is in: views of its arrays, so what is read is what is so now.
+
+    number: of segments begun before it and itself. start: state at the segment's start. committed_ns: where the last full step
+    ended. problem: motion/problem.py. variables: motion/variables.py, at the last committed step.
+    """
+
+    def __init__(self, arrays: FlightArrays) -> None:
+        self._arrays = arrays
+
+    @property
+    def number(self) -> int:
+        return int(self._arrays.n[fl.SEGMENTS])
+
+    @property
+    def start(self) -> State:
+        return State(int(self._arrays.n[fl.START_NS]), self._arrays.f[fl.START : fl.START + 13].copy())
+
+    @property
+    def committed_ns(self) -> int:
+        return int(self._arrays.n[fl.COMMITTED_NS])
+
+    @property
+    def problem(self) -> np.ndarray:
+        return self._arrays.f[fl.PROBLEM : fl.PROBLEM + SIZE]
+
+    @property
+    def variables(self) -> np.ndarray:
+        return self._arrays.f[fl.VARIABLES : fl.VARIABLES + STORED]
+
+    @property
+    def sampled(self) -> np.ndarray:
+        """The variables at the time last advanced to."""
+        f, n = self._arrays.f, self._arrays.n
+        return f[fl.TRIAL : fl.TRIAL + STORED] if n[fl.NOW_NS] > n[fl.COMMITTED_NS] else self.variables
+
+    @property
+    def steps(self) -> int:
+        """Steps committed so far."""
+        return int(fl.steps_of_segment(self._arrays.f, self._arrays.n))
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the equations of motion in them."""
+        return int(fl.evaluations_of_segment(self._arrays.f, self._arrays.n, self._arrays.methods))
+
+    @property
+    def evaluates_once(self) -> bool:
+        """Whether the segment is one exact step, however long, of a body that turns."""
+        method = self._arrays.method
+        return method.way in (NOTHING, ONE_STEP) and not method.sleeps
+
+    @property
+    def choice(self) -> str:
+        """Which method, and why."""
+        step_s = int(self._arrays.n[fl.STEP_NS]) * 1e-9
+        return self._arrays.method.choice(self.problem, step_s, float(self._arrays.f[fl.ACCURACY]))
+
+    @property
+    def floor_binds(self) -> bool:
+        """Some step's error allowance was set by rounding and not by the accuracy asked for."""
+        return self._arrays.method.floor_binds or bool(self._arrays.f[fl.CONTROL + ctl.FLOOR_BINDS])

@@ -1,0 +1,412 @@
+# SPDX-License-Identifier: MIT
+"""The simulation: commands in, motion out.
+
+Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/segment.py); within one, commands are
+constant and an integrator carries the body. ``advance`` is the whole story.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from collections.abc import Iterable
+from typing import Protocol
+
+from ..base.errors import CommandRefused, InputError
+from ..motion.integrators import check_carried
+from ..motion.integrators.integrator import (
+    ANGULAR_DAMPING,
+    MAX_SPEED,
+    NO_GYROSCOPIC_TERM,
+    STRING,
+    needs_of_load,
+)
+from ..motion.loads import Load, cross, light_row, settle
+from ..motion.state import State
+from . import flight as fl
+from .commands import (
+    Change,
+    ClearWrench,
+    Command,
+    Listed,
+    MoveString,
+    Pending,
+    ReleaseString,
+    TieString,
+    WrenchCommand,
+    order_key,
+)
+from .event_log import EventLog, Noted
+from .flight_arrays import FlightArrays
+from .notifier import Narrator, snapshot
+from .observer import BodySnapshot, Observer
+from .readings import Readings
+from .setup import Setup
+from .string_control import StringControl
+
+
+class Follower(Protocol):
+    """Whoever takes the same commands at the same times, such as a ghost."""
+
+    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None: ...
+
+
+class Simulation(Readings):
+    """One body under commands; what can be read off it is in readings.py.
+
+    Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
+    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place of the
+    command that acts at this moment in its list, if it is an entry of one.
+    """
+
+    def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
+        self.setup = setup
+        self.observer = observer or Observer()
+        self._narrator = Narrator(self.observer)
+        self.follower: Follower | None = None
+        self.events = EventLog()
+        self.refused: Counter[str] = Counter()
+        self._arrivals = 0
+        self.listed: Listed | None = None
+        check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
+        self._arrays = FlightArrays(setup)
+        self._start_over()
+
+    # Who watches
+
+    def watch(self, observer: Observer) -> None:
+        """Tell this observer from now on, and no other."""
+        self.observer = observer
+        self._narrator.watch_for(observer)
+
+    def introduce(self, observer: Observer) -> None:
+        """Tell an observer that comes in flight about the body, what acts on it and the string."""
+        Narrator(observer).introduce(self)
+
+    def announce(self) -> None:
+        """Tell the observer about the body as it is now."""
+        self._narrator.body(self)
+
+    def tell_status(self, paused: bool = False) -> None:
+        """Tell the observer what the body is doing, where that changed since it was last told."""
+        self._narrator.status(self, paused)
+
+    def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
+        """The body as an observer is told of it; of another setup, when one is given."""
+        return snapshot(setup or self.setup)
+
+    def log(self, kind: str, content: dict) -> None:
+        """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever brings it about."""
+        if self.observer.hears_events():
+            self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
+        else:
+            self.events.note([(self.time_ns, Noted(kind, content))])
+
+    # The way of a command
+
+    def submit(
+        self,
+        command: Command,
+        at_ns: int | None = None,
+        listed: Listed | None = None,
+        judged: tuple[bytes, Setup] | None = None,
+    ) -> int:
+        """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
+
+        listed: its place, when it is an entry of a list. judged: what ``judge`` gave, and the setup that it was given, where
+        that isn't the present one: a change before it in its list may allow what the present setup doesn't. Raises
+        CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
+        """
+        when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
+        row, setup = (judge(command, self.setup), self.setup) if judged is None else judged
+        pending = Pending(when_ns, command, listed)
+        if row:
+            _settle(pending, row, setup)
+        self._push(pending)
+        if self.follower is not None:
+            self.follower.submit(command, when_ns, listed)
+        return when_ns
+
+    def _push(self, pending: Pending) -> None:
+        self._arrivals += 1
+        key = order_key(pending.command, pending.listed)
+        # Arrival decides only between messages that are equal to the byte.
+        heapq.heappush(self._pending, (pending.time_ns, key, self._arrivals, pending))
+
+    def refuse(self, error: CommandRefused, count: int = 1) -> None:
+        """Count a refusal, of so many commands at once, and tell the observer."""
+        self.refused[error.reason] += count
+        self.observer.refused(self.time_ns, error.reason, str(error))
+
+    def check_change(self, new: Setup) -> None:
+        """Raises CommandRefused (``integrator``) when the new setup's integrator can't carry what acts, or will."""
+        # A string that is to be tied at time 0 will be, at the next reset, though it was let go since.
+        tied = new.string.attached or (self.string is not None and not self.setup.string.attached)
+        check_carried(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
+
+    def reset(self, setup: Setup | None = None) -> None:
+        """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
+        stay.
+        """
+        self._arrays.end_all()
+        self._tell([])
+        self.observer.reset()
+        self.events.reset()
+        replaced = setup is not None and setup is not self.setup
+        self.setup = setup or self.setup
+        self._start_over()
+        self.log("reset", {})
+        if replaced:
+            self.announce()
+
+    # The story
+
+    def advance(self, until_ns: int) -> State:
+        """Carry the body to ``until_ns`` and return its state there, before what acts at that very time.
+
+        Running away (|x|, |v| or |ω| past 1e100) stops at the last good state and sets ``failure``.
+        """
+        if until_ns < self.time_ns:
+            raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
+        while True:
+            # 1. What loads alone bring about on the way is handed to the compiled flight.
+            event_ns, due = self._hand_over(until_ns)
+            # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
+            if not self._fly(event_ns, due):
+                return self._stop_in_last_good_state()
+            if event_ns == until_ns:
+                return self.state
+            # 3. That event is brought about; with what acts now a new segment begins.
+            self._act()
+
+    def _hand_over(self, until_ns: int) -> tuple[int, list[Pending]]:
+        """Until when the compiled flight gets along, and the commands that it carries out on the way."""
+        tied, pending = self._string.tied, self._pending
+        if tied is not None and tied.release_ns is not None:
+            until_ns = min(until_ns, tied.release_ns)
+        due: list[Pending] = []
+        if not pending or pending[0][0] >= until_ns:
+            return until_ns, due
+        taken, setup = [], self.setup
+        while pending and pending[0][0] < until_ns:
+            first = pending[0][-1]
+            if first.settled_for is not setup and not self._is_ready(first):
+                until_ns = first.time_ns
+                break
+            taken.append(heapq.heappop(pending))
+        # All commands of one instant act together.
+        while taken and taken[-1][0] == until_ns:
+            heapq.heappush(pending, taken.pop())
+        due = [entry[-1] for entry in taken]
+        self._arrays.put(due)
+        return until_ns, due
+
+    def _is_ready(self, pending: Pending) -> bool:
+        """Whether nothing but arithmetic is left to do when the command acts."""
+        if not isinstance(pending.command, WrenchCommand):
+            return isinstance(pending.command, ClearWrench)
+        try:
+            return self._still_holds(pending)
+        except CommandRefused:
+            return False  # refused when it acts, and not before
+
+    def _fly(self, until_ns: int, due: list[Pending]) -> bool:
+        """The compiled flight to ``until_ns``, and word of what began and ended; False when the motion failed."""
+        arrays = self._arrays
+        reached = arrays.fly(until_ns)
+        if not reached:
+            waiting = len(due) - arrays.waiting
+            for pending in due[waiting:]:
+                self._push(pending)
+            del due[waiting:]
+        if due or self._narrator.hears_loads:
+            self._tell(due)
+        self.time_ns = until_ns if reached else arrays.time_ns
+        self.state = State(self.time_ns, arrays.row.copy())
+        return reached
+
+    def _tell(self, due: list[Pending]) -> None:
+        """Log the commands that acted, and tell the observer what began and ended."""
+        observer, narrator = self.observer, self._narrator
+        if not (narrator.hears_loads or observer.hears_events()):
+            self.events.note([(pending.time_ns, pending.command) for pending in due])
+            return
+        first = self._arrays.first_due
+        for now_ns, what, load_id, row in self._arrays.last_events():
+            self.time_ns = now_ns
+            if what == fl.ENDED:
+                observer.load_ended(now_ns, load_id)
+                continue
+            pending = due[row - first]
+            command = pending.command
+            if what == fl.DONE:
+                self._log_command(command)
+                continue
+            load = pending.load
+            if load is not None and what == fl.APPLIED:
+                observer.applied(now_ns, command, load, self.setup.body)
+            elif load is not None:
+                kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
+                narrator.load_began(self, load_id, kind, load)
+
+    def _log_command(self, command: Command) -> None:
+        # A change that waited in a queue would keep its whole setup, mesh included.
+        if self.observer.hears_events() or isinstance(command, Change):
+            self.log(command.kind, command.content)
+        else:
+            self.events.note([(self.time_ns, command)])
+
+    # What happens at an event that takes more than arithmetic
+
+    def _act(self) -> None:
+        """Everything that ends or begins now; a new segment if anything did."""
+        arrays, now_ns = self._arrays, self.time_ns
+        changed = arrays.end_due()
+        self._tell([])
+        changed |= self._string.end_due(now_ns)
+        while self._pending and self._pending[0][0] == now_ns:
+            pending = heapq.heappop(self._pending)[-1]
+            self.listed = pending.listed
+            try:
+                self._apply(pending)
+                changed = True
+            except CommandRefused as refusal:
+                self.refuse(refusal)
+            except InputError as error:
+                self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
+        self.listed = None
+        if changed:
+            arrays.tie(self._string.tied)
+            arrays.cut_segment()
+            self._narrator.string(self)
+
+    def _apply(self, pending: Pending) -> None:
+        command = pending.command
+        if isinstance(command, WrenchCommand | ClearWrench):
+            if isinstance(command, WrenchCommand) and not self._still_holds(pending):
+                _settle(pending, _settled(command, self.setup, self.state), self.setup)
+            self._arrays.put([pending])
+            self._arrays.apply()
+            self._tell([pending])
+            self.state = self._arrays.state
+            return
+        if isinstance(command, Change):
+            self._change(command.apply())
+        elif isinstance(command, TieString):
+            self._string.tie_at(command, self.setup, self.state)
+        elif isinstance(command, MoveString):
+            check_carried(self.setup.integrator, frozenset({STRING}))
+            self._string.move(command, self.setup, self.state)
+        elif isinstance(command, ReleaseString):
+            self._string.release()
+        self._log_command(command)
+
+    def _still_holds(self, pending: Pending) -> bool:
+        """Whether the load settled at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
+
+        Raises CommandRefused when the body or the integrator that there is now can't take it.
+        """
+        setup, before = self.setup, pending.settled_for
+        if before is setup:
+            return True
+        if before is None or before.surface is not setup.surface:
+            return False
+        load = pending.load
+        if before.body is not setup.body:
+            load.check_magnitude(setup.body)
+        _check_load_carried(pending.command, load, setup)
+        pending.settled_for = setup
+        return True
+
+    def _change(self, new: Setup) -> None:
+        """Take another setup in flight. The same mesh at the same size stays where it is, so a COM that moves within it
+        takes position and velocity along; another mesh or size keeps the COM and its motion.
+        """
+        self.check_change(new)
+        old, self.setup = self.setup, new
+        moved = new.body.center_of_mass - old.body.center_of_mass
+        if new.geometry == old.geometry and moved.any():
+            shift = (self.state.rotation * moved).sum(axis=1)
+            row = self._arrays.row
+            row[0:3] += shift
+            row[7:10] += cross(self.state.angular_velocity, shift)
+            self.state = self._arrays.state
+        self._arrays.take(new)
+        self._string.change(old, new, self.state)
+        if new.surface is not old.surface and new.surface is not None:
+            self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))
+        self.announce()
+
+    # The beginning and a bad end
+
+    def _start_over(self) -> None:
+        self._pending: list[tuple] = []
+        self.listed = None
+        self.failure = ""
+        self.time_ns = 0
+        self.state = State(0, self.setup.initial.copy())
+        self._string = StringControl(self.setup, self.state)
+        self._arrays.start_over(self.setup, self._string.tied)
+        self._narrator.start_over()
+        self._narrator.string(self)
+
+    def _stop_in_last_good_state(self) -> State:
+        when = f"{self._segment.committed_ns * 1e-9:.9g} s"
+        self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
+        self._arrays.finish_segment()
+        return self.state
+
+
+def judge(command: Command, setup: Setup) -> bytes:
+    """The row of a command's load, empty for what is none or can't be settled before it acts; raises CommandRefused for what a
+    body of this setup can't take.
+    """
+    if isinstance(command, WrenchCommand):
+        row = _settled(command, setup, None)
+        return b"" if command.frame.point[0] == "ray" else row
+    if isinstance(command, MoveString):
+        check_carried(setup.integrator, frozenset({STRING}))
+    return b""
+
+
+def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
+    """The row of the load, which body and integrator can take."""
+    frame, force, torque = command.frame, command.force, command.torque
+    if setup.integrator.carries_loads or frame.impulse:
+        row = light_row(frame, force, torque, setup.light_amount)
+        if row:
+            return row
+    load = settle(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
+    load.check_magnitude(setup.body)
+    _check_load_carried(command, load, setup)
+    return load.packed
+
+
+def _settle(pending: Pending, row: bytes, setup: Setup) -> None:
+    """The load, as the tables of a flight take it, was settled under this setup."""
+    command = pending.command
+    pending.settled_for, pending.row = setup, row
+    if command.held:
+        pending.kind = fl.HELD_WRENCH
+    elif command.frame.impulse:
+        pending.kind = fl.IMPULSE
+    else:
+        pending.kind, pending.duration_ns = fl.PULSE, command.duration_ns
+
+
+def _check_load_carried(command: WrenchCommand, load: Load, setup: Setup) -> None:
+    # An impulse acts at once: the integrator never sees it.
+    if not (setup.integrator.carries_loads or command.frame.impulse):
+        check_carried(setup.integrator, needs_of_load(load))
+
+
+def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
+    """What the scene asks of its integrator."""
+    needs = set().union(*(needs_of_load(load) for load in loads))
+    if not setup.gyroscopic:
+        needs.add(NO_GYROSCOPIC_TERM)
+    if setup.angular_damping:
+        needs.add(ANGULAR_DAMPING)
+    if tied:
+        needs.add(STRING)
+    return frozenset(needs)

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: MIT
+"""Random numbers that belong to a row: the same whatever rows are drawn beside it, in which order and by whom.
+
+Row i's numbers are those of ``numpy.random.default_rng(SeedSequence(seed, spawn_key=(i,))).random(n)``, computed here
+without an object per row: SeedSequence is O'Neill's seed_seq (pcg-random.org, "Developing a seed_seq alternative", 2015) and
+the generator PCG64 XSL RR (O'Neill, HMC-CS-2014-0905), both as NumPy's documentation fixes them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import uint32, uint64
+
+from ..base.compilation import njit
+
+_POOL = 4
+_LOW = uint64(0xFFFFFFFF)
+_MULTIPLIER_HIGH, _MULTIPLIER_LOW = uint64(2549297995355413924), uint64(4865540595714422341)
+
+
+@njit(cache=True)
+def _hashed(value, constant, multiplier):
+    """The value hashed, and the next constant."""
+    value = uint32(value ^ constant)
+    constant = uint32(constant * multiplier)
+    value = uint32(value * constant)
+    return uint32(value ^ (value >> uint32(16))), constant
+
+
+@njit(cache=True)
+def _mixed(x, y):
+    result = uint32(uint32(x * uint32(0xCA01F9DD)) - uint32(y * uint32(0x4973F715)))
+    return uint32(result ^ (result >> uint32(16)))
+
+
+@njit(cache=True)
+def _fill_pool(entropy, pool):
+    constant = uint32(0x43B0D7E5)
+    for i in range(_POOL):
+        pool[i], constant = _hashed(entropy[i] if i < entropy.size else uint32(0), constant, uint32(0x931E8875))
+    for source in range(_POOL):
+        for target in range(_POOL):
+            if source != target:
+                value, constant = _hashed(pool[source], constant, uint32(0x931E8875))
+                pool[target] = _mixed(pool[target], value)
+    for source in range(_POOL, entropy.size):
+        for target in range(_POOL):
+            value, constant = _hashed(entropy[source], constant, uint32(0x931E8875))
+            pool[target] = _mixed(pool[target], value)
+
+
+@njit(cache=True)
+def _words(pool, out):
+    """Four 64-bit words of the sequence."""
+    constant = uint32(0x8B51F9DD)
+    for k in range(8):
+        value, constant = _hashed(pool[k % _POOL], constant, uint32(0x58F38DED))
+        out[k // 2] = uint64(value) if k % 2 == 0 else out[k // 2] | (uint64(value) << uint64(32))
+
+
+@njit(cache=True)
+def _times(a, b):
+    """Upper and lower half of the 128-bit product of two 64-bit words."""
+    a0, a1, b0, b1 = a & _LOW, a >> uint64(32), b & _LOW, b >> uint64(32)
+    low, middle, other = a0 * b0, a0 * b1, a1 * b0
+    carry = (low >> uint64(32)) + (middle & _LOW) + (other & _LOW)
+    high = a1 * b1 + (middle >> uint64(32)) + (other >> uint64(32)) + (carry >> uint64(32))
+    return high, (low & _LOW) | (carry << uint64(32))
+
+
+@njit(cache=True)
+def _stepped(high, low, added_high, added_low):
+    """state · multiplier + increment, modulo 2¹²⁸."""
+    product_high, product_low = _times(low, _MULTIPLIER_LOW)
+    product_high += low * _MULTIPLIER_HIGH + high * _MULTIPLIER_LOW
+    total = product_low + added_low
+    return product_high + added_high + (uint64(1) if total < product_low else uint64(0)), total
+
+
+@njit(cache=True)
+def row_uniforms(seed_words, rows, out):
+    """Fill out (n, k) with the first k uniform numbers in [0, 1) of each row (n,). seed_words: the seed in 32-bit words."""
+    length = max(seed_words.size, _POOL)
+    words, pool = np.zeros(4, np.uint64), np.zeros(_POOL, np.uint32)
+    for i in range(rows.size):
+        row = uint64(rows[i])
+        entropy = np.zeros(length + (1 if row <= _LOW else 2), np.uint32)
+        entropy[: seed_words.size] = seed_words
+        entropy[length] = uint32(row & _LOW)
+        if row > _LOW:
+            entropy[length + 1] = uint32(row >> uint64(32))
+        _fill_pool(entropy, pool)
+        _words(pool, words)
+        added_high = (words[2] << uint64(1)) | (words[3] >> uint64(63))
+        added_low = (words[3] << uint64(1)) | uint64(1)
+        low = added_low + words[1]
+        high = added_high + words[0] + (uint64(1) if low < added_low else uint64(0))
+        high, low = _stepped(high, low, added_high, added_low)
+        for k in range(out.shape[1]):
+            high, low = _stepped(high, low, added_high, added_low)
+            x, turn = high ^ low, high >> uint64(58)
+            x = (x >> turn) | (x << ((uint64(64) - turn) & uint64(63)))
+            out[i, k] = float(x >> uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+def seed_words(seed: int) -> np.ndarray:
+    """A seed ≥ 0 in 32-bit words, lowest first, as SeedSequence takes it."""
+    words = [seed & 0xFFFFFFFF]
+    while seed := seed >> 32:
+        words.append(seed & 0xFFFFFFFF)
+    return np.array(words, np.uint32)
+
+
+@njit(cache=True)
+def _scrambled(value, key):
+    """A 64-bit hash of value and key (SplitMix64's finalizer; Steele, Lea and Flood, OOPSLA 2014)."""
+    x = value + key * uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> uint64(30))) * uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> uint64(27))) * uint64(0x94D049BB133111EB)
+    return x ^ (x >> uint64(31))
+
+
+@njit(cache=True)
+def permuted(index, size, key):
+    """Where a random permutation of 0 … size − 1 takes ``index``: six Feistel rounds on the next power of four, repeated until
+    within size (Black and Rogaway, CT-RSA 2002, "cycle walking"). No table, so any size costs the same.
+    """
+    half = uint64(1)
+    while (uint64(1) << (uint64(2) * half)) < uint64(size):
+        half += uint64(1)
+    mask = (uint64(1) << half) - uint64(1)
+    x = uint64(index)
+    while True:
+        left, right = x >> half, x & mask
+        for r in range(6):
+            left, right = right, left ^ (_scrambled(right, key + uint64(r) * uint64(0xD1342543DE82EF95)) & mask)
+        x = (left << half) | right
+        if x < uint64(size):
+            return x
+
+
+@njit(cache=True)
+def latin_uniforms(keys, rows, size, jitter, out):
+    """Fill out (n, k) with rows (n,) of a Latin hypercube of ``size`` points: (π_k(i) + u)/size. keys (k,) choose the
+    permutations; jitter (n, k) are the u.
+    """
+    for i in range(rows.size):
+        for k in range(out.shape[1]):
+            out[i, k] = (float(permuted(rows[i], size, keys[k])) + jitter[i, k]) / size
+
+
+@njit(cache=True, error_model="numpy")
+def _tail(r, c, d):
+    return (((((((c[7] * r + c[6]) * r + c[5]) * r + c[4]) * r + c[3]) * r + c[2]) * r + c[1]) * r + c[0]) / (
+        ((((((d[6] * r + d[5]) * r + d[4]) * r + d[3]) * r + d[2]) * r + d[1]) * r + d[0]) * r + 1.0
+    )
+
+
+# Wichura, Algorithm AS 241, Applied Statistics 37 (1988) 477, PPND16: about 1 part in 10¹⁶.
+_A = (
+    3.3871328727963666080,
+    1.3314166789178437745e2,
+    1.9715909503065514427e3,
+    1.3731693765509461125e4,
+    4.5921953931549871457e4,
+    6.7265770927008700853e4,
+    3.3430575583588128105e4,
+    2.5090809287301226727e3,
+)
+_B = (
+    4.2313330701600911252e1,
+    6.8718700749205790830e2,
+    5.3941960214247511077e3,
+    2.1213794301586595867e4,
+    3.9307895800092710610e4,
+    2.8729085735721942674e4,
+    5.2264952788528545610e3,
+)
+_C = (
+    1.42343711074968357734,
+    4.63033784615654529590,
+    5.76949722146069140550,
+    3.64784832476320460504,
+    1.27045825245236838258,
+    2.41780725177450611770e-1,
+    2.27238449892691845833e-2,
+    7.74545014278341407640e-4,
+)
+_D = (
+    2.05319162663775882187,
+    1.67638483018380384940,
+    6.89767334985100004550e-1,
+    1.48103976427480074590e-1,
+    1.51986665636164571966e-2,
+    5.47593808499534494600e-4,
+    1.05075007164441684324e-9,
+)
+_E = (
+    6.65790464350110377720,
+    5.46378491116411436990,
+    1.78482653991729133580,
+    2.96560571828504891230e-1,
+    2.65321895265761230930e-2,
+    1.24266094738807843860e-3,
+    2.71155556874348757815e-5,
+    2.01033439929228813265e-7,
+)
+_F = (5.99832206555887937690e-1, 1.36929880922735805310e-1, 1.48753612908506148525e-2, 7.86869131145613259100e-4, 1.84631831751005468180e-5, 1.42151175831644588870e-7, 2.04426310338993978564e-15)  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def normal_quantile(u):
+    """x with Φ(x) = u, 0 < u < 1."""
+    q = u - 0.5
+    if abs(q) <= 0.425:
+        return q * _tail(0.180625 - q * q, _A, _B)
+    r = math.sqrt(-math.log(min(u, 1.0 - u)))
+    x = _tail(r - 1.6, _C, _D) if r <= 5.0 else _tail(r - 5.0, _E, _F)
+    return x if q > 0.0 else -x
+
+
+UNIFORM, LOG_UNIFORM, NORMAL, ROTATION, DIRECTION = range(5)
+UNIFORMS = {UNIFORM: 1, LOG_UNIFORM: 1, NORMAL: 1, ROTATION: 3, DIRECTION: 2}
+"""How many uniform numbers a draw takes."""
+NUMBERS = {UNIFORM: 1, LOG_UNIFORM: 1, NORMAL: 1, ROTATION: 4, DIRECTION: 3}
+"""How many numbers it gives."""
+
+
+@njit(cache=True, error_model="numpy")
+def shape_uniforms(kind, a, b, u, out):
+    """Fill out (n, NUMBERS) from uniforms u (n, UNIFORMS): between a and b, mean a and deviation b, or a direction of length a.
+
+    A rotation is uniform over the group (Shoemake, Graphics Gems III, 1992), a direction over the sphere.
+    """
+    for i in range(out.shape[0]):
+        if kind == UNIFORM:
+            out[i, 0] = a + (b - a) * u[i, 0]
+        elif kind == LOG_UNIFORM:
+            out[i, 0] = math.exp(math.log(a) + (math.log(b) - math.log(a)) * u[i, 0])
+        elif kind == NORMAL:
+            out[i, 0] = a + b * normal_quantile(min(max(u[i, 0], 2.0**-54), 1.0 - 2.0**-53))
+        elif kind == ROTATION:
+            near, far = math.sqrt(1.0 - u[i, 0]), math.sqrt(u[i, 0])
+            s, t = 2.0 * math.pi * u[i, 1], 2.0 * math.pi * u[i, 2]
+            out[i, 0], out[i, 1] = near * math.sin(s), near * math.cos(s)
+            out[i, 2], out[i, 3] = far * math.sin(t), far * math.cos(t)
+        else:
+            z, turn = 2.0 * u[i, 0] - 1.0, 2.0 * math.pi * u[i, 1]
+            across = math.sqrt(max(1.0 - z * z, 0.0))
+            out[i, 0], out[i, 1], out[i, 2] = a * across * math.cos(turn), a * across * math.sin(turn), a * z

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""What the command lines have in common: examples that are read, completion, colour on a terminal and plain text elsewhere."""
+
+import importlib
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+from ros_process import from_source
+
+from rigid_proto_ros.base.command_line import Parser
+from rigid_proto_ros.cli import main as command
+from rigid_proto_ros.cli.inspect_report import shown_zero
+from rigid_proto_ros.ros import arguments, poke_client
+
+
+@pytest.mark.parametrize("name", command.COMMANDS)
+def test_examples_in_the_help_of_a_command_are_read_by_it(name, capsys):
+    module = importlib.import_module(f"rigid_proto_ros.cli.{name}")
+    parser = Parser(prog=f"rigid_proto {name}", examples=module.EXAMPLES)
+    module.add_arguments(parser)
+    for example, _ in module.EXAMPLES:
+        program, own, *words = shlex.split(example)
+        assert (program, own) == ("rigid_proto", name)
+        parser.parse_args(words)
+    with pytest.raises(SystemExit):
+        command.main([name, "--help"])
+    text = capsys.readouterr().out
+    assert all(example in text for example, _ in module.EXAMPLES)
+
+
+def test_examples_of_the_node_and_the_client_are_read_by_them():
+    for example, _ in arguments.EXAMPLES:
+        arguments.own_arguments(shlex.split(example))
+    for example, _ in poke_client.EXAMPLES:
+        poke_client._arguments(shlex.split(example)[1:])
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "offered"),
+    [
+        ("cli.main", "rigid_proto si", {"simulate"}),
+        ("cli.main", "rigid_proto simulate book --set string.freq", {"string.frequency="}),
+        ("ros.poke_client", "poke_client wr", {"wrench"}),
+        ("ros.main", "rigid_body_node --bodies spin", {"spinning_top"}),
+    ],
+)
+def test_the_shell_completes_commands_options_and_names(module, line, offered, tmp_path):
+    pytest.importorskip("argcomplete")
+    answer = tmp_path / "completions"
+    asked = {
+        "_ARGCOMPLETE": "1",
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+        "_ARGCOMPLETE_SHELL": "bash",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
+        "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
+        "_ARGCOMPLETE_IFS": "\n",
+    }
+    subprocess.run(
+        [sys.executable, "-m", f"rigid_proto_ros.{module}"],
+        env={**from_source(dict(os.environ)), **asked},
+        cwd=tmp_path,
+        check=True,
+        timeout=180,
+    )
+    assert {word.strip() for word in answer.read_text().splitlines()} == offered
+
+
+WITHOUT = """
+import sys
+for name in {names!r}:
+    sys.modules[name] = None
+sys.stdout.isatty = lambda: True
+from rigid_proto_ros.cli.main import main
+sys.exit(main({words!r}))
+"""
+
+
+def said(words: list[str], *missing: str, **environment: str) -> str:
+    """What a command prints to something that says it is a terminal, in a Python without these packages."""
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT.format(names=missing, words=words)],
+        env={**from_source(dict(os.environ)), "TERM": "xterm", "FORCE_COLOR": "1", **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=180,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_terminal_shows_colour_and_without_rich_and_argcomplete_or_piped_the_same_text_is_plain(capsys):
+    pytest.importorskip("rich")
+    words = ["inspect", "hammer"]
+    coloured, plain = said(words), said(words, "rich", "argcomplete", _ARGCOMPLETE="1")
+    assert command.main(words) == 0
+    assert "\x1b[" in coloured and "\x1b[" not in plain
+    assert capsys.readouterr().out == plain
+    bare = "".join(part.split("m", 1)[1] if k else part for k, part in enumerate(coloured.split("\x1b[")))
+    assert [line.rstrip() for line in bare.splitlines()] == plain.splitlines()
+
+
+def test_what_does_not_show_beside_the_rest_is_0_in_text_and_itself_in_json(capsys):
+    assert shown_zero([1.0, -4e-7, 6e-7], 1.0) == [1.0, 0.0, 6e-7]
+    assert command.main(["inspect", "hammer"]) == 0
+    center = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("centre of mass"))
+    assert center.split()[3:6] == ["0.00343475", "0", "0.237056"]
+    assert command.main(["inspect", "hammer", "--json"]) == 0
+    assert 0.0 < abs(json.loads(capsys.readouterr().out)["center_of_mass"][1]) < 1e-9

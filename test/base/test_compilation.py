@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Kernels kept on disk are those of the present sources."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import rigid_proto_ros
+from rigid_proto_ros.base import compilation
+
+PACKAGE = Path(rigid_proto_ros.__file__).parent
+INNER = "from .compilation import njit\n\n\n@njit(cache=True)\ndef inner(x):\n    return x + {}\n"
+OUTER = "from .compilation import njit\nfrom .between import (\n    inner,\n)\n\n\n@njit(cache=True)\ndef outer(x):\n    return inner(x)\n"
+CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
+
+
+def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tmp_path):
+    base = tmp_path / "package" / "base"
+    base.mkdir(parents=True)
+    shutil.copy(compilation.__file__, base)
+    (base / "outer.py").write_text(OUTER)
+    (base / "between.py").write_text("from .inner import inner\n")
+    said = []
+    for added in (1, 1, 2):
+        (base / "inner.py").write_text(INNER.format(added))
+        ran = subprocess.run([sys.executable, "-c", CALL], cwd=tmp_path, capture_output=True, text=True, check=True)
+        said.append(ran.stdout.split())
+    # Value, and whether it came from the disk.
+    assert said == [["2", "0"], ["2", "1"], ["3", "0"]]
+
+
+SUMS = """
+import numpy as np
+from package.mass.moments_solid import joined_sums as kernel
+sums = [np.zeros(11) for _ in range(4)]
+kernel(*sums)
+print(sums[0][1], sum(kernel.stats.cache_hits.values()))
+"""
+
+
+def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_has_changed(tmp_path):
+    base, mass = tmp_path / "package" / "base", tmp_path / "package" / "mass"
+    for folder, names in ((base, ("compilation", "exact_arithmetic")), (mass, ("moments_solid",))):
+        folder.mkdir(parents=True)
+        for name in names:
+            shutil.copy(PACKAGE / folder.name / f"{name}.py", folder)
+    arithmetic = (base / "exact_arithmetic.py").read_text()
+    head = "def two_sum(a: float, b: float) -> tuple[float, float]:\n"
+    changed = arithmetic.replace(head, f"{head}    return 42.0, 0.0\n", 1)
+    assert changed != arithmetic
+    said = []
+    for text in (arithmetic, arithmetic, changed):
+        (base / "exact_arithmetic.py").write_text(text)
+        ran = subprocess.run([sys.executable, "-c", SUMS], cwd=tmp_path, capture_output=True, text=True, check=True)
+        said.append(ran.stdout.split())
+    assert said == [["0.0", "0"], ["0.0", "1"], ["42.0", "0"]]
+
+
+def test_every_kernel_of_the_package_is_kept_that_way():
+    direct = [
+        str(file.relative_to(PACKAGE))
+        for file in PACKAGE.rglob("*.py")
+        if file != Path(compilation.__file__)
+        for line in file.read_text().splitlines()
+        if line.startswith("from numba import") and "njit" in line or "numba.njit" in line
+    ]
+    assert direct == []

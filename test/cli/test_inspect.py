@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""The inspect command: its JSON object, exit statuses, scale and mass, verification, pictures."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import needs_rerun
+from mesh_files import CUBE_TRIANGLES, obj
+
+from rigid_proto_ros.cli.main import main
+
+KEYS = {
+    *("mesh", "vertices", "triangles", "watertight", "winding_consistent", "components", "volume", "area", "mass"),
+    *(
+        "density",
+        "center_of_mass",
+        "inertia",
+        "principal_moments",
+        "principal_axes",
+        "bounding_box",
+        "models",
+        "verdict",
+    ),
+}
+
+
+def inspect(capsys, *arguments: str) -> tuple[int, str, str]:
+    status = main(["inspect", *arguments])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def report(capsys, *arguments: str) -> dict:
+    status, out, err = inspect(capsys, *arguments, "--json")
+    assert (status, err) == (0, "")
+    assert out.count("\n") == 1
+    return json.loads(out)
+
+
+def refusal(capsys, *arguments: str) -> str:
+    status, out, err = inspect(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    return err
+
+
+def test_the_json_object_has_its_keys_and_they_agree_with_each_other(capsys):
+    found = report(capsys, "hammer")
+    assert set(found) >= KEYS
+    assert found["mass"] == pytest.approx(1000.0 * found["volume"], rel=1e-15)
+    assert found["density"] == 1000.0
+    axes, moments = np.array(found["principal_axes"]), np.array(found["principal_moments"])
+    assert np.linalg.det(axes) == pytest.approx(1.0, abs=1e-14)
+    assert axes @ np.diag(moments) @ axes.T == pytest.approx(np.array(found["inertia"]), abs=1e-14 * moments[2])
+    assert list(moments) == sorted(moments)
+    assert set(found["models"]) == {"solid", "shell", "points", "bounding_box"}
+    assert found["models"]["solid"]["inertia"] == found["inertia"]
+    assert {m["mass"] for m in found["models"].values()} == {found["mass"]}
+    low, high = np.array(found["bounding_box"]["min"]), np.array(found["bounding_box"]["max"])
+    assert np.all(low < found["center_of_mass"])
+    assert np.all(high > found["center_of_mass"])
+    assert found["verdict"] == []
+    assert (found["watertight"], found["winding_consistent"], found["components"]) == (True, True, 1)
+
+
+def test_numbers_keep_full_precision(capsys, meshes):
+    truth = json.loads((meshes / "truth.json").read_text())["spot.obj"]
+    found = report(capsys, str(meshes / "spot.obj"), "--density", "1")
+    assert found["volume"] == pytest.approx(truth["volume"], rel=1e-15)
+    assert found["vertices"] == truth["vertices"]
+    assert found["triangles"] == truth["triangles"]
+    assert np.array(found["inertia"]) == pytest.approx(np.array(truth["inertia_unit_density_about_com"]), rel=1e-12)
+
+
+def test_scale_mirrors_stretches_and_may_stand_before_the_mesh(capsys):
+    plain = report(capsys, "hammer")
+    for words in (("hammer", "--scale", "-2", "1", "1e-1"), ("--scale", "-2", "1", "1e-1", "hammer")):
+        scaled = report(capsys, *words)
+        assert scaled["volume"] == pytest.approx(0.2 * plain["volume"], rel=1e-14)
+        assert scaled["center_of_mass"][0] == pytest.approx(-2 * plain["center_of_mass"][0], rel=1e-13)
+        assert scaled["bounding_box"]["max"][0] == pytest.approx(-2 * plain["bounding_box"]["min"][0], rel=1e-14)
+    assert report(capsys, "hammer", "--scale", "0.5")["area"] == pytest.approx(0.25 * plain["area"], rel=1e-14)
+    assert report(capsys, "hammer", "--scale", "-.5e0", "1", "1")["volume"] == pytest.approx(0.5 * plain["volume"])
+
+
+def test_mass_wins_over_size_and_density_follows(capsys):
+    found = report(capsys, "book", "--mass", "2.5", "--scale", "2")
+    assert found["mass"] == 2.5
+    assert found["density"] == pytest.approx(2.5 / found["volume"], rel=1e-15)
+
+
+def test_ballast_is_added_to_every_model(capsys):
+    plain, loaded = report(capsys, "book", "--mass", "2"), report(capsys, "book", "--mass", "2", "--ballast", "1", "0.1", "0", "-1e-2")  # fmt: skip
+    assert {m["mass"] for m in loaded["models"].values()} == {3.0}
+    expected = (2.0 * np.array(plain["center_of_mass"]) + np.array([0.1, 0.0, -0.01])) / 3.0
+    assert loaded["center_of_mass"] == pytest.approx(expected, abs=1e-16)
+
+
+def test_a_model_is_chosen_by_name(capsys):
+    found = report(capsys, "hammer", "--model", "bounding_box")
+    assert found["inertia"] == found["models"]["bounding_box"]["inertia"]
+    assert found["inertia"] != found["models"]["solid"]["inertia"]
+
+
+def test_verification_states_errors_against_exact_arithmetic(capsys):
+    found = report(capsys, "hollow_box", "--verify", "--scale", "1", "-3", "1e-3")
+    assert set(found["verification"]) == {"volume_error", "center_of_mass_error", "inertia_error"}
+    assert max(found["verification"].values()) <= 1e-15
+
+
+def test_a_verification_that_fails_exits_1(capsys, monkeypatch):
+    from rigid_proto_ros.mass import properties as mass_properties
+
+    true_solid = mass_properties.solid_moments
+
+    def slightly_off(*mesh):
+        moments = true_solid(*mesh)
+        object.__setattr__(moments, "measure", moments.measure * (1 + 1e-12))
+        return moments
+
+    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+    monkeypatch.setattr(mass_properties, "solid_moments", slightly_off)
+    status, out, err = inspect(capsys, "book", "--verify", "--json")
+    assert status == 1
+    assert json.loads(out)["verification"]["volume_error"] == pytest.approx(1e-12, rel=1e-2)
+    assert "1e-13" in err
+
+
+def test_an_open_mesh_has_its_other_models_with_a_given_mass(capsys, tmp_path):
+    (tmp_path / "open.obj").write_bytes(obj(faces=CUBE_TRIANGLES[:-2]))
+    path = str(tmp_path / "open.obj")
+    found = report(capsys, path, "--model", "shell", "--mass", "2")
+    assert found["volume"] is None
+    assert found["density"] is None
+    assert found["models"]["solid"] is None
+    assert found["area"] == pytest.approx(5.0)
+    assert (found["watertight"], [f["code"] for f in found["verdict"]]) == (False, ["open"])
+    assert "--mass" in refusal(capsys, path, "--model", "shell")
+    assert report(capsys, path, "--repair")["volume"] == pytest.approx(1.0, rel=1e-15)
+    assert report(capsys, path, "--fallback", "hull")["volume"] == pytest.approx(1.0, rel=1e-14)
+    assert report(capsys, path, "--fallback", "box", "--verify")["verification"]["volume_error"] <= 1e-15
+
+
+def test_an_open_mesh_that_is_to_be_verified_is_refused_with_its_report(capsys, tmp_path):
+    path = tmp_path / "open.obj"
+    path.write_bytes(obj(faces=CUBE_TRIANGLES[:-1]))
+    status, out, err = inspect(capsys, str(path), "--mass", "1", "--model", "points", "--verify", "--json")
+    assert status == 2 and err.count("\n") == 1 and out.count("\n") == 1
+    found = json.loads(out)
+    assert found["verification"] is None and found["mass"] == 1.0 and found["verdict"]
+
+
+def test_millimetres_are_suspected(capsys, meshes):
+    found = report(capsys, str(meshes / "nefertiti_lowres.obj"))
+    assert [f["code"] for f in found["verdict"]] == ["unit_suspicion"]
+    assert "--scale 0.001" in found["verdict"][0]["message"]
+    assert report(capsys, str(meshes / "nefertiti_lowres.obj"), "--scale", "0.001")["verdict"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("book", "--scale", "0"), "1e-9 <= |s|"),
+        (("book", "--scale", "1", "2"), "one or three"),
+        (("book", "--scale", "nan"), "1e-9 <= |s|"),
+        (("book", "--scale", "two"), "one or three"),
+        (("book", "--mass", "-1"), "> 0"),
+        (("book", "--mass", "inf"), "> 0"),
+        (("book", "--mass", "nan"), "> 0"),
+        (("book", "--density", "0"), "> 0"),
+        (("book", "--ballast", "-1", "0", "0", "0"), "mass >= 0"),
+        (("book", "--max-triangles", "0"), ">= 1"),
+        pytest.param(("book", "--record", "picture.png"), ".rrd", marks=needs_rerun),
+        pytest.param(("book", "--record", "/dev/null/x.rrd"), "folder", marks=needs_rerun),
+        ((), "--compare"),
+    ],
+)
+def test_what_is_refused_says_what_would_be_accepted(capsys, arguments, words):
+    assert words in refusal(capsys, *arguments)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("book", "--mass", "heavy"), ("book", "--model", "cuboid"), ("book", "--json", "--urdf"), ("book", "--colour"), ("book", "--mass", "1", "--density", "2"), ("book", "--model", "explicit")],
+)  # fmt: skip
+def test_wrong_usage_exits_2_with_one_line(capsys, arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(["inspect", *arguments])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_printed_report_names_every_model_and_remark(capsys, tmp_path):
+    (tmp_path / "inward.obj").write_bytes(obj(faces=CUBE_TRIANGLES[:, ::-1]))
+    status, out, _ = inspect(capsys, str(tmp_path / "inward.obj"), "--verify")
+    assert status == 0
+    for words in (
+        "solid",
+        "shell",
+        "points",
+        "bounding_box",
+        "inward",
+        "1 and 2 and 2 and 3 are equal",
+        "1000 kg",
+        "exact rational",
+    ):
+        assert words in out
+
+
+def test_trimesh_and_rerun_are_not_imported_for_an_obj():
+    code = (
+        "import sys; from rigid_proto_ros.cli.main import main; main(['inspect', 'book', '--json']); "
+        "sys.exit(any(name in sys.modules for name in ('trimesh', 'rerun', 'rclpy')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_picture_holds_mesh_axes_boxes_and_differences(capsys, tmp_path):
+    pytest.importorskip("rerun")
+    from rerun.chunk import RrdReader
+
+    target = tmp_path / "hammer.rrd"
+    report(capsys, "hammer", "--record", str(target), "--scale", "1", "1", "-1")
+    chunks = {chunk.entity_path.strip("/"): chunk.to_record_batch() for chunk in RrdReader(target).stream()}
+    shapes = ("center_of_mass", "principal_axes", "bounding_box", "equimomental_box", "equimomental_ellipsoid")
+    for name in ("world/mesh", *(f"world/{shape}" for shape in shapes), "report", "differences"):
+        assert name in chunks
+    vectors = chunks["world/principal_axes"].column("Arrows3D:vectors")[0].as_py()
+    axes = np.array(report(capsys, "hammer", "--scale", "1", "1", "-1")["principal_axes"])
+    drawn = np.array(vectors).T
+    assert drawn / np.linalg.norm(drawn, axis=0) == pytest.approx(axes, abs=1e-6)
+    text = chunks["report"].column("TextDocument:text")[0].as_py()[0]
+    found = report(capsys, "hammer")
+    solid = np.array(found["models"]["solid"]["inertia"])
+    for name, label in (("shell", "shell"), ("points", "vertices"), ("bounding_box", "bounding box")):
+        off = np.max(np.abs(np.array(found["models"][name]["inertia"]) - solid)) / np.max(np.abs(solid))
+        (row,) = [line for line in text.splitlines() if line.startswith(f"| {label} |")]
+        assert row.endswith(f"| {off:.3g} |")

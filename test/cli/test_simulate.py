@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""What `simulate --json` says of a flight, and the defaults that every scene begins with."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from rigid_proto_ros.base.rotation import rotate
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.scene.parameters import PARAMETERS
+from rigid_proto_ros.scene.scenario import make_scenario
+
+KEYS = {
+    *("time_ns", "position", "orientation_xyzw", "linear_velocity", "angular_velocity", "angular_velocity_body"),
+    *("kinetic_energy", "potential_energy", "angular_momentum", "integrator", "steps", "force_evaluations"),
+    *("wall_time", "state_hash"),
+}
+DEFAULTS = {
+    "mesh": "t_handle",
+    "scale": [1.0, 1.0, 1.0],
+    "mass": 0.0,
+    "density": 1000.0,
+    "inertia_model": "solid",
+    "mesh_repair": False,
+    "mesh_fallback": "",
+    "gyroscopic": True,
+    "gravity": [0.0, 0.0, 0.0],
+    "linear_damping": 0.0,
+    "angular_damping": 0.0,
+    "integrator": "auto",
+    "step": 0.001,
+    "accuracy": 1e-9,
+    "publish_rate": 100.0,
+    "real_time_factor": 1.0,
+    "start_paused": False,
+    "wrench_timeout": 1.5,
+    "poke_duration": 0.05,
+    "schedule_horizon": 3600.0,
+    "string.attached": False,
+    "string.stiffness": 50.0,
+    "string.frequency": 0.0,
+    "string.damping_ratio": 0.1,
+    "string.rest_length": 0.0,
+    "string.bilateral": False,
+    "string.timeout": 1.0,
+    "world_frame": "world",
+    "body_frame": "",
+    "publish_clock": False,
+    "publish_tf": False,
+    "record": "",
+    "viewer": "none",
+    "rerun_port": 9876,
+    "web_port": 9090,
+    "workbench_port": 8080,
+}
+"""Scripts and scenes of others rely on these."""
+
+
+def simulated(capsys, *arguments: str) -> dict:
+    assert main(["simulate", *arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_one_json_object_has_all_that_is_known_of_the_flight_in_full_precision(capsys):
+    values = ("gravity=[0.0, 0.0, -9.81]", "mass=2", "initial.linear_velocity=[1, -2, 3]", "linear_damping=0")
+    settings = [word for value in values for word in ("--set", value)]
+    said = simulated(capsys, "t_handle", "--duration", "1.5", *settings)
+    assert said.keys() == KEYS
+    assert said["time_ns"] == 1_500_000_000
+    body = make_scenario({"mesh": "t_handle", "mass": 2.0}).setup.body
+    # Thrown, and turning freely meanwhile.
+    fall = np.array([1.0, -2.0, 3.0 - 9.81 * 1.5])
+    assert said["linear_velocity"] == pytest.approx(fall, rel=1e-14)
+    assert said["position"] == pytest.approx([1.5, -3.0, 4.5 - 9.81 * 1.5**2 / 2], rel=1e-14)
+    spin, attitude = np.array(said["angular_velocity_body"]), said["orientation_xyzw"]
+    assert said["angular_velocity"] == pytest.approx(rotate(*attitude, *spin), rel=1e-14)
+    momentum = body.inertia @ spin
+    assert said["angular_momentum"] == pytest.approx(rotate(*attitude, *momentum), rel=1e-13)
+    assert said["kinetic_energy"] == pytest.approx(fall @ fall + spin @ momentum / 2, rel=1e-14)
+    assert said["potential_energy"] == pytest.approx(2 * 9.81 * said["position"][2], rel=1e-14)
+
+
+def test_the_state_hash_is_that_of_time_and_state_as_little_endian_numbers(capsys):
+    said = simulated(capsys, "t_handle", "--duration", "0.25")
+    parts = ("position", "orientation_xyzw", "linear_velocity", "angular_velocity_body")
+    numbers = [x + 0.0 for part in parts for x in said[part]]  # -0.0 + 0.0 is 0.0
+    assert said["state_hash"] == hashlib.sha256(struct.pack("<q13d", said["time_ns"], *numbers)).hexdigest()
+    assert simulated(capsys, "t_handle", "--duration", "0.25")["state_hash"] == said["state_hash"]
+
+
+def test_a_density_that_is_set_wins_over_the_mass_of_the_scene(tmp_path, capsys):
+    scene = tmp_path / "m.yaml"
+    scene.write_text("rigid_body: {ros__parameters: {mass: 2.0, initial.linear_velocity: [1.0, 0.0, 0.0]}}\n")
+
+    def mass(*settings: str) -> float:
+        words = [word for setting in settings for word in ("--set", setting)]
+        said = simulated(capsys, str(scene), "--duration", "0", *words)
+        return 2.0 * said["kinetic_energy"]  # at 1 m/s, without spin
+
+    assert mass() == 2.0
+    assert mass("density=5000") == make_scenario({"mesh": "t_handle", "density": 5000.0}).setup.body.mass != 2.0
+    assert mass("density=5000", "mass=3") == mass("mass=3", "density=5000") == 3.0
+
+
+def test_every_scene_begins_with_the_same_defaults():
+    assert {name: PARAMETERS[name].default for name in DEFAULTS} == DEFAULTS

@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: MIT
+"""Refused input: exit status 2 and one line that names what, where and what would be accepted; through the real commands."""
+
+import errno
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ENDINGS
+from ros_process import READY_S, refusal, run
+
+from rigid_proto_ros.base.bundled import scene_path
+from rigid_proto_ros.base.errors import MeshError
+from rigid_proto_ros.cli.main import main as rigid_proto
+from rigid_proto_ros.mesh.reading import resolve_mesh
+from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
+from rigid_proto_ros.ros.main import main as rigid_body_node
+from rigid_proto_ros.ros.poke_client import main as poke_client
+from rigid_proto_ros.scene.parameters import PARAMETERS
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+MESHES = {
+    "missing.obj": (None, "there is no file"),
+    "empty.obj": ("", "the file is empty"),
+    "vertices_only.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
+    "text.obj": ("this is no mesh\n", "no faces"),
+    "nan.obj": (TETRAHEDRON.replace("v 0 0 1", "v 0 0 nan"), "the first is vertex 3"),
+    "inf.obj": (TETRAHEDRON.replace("v 0 0 1", "v 0 0 inf"), "the first is vertex 3"),
+    "flat.obj": (TETRAHEDRON.replace("v 0 0 1", "v 1 1 0"), "encloses no volume"),
+    "point.obj": ("v 1 1 1\nv 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", "in one point"),
+    "open.obj": (TETRAHEDRON.replace("f 2 3 4\n", ""), "--repair (mesh_repair), --fallback hull|box (mesh_fallback)"),
+    "index.obj": (TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"), "face 4 uses vertex 9, but the file has only 4"),
+    "what.xyz": (TETRAHEDRON, ".obj, .off, .ply, .stl"),
+}
+
+
+def scene_text(lines: str, section: str = "rigid_body") -> str:
+    indented = "".join(f"    {line}\n" for line in lines.splitlines())
+    return f"{section}:\n  ros__parameters:\n{indented}"
+
+
+SCENES = {
+    "negative_mass": (scene_text("mass: -1.0"), "mass", "-1.0", ">= 0"),
+    "zero_density": (scene_text("density: 0.0"), "density", "0.0", "> 0"),
+    "infinite_mass": (scene_text("mass: .inf"), "mass", "inf", "finite"),
+    "nan_gravity": (scene_text("gravity: [0.0, 0.0, .nan]"), "gravity", "nan", "3 finite numbers"),
+    "short_gravity": (scene_text("gravity: [0.0, 0.0]"), "gravity", "0.0, 0.0", "3 finite numbers"),
+    "long_scale": (scene_text("scale: [1.0, 1.0]"), "scale", "1.0, 1.0", "1 or 3"),
+    "zero_scale": (scene_text("scale: [1.0, 0.0, 1.0]"), "scale", "0.0", "1e-9 <= |s|"),
+    "unknown": (
+        scene_text("gravitation: [0.0, 0.0, 1.0]"),
+        "gravitation",
+        "there is no parameter",
+        "did you mean gravity?",
+    ),
+    "model": (scene_text("inertia_model: wire"), "inertia_model", "wire", "solid"),
+    "integrator": (scene_text("integrator: rk5"), "integrator", "rk5", "rk4"),
+    "text_for_bool": (scene_text("gyroscopic: perhaps"), "gyroscopic", "perhaps", "true or false"),
+    "bool_for_double": (scene_text("mass: true"), "mass", "True", "finite number"),
+    "list_for_double": (scene_text("mass: [1.0]"), "mass", "1.0", "finite number"),
+    "number_for_text": (scene_text("mesh: 5"), "mesh", "5", "text"),
+    "mixed_list": (scene_text("mass: 1.0\ngravity: [0, 0, -9.81]"), "line 4", "[0, 0, -9.81]", "[0.0, 0.0, -9.81]"),
+    "no_value": (scene_text("mass:"), "line 3", "mass", "a value"),
+    "not_yaml": ("rigid_body: {ros__parameters: [", "line 1", "", "valid YAML"),
+    "tab": ("rigid_body:\n\tros__parameters: {}\n", "line 2", "", "valid YAML"),
+    "list": ("- 1\n- 2\n", "line 1", "[1, 2]", "a mapping"),
+    "no_section": ("mass: 1.0\n", "line 1", "1.0", "section"),
+    "zero_quaternion": (
+        scene_text("initial.orientation_xyzw: [0.0, 0.0, 0.0, 0.0]"),
+        "initial.orientation",
+        "0.0",
+        "not all",
+    ),
+    "contact_word": (scene_text("contacts.world: [0.0, 0.0, 0.0]"), "contacts.world", "world", "none of"),
+    "flat_tensor": (
+        scene_text('mesh: ""\ninertia_model: explicit\nexplicit_inertia.tensor: [1.0, 0.0, 0.0, 1.0, 0.0, 3.0]'),
+        *("", "", ""),
+    ),
+    "no_mesh": (scene_text('mesh: ""'), "mesh", "explicit"),
+}
+
+SCRIPTS = {
+    "not_yaml": ("- {t: 1", "line"),
+    "mapping": ("t: 1\n", "a list"),
+    "text_entry": ("- hello\n", "entry 1"),
+    "no_time": ("- {force: [0, 0, 1]}\n", "entry 1, t"),
+    "negative_time": ("- {t: -1, force: [0, 0, 1]}\n", "entry 1, t"),
+    "nan_time": ("- {t: .nan, force: [0, 0, 1]}\n", "entry 1, t"),
+    "text_time": ("- {t: soon, force: [0, 0, 1]}\n", "entry 1, t"),
+    "bool_time": ("- {t: true, force: [0, 0, 1]}\n", "entry 1, t"),
+    "nothing": ("- {t: 1, at: com}\n", "entry 1"),
+    "unknown_key": ("- {t: 1, farce: [0, 0, 1]}\n", "farce"),
+    "two_forces": ("- {t: 1, force: [0, 0, 1], push: 1}\n", "one of"),
+    "short_force": ("- {t: 1, force: [0, 1]}\n", "three numbers"),
+    "nan_force": ("- {t: 1, force: [0, 1, .nan]}\n", "entry 1, force"),
+    "text_force": ("- {t: 1, force: up}\n", "three numbers"),
+    "axes": ("- {t: 1, force: [0, 0, 1], axes: moon}\n", "world, body"),
+    "push_and_axes": ("- {t: 1, push: 1, axes: body}\n", "inward normal"),
+    "impulse_and_duration": ("- {t: 1, impulse: [0, 0, 1], duration: 1}\n", "impulses alone"),
+    "zero_duration": ("- {t: 1, force: [0, 0, 1], duration: 0}\n", "duration"),
+    "point": ("- {t: 1, at: {point: [1, 2]}, force: [0, 0, 1]}\n", "point"),
+    "negative_vertex": ("- {t: 1, at: {vertex: -1}, force: [0, 0, 1]}\n", "at"),
+    "vertex": ("- {t: 1, at: {vertex: 123456}, force: [0, 0, 1]}\n", "vertex/0 to vertex/"),
+    "contact": ("- {t: 1, at: nose, force: [0, 0, 1]}\n", "tip"),
+    "ray": ("- {t: 1, at: {ray: {origin: [0, 0, 0], direction: [0, 0, 0]}}, push: 1}\n", "isn't zero"),
+    "push_at_com": ("- {t: 1, at: com, push: 1}\n", "normal"),
+    "set": ("- {t: 1, set: 5}\n", "parameter"),
+    "set_unknown": ("- {t: 1, set: {masse: 5}}\n", "did you mean mass?"),
+    "set_value": ("- {t: 1, set: {mass: heavy}}\n", "finite number"),
+    "service": ("- {t: 1, service: dance}\n", "clear_wrench"),
+    "wrench": ("- {t: 1, wrench: 5}\n", "wrench"),
+    "wrench_impulse": ("- {t: 1, wrench: {impulse: [0, 0, 1]}}\n", "impulse"),
+    "huge": ("- {t: 1, force: [0, 0, 1e90]}\n", "at most"),
+}
+
+
+def one_line(capfd, main, arguments) -> str:
+    """Run a command's main function in this process: as ``refusal``, without an interpreter's start."""
+    try:
+        status = main(arguments)
+    except SystemExit as leaving:
+        status = leaving.code
+    out, err = capfd.readouterr()
+    assert status == 2, (status, out, err)
+    assert len(err.splitlines()) == 1 and not out, (out, err)
+    return err
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_that_bounds_no_solid_is_refused(name, tmp_path, capfd):
+    text, part = MESHES[name]
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    line = one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={tmp_path / name}"])
+    assert name.split(".")[0] in line and part in line
+
+
+def test_an_unreadable_mesh_or_a_folder_is_refused(tmp_path, capfd):
+    assert "folder" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={tmp_path}"])
+    unreadable = tmp_path / "cow.obj"
+    unreadable.write_text(TETRAHEDRON)
+    unreadable.chmod(0)
+    if os.access(unreadable, os.R_OK):
+        pytest.skip("root reads everything")
+    assert "cow.obj" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={unreadable}"])
+
+
+@pytest.mark.parametrize("name", ["~nosuchuser/part.obj", "x" * 300 + ".obj", "package://rigid_proto_ros/" + "x" * 300])
+def test_a_mesh_name_that_the_system_itself_refuses_is_refused(name, capfd):
+    for arguments in (["inspect", name], ["simulate", "t_handle", "--set", f"mesh={name}"]):
+        line = one_line(capfd, rigid_proto, arguments)
+        assert name in line
+
+
+@pytest.mark.parametrize("method", ["is_file", "iterdir"])
+def test_a_mesh_in_a_folder_that_may_not_be_read_is_refused(method, monkeypatch):
+    def denied(path):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, method, denied)  # root, who may run this, is denied nothing
+    with pytest.raises(MeshError, match="Permission denied"):
+        resolve_mesh("/tmp/nowhere.obj")
+
+
+def test_a_format_that_needs_trimesh_says_so_where_it_is_not_installed(tmp_path, monkeypatch, capfd):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    (tmp_path / "part.glb").write_bytes(b"glTF" + bytes(100))
+    assert "pip install trimesh" in one_line(capfd, rigid_proto, ["inspect", str(tmp_path / "part.glb")])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_that_makes_no_sense_is_refused(name, tmp_path, capfd):
+    text, *parts = SCENES[name]
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(text)
+    line = one_line(capfd, rigid_proto, ["simulate", str(scene)])
+    assert any(words in line for words in ("accepted: ", "did you mean", "is needed"))
+    for part in parts:
+        assert part in line
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
+    text, part = SCRIPTS[name]
+    script = tmp_path / "pokes.yaml"
+    script.write_text(text)
+    assert part in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--script", str(script)])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["simulate", "nowhere.yaml"], "bundled"),
+        (["simulate", "/"], "/"),
+        (["simulate", "t_handle", "--set", "mass"], "name=value"),
+        (["simulate", "t_handle", "--set", "gravty=[0, 0, 1]"], "did you mean gravity?"),
+        (["simulate", "t_handle", "--set", "mass=-1"], ">= 0"),
+        (["simulate", "t_handle", "--set", "mass=nan"], "finite"),
+        (["simulate", "t_handle", "--set", "gravity=[0, 0, 1"], "3 finite numbers"),
+        (["simulate", "t_handle", "--duration", "-1"], "--duration"),
+        (["simulate", "t_handle", "--duration", "nan"], "--duration"),
+        (["simulate", "t_handle", "--duration", "long"], "--duration"),
+        (["simulate", "t_handle", "--script", "nowhere.yaml"], "nowhere.yaml"),
+        (["simulate"], "SCENE"),
+        (["fly"], "simulate"),
+        (["inspct", "book"], "did you mean inspect?"),
+        (["simulate", "t_handel"], "did you mean t_handle?"),
+        (["simulate", "config/t_handel.yaml"], "did you mean t_handle?"),
+        (["simulate", "t_handle", "--recrod", "x.rrd"], "did you mean --record?"),
+        (["replay", "x.rrd", "--publish", "state"], "did you mean states?"),
+        (["inspect", "book", "hammer"], "one argument too many"),
+        (["replay", "nowhere.rrd"], "nowhere.rrd"),
+        (["demo", "--duration", "1"], "--duration"),
+    ],
+)
+def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
+    assert part in one_line(capfd, rigid_proto, arguments)
+
+
+@pytest.mark.parametrize("option", ["--record", "--bag", "--set"])
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_is_refused_overwrites_no_recording(option, ending, tmp_path, capfd):
+    kept, script = tmp_path / f"kept{ending}", tmp_path / "pokes.yaml"
+    kept.write_bytes(b"an earlier flight")
+    script.write_text(SCRIPTS["contact"][0])
+    recorded = [option, f"record={kept}" if option == "--set" else str(kept)]
+    elsewhere = ["--record", str(script / "x.mcap")] if option == "--bag" else []
+    for refused in (["--script", str(script)], elsewhere or ["--set", "mass=-1"], ["--duration", "-1"]):
+        one_line(capfd, rigid_proto, ["simulate", "t_handle", *recorded, *refused])
+        assert kept.read_bytes() == b"an earlier flight"
+
+
+def test_a_demo_that_is_refused_keeps_the_session_before_it(tmp_path, capfd):
+    session, mesh = tmp_path / "session.rrd", tmp_path / "open.obj"
+    session.write_bytes(b"an earlier flight")
+    mesh.write_text(MESHES["open.obj"][0])
+    assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--out", str(tmp_path), "--mesh", str(mesh)])
+    assert session.read_bytes() == b"an earlier flight"
+
+
+def test_two_recordings_of_one_flight_are_two_files(tmp_path, capfd):
+    file = str(tmp_path / "x.mcap")
+    assert "another file" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--record", file, "--bag", file])
+
+
+def test_a_binary_file_is_no_scene_script_or_session(tmp_path, capfd):
+    binary = tmp_path / "cow.bin"
+    binary.write_bytes(bytes(range(256)) * 10)
+    for arguments in (["simulate", binary], ["simulate", "t_handle", "--script", binary], ["replay", binary]):
+        assert "cow.bin" in one_line(capfd, rigid_proto, [str(a) for a in arguments])
+
+
+def test_an_unknown_name_under_the_wildcard_is_only_warned_of(tmp_path, capfd):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(scene_text("speed_of_light: 3.0", "/**"))
+    assert rigid_proto(["simulate", str(scene), "--duration", "0.1"]) == 0
+    assert "speed_of_light under /** is not a parameter" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["-p", "gravty:=[0.0, 0.0, 1.0]"], "did you mean gravity?"),
+        (["-p", "mass"], "name:=value"),
+        (["-p", "gravity:=[0, 0, -9.81]"], "[0.0, 0.0, -9.81]"),
+        (["--params-file", "nowhere.yaml"], "nowhere.yaml"),
+        (["-p"], "behind it"),
+    ],
+)
+def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
+    assert part in one_line(capfd, rigid_body_node, ["rigid_body_node", "--ros-args", *arguments])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--bodys", "hammer"], "did you mean --bodies?"),
+        (["--recrd"], "no option --recrd"),
+        (["hammer"], "--ros-args --params-file hammer"),
+        (["--bodies"], "--bodies"),
+        (["--ros-args", "--parms-file", "x.yaml"], "did you mean --params-file?"),
+        (["--ros-args", "mesh:=book"], "did you mean -p mesh:=book?"),
+        (["--ros-args", "-p", "mass:=1", "--", "--mas"], "no option --mas"),
+    ],
+)
+def test_a_mistyped_option_of_the_node_starts_nothing(arguments, part, capfd):
+    assert part in one_line(capfd, rigid_body_node, ["rigid_body_node", *arguments])
+
+
+def test_help_of_the_node_lists_options_and_parameters_and_starts_nothing(capfd):
+    with pytest.raises(SystemExit) as ended:
+        rigid_body_node(["rigid_body_node", "--help"])
+    assert ended.value.code == 0
+    text = capfd.readouterr().out
+    assert "--bodies" in text and all(f"\n  {name}\n" in text for name in PARAMETERS)
+
+
+def test_what_ros_itself_hands_a_node_is_no_mistake():
+    """As `ros2 launch` and `ros2 run` start it, with every kind of ROS argument."""
+    ros = "--ros-args -r __node:=a -r __ns:=/b --remap ~/wrench:=/w --params-file f.yaml -p mass:=1 --log-level debug"
+    ros += " --log-level rigid_body:=info --enable-rosout-logs --disable-stdout-logs -e /enclave"
+    assert own_arguments(["node", *ros.split()]).bodies == []
+    assert own_arguments(["node", *ros.split(), "--", "--bodies", "book", "hammer"]).bodies == ["book", "hammer"]
+    assert own_arguments(["node", "--bodies", "book", *ros.split()]).bodies == ["book"]
+
+
+@pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])
+def test_a_mesh_of_any_name_reaches_the_node_that_up_starts(name, tmp_path, monkeypatch, capfd):
+    started = []
+    monkeypatch.setattr("rigid_proto_ros.ros.main.main", lambda argv: started.append(argv) or 0)
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text(TETRAHEDRON)
+    assert rigid_proto(["up", "--mesh", name, "--viewer", "none"]) == 0
+    (argv,) = started
+    assert given_arguments(argv, "rigid_body", pytest.fail)["mesh"] == name
+
+
+def test_a_density_on_the_nodes_command_line_wins_over_the_scenes_mass(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("rigid_body:\n  ros__parameters: {mass: 2.0, density: 1000.0}\n")
+    argv = ["--ros-args", "--params-file", str(scene)]
+    assert given_arguments(argv, "rigid_body", pytest.fail) == {"mass": 2.0, "density": 1000.0}
+    argv += ["-p", "density:=5000.0"]
+    assert given_arguments(argv, "rigid_body", pytest.fail) == {"mass": 0.0, "density": 5000.0}
+    assert given_arguments([*argv, "-p", "mass:=3.0"], "rigid_body", pytest.fail)["mass"] == 3.0
+
+
+@pytest.mark.parametrize(
+    "arguments", [["nowhere.yaml"], ["poke"], ["poke", "--at", "point/1,2"], ["--lead", "x", "poke"]]
+)
+def test_the_client_refuses_a_slip(arguments, capfd):
+    assert "poke_client" in one_line(capfd, poke_client, arguments)
+
+
+def test_the_node_itself_ends_with_one_line(ros_environment, tmp_path):
+    """The real process, where ROS has started and has to be taken down again."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(scene_text("mass: -1.0"))
+    bad = (
+        (["-p", "mesh:=nowhere.obj"], "nowhere.obj"),
+        (["--params-file", scene], "mass"),
+        (["-p", "integrator:=rk5"], "rk4"),
+        (["-p", "mass:=-1"], ">= 0"),
+    )
+    for arguments, part in bad:
+        line = refusal("rigid_body_node", "--ros-args", *arguments, environment=ros_environment)
+        assert part in line
+
+
+def test_the_client_without_a_node_says_so(ros_environment):
+    line = refusal("poke_client", "poke", "--force", 0, 0, 1, "--timeout", 0.5, environment=ros_environment)
+    assert "/rigid_body" in line
+
+
+def test_what_is_refused_by_the_installed_command_is_one_line_too(ros_environment):
+    assert "gravity" in refusal(
+        "rigid_proto", "simulate", "t_handle", "--set", "gravity=1", environment=ros_environment
+    )
+    done = run("rigid_proto", "simulate", scene_path("book"), "--json", environment=ros_environment, timeout=READY_S)
+    assert done.returncode == 0 and done.stderr == ""

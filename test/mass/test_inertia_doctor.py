@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: MIT
+"""The inertia doctor finds the usual mistakes in URDF, SDF and MJCF files, and finds nothing in right ones."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.robot_files import rotation_from_rpy
+from rigid_proto_ros.mass.tensor import six_from_tensor
+
+MASS = 0.7
+RPY = (0.3, -0.5, 0.9)
+POSITION = np.array([0.1, 0.2, -0.05])
+SCALE = np.array([1.0, 2.0, 1.5])
+NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+POUND_INCH = 2.2046226218487757 / 0.0254**2
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """COM (3,) and six entries of the hammer's tensor in the link's axes."""
+    properties = mesh_body("hammer").moments.mass_properties(scale=SCALE, mass=MASS)
+    R = rotation_from_rpy(*RPY)
+    return R @ properties.center_of_mass + POSITION, np.array(six_from_tensor(R @ properties.inertia @ R.T))
+
+
+def words(values) -> str:
+    return " ".join(f"{float(value):.17g}" for value in values)
+
+
+def urdf(center, six, mass=MASS, mesh="hammer") -> str:
+    entries = " ".join(f'{name}="{float(value):.17g}"' for name, value in zip(NAMES, six, strict=True))
+    return (
+        f'<robot name="r"><link name="head"><visual><origin xyz="{words(POSITION)}" rpy="{words(RPY)}"/>'
+        f'<geometry><mesh filename="{mesh}" scale="{words(SCALE)}"/></geometry></visual><inertial>'
+        f'<origin xyz="{words(center)}"/><mass value="{mass}"/><inertia {entries}/></inertial></link></robot>'
+    )
+
+
+def sdf(center, six) -> str:
+    entries = "".join(f"<{name}>{float(value):.17g}</{name}>" for name, value in zip(NAMES, six, strict=True))
+    return (
+        f'<sdf version="1.9"><model name="m"><link name="head"><collision name="c"><pose>{words(POSITION)} {words(RPY)}'
+        f"</pose><geometry><mesh><uri>hammer</uri><scale>{words(SCALE)}</scale></mesh></geometry></collision><inertial>"
+        f"<pose>{words(center)} 0 0 0</pose><mass>{MASS}</mass><inertia>{entries}</inertia></inertial></link></model></sdf>"
+    )
+
+
+def mjcf(center, six) -> str:
+    ixx, ixy, ixz, iyy, iyz, izz = six
+    degrees = np.degrees(RPY)
+    return (
+        '<mujoco><compiler eulerseq="XYZ"/><asset><mesh name="h" file="hammer" '
+        f'scale="{words(SCALE)}"/></asset><worldbody><body name="head"><geom type="mesh" mesh="h" pos="{words(POSITION)}" '
+        f'euler="{words(degrees)}"/><inertial pos="{words(center)}" mass="{MASS}" '
+        f'fullinertia="{words((ixx, iyy, izz, ixy, ixz, iyz))}"/></body></worldbody></mujoco>'
+    )
+
+
+def compare(capsys, tmp_path, text: str, *arguments: str) -> tuple[int, list[dict]]:
+    path = tmp_path / "robot.xml"
+    path.write_text(text)
+    status = main(["inspect", *arguments, "--compare", str(path), "--json"])
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    return status, json.loads(out)["links"]
+
+
+def tensor(six) -> np.ndarray:
+    ixx, ixy, ixz, iyy, iyz, izz = six
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+@pytest.mark.parametrize("write", [urdf, sdf, mjcf])
+def test_a_right_file_is_found_right(capsys, tmp_path, truth, write):
+    status, (link,) = compare(capsys, tmp_path, write(*truth))
+    assert (status, link["status"], link["causes"]) == (0, "ok", [])
+    assert link["inertia_error"] <= 1e-14
+    assert link["center_of_mass_error"] <= 1e-14
+
+
+def about(center, six, point) -> tuple:
+    d = center - point
+    return six_from_tensor(tensor(six) + MASS * (d @ d * np.eye(3) - np.outer(d, d)))
+
+
+def quarter_turn(six) -> tuple:
+    Q = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    return six_from_tensor(Q @ tensor(six) @ Q.T)
+
+
+MISTAKES = {
+    "millimetres": (lambda c, s: (c, 1e6 * s), "kg mm^2"),
+    "gram millimetres": (lambda c, s: (c, 1e9 * s), "g mm^2"),
+    "pounds and inches": (lambda c, s: (c, POUND_INCH * s), "lb in^2"),
+    "density": (lambda c, s: (c, 3.3 * s), "2.31 kg"),
+    "sign of products": (lambda c, s: (c, s * [1, -1, -1, 1, -1, 1]), "signs of the products"),
+    "order of entries": (lambda c, s: (c, s[[0, 3, 5, 1, 2, 4]]), "order of entries: xx yy zz"),
+    "order of products": (lambda c, s: (c, s[[0, 1, 4, 3, 2, 5]]), "order of products"),
+    "no products": (lambda c, s: (c, s * [1, 0, 0, 1, 0, 1]), "products left out"),
+    "about the link's origin": (lambda c, s: (c, about(c, s, np.zeros(3))), "link's origin"),
+    "about the mesh's origin": (lambda c, s: (c, about(c, s, POSITION)), "mesh's origin"),
+    "y up": (lambda c, s: (c, quarter_turn(s)), "quarter turn about x"),
+    "placeholder": (lambda c, s: (c, [1e-3, 0, 0, 1e-3, 0, 1e-3]), "placeholder"),
+    "zeros": (lambda c, s: (c, 0 * s), "all entries zero"),
+    "com at the origin": (lambda c, s: (0 * c, s), "COM left at the link's origin"),
+    "com in millimetres": (lambda c, s: (1000 * c, s), "COM in mm"),
+    "com mirrored": (lambda c, s: (-c, s), "opposite sign"),
+    "two at once": (lambda c, s: (c, 1e6 * s * [1, -1, -1, 1, -1, 1]), "signs of the products"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_each_usual_mistake_is_named(capsys, tmp_path, truth, mistake):
+    break_it, words_of_cause = MISTAKES[mistake]
+    status, (link,) = compare(capsys, tmp_path, urdf(*break_it(*truth)))
+    assert (status, link["status"]) == (1, "off")
+    assert any(words_of_cause in cause for cause in link["causes"]), link["causes"]
+    assert np.array(link["expected"]["inertia"]) == pytest.approx(tensor(truth[1]), rel=1e-12, abs=1e-15)
+    assert link["expected"]["center_of_mass"] == pytest.approx(truth[0], rel=1e-12)
+
+
+def test_a_bounding_boxs_tensor_is_recognised(capsys, tmp_path):
+    box = mesh_body("hammer").moments.mass_properties("bounding_box", scale=SCALE, mass=MASS)
+    R = rotation_from_rpy(*RPY)
+    text = urdf(R @ box.center_of_mass + POSITION, six_from_tensor(R @ box.inertia @ R.T))
+    _, (link,) = compare(capsys, tmp_path, text)
+    assert any("bounding box, not of the solid" in cause for cause in link["causes"])
+    assert "COM at the bounding box's centre" in link["causes"]
+
+
+def test_rounding_to_four_digits_is_no_mistake(capsys, tmp_path, truth):
+    rounded = [float(f"{value:.4g}") for value in truth[1]]
+    status, (link,) = compare(capsys, tmp_path, urdf(truth[0], rounded))
+    assert (status, link["status"]) == (0, "ok")
+    assert 0.0 < link["inertia_error"] <= 1e-3
+
+
+def test_the_mass_is_judged_when_a_density_is_given(capsys, tmp_path, truth):
+    volume = mesh_body("hammer").moments.moments("solid").measure * np.prod(SCALE)
+    right, wrong = float(MASS / volume), float(2.0 * MASS / volume)
+    assert compare(capsys, tmp_path, urdf(*truth), "--density", f"{right!r}")[0] == 0
+    status, (link,) = compare(capsys, tmp_path, urdf(*truth), "--density", f"{wrong!r}")
+    assert status == 1
+    assert link["mass_error"] == pytest.approx(0.5, rel=1e-12)
+    assert any("1.4 kg expected" in cause for cause in link["causes"])
+
+
+def test_a_mesh_may_be_named_for_the_link_that_shows_it(capsys, tmp_path, truth):
+    status, (link,) = compare(capsys, tmp_path, urdf(*truth, mesh="lost/folder/hammer.stl"), "hammer")
+    assert (status, link["link"]) == (0, "head")
+
+
+def test_a_mesh_that_is_not_found_leaves_the_link_unknown_and_fails(capsys, tmp_path, truth):
+    status, (link,) = compare(capsys, tmp_path, urdf(*truth, mesh="package://nowhere/x.stl"))
+    assert (status, link["status"]) == (1, "unknown")
+    assert "nowhere" in link["note"]
+
+
+def test_a_link_without_an_inertial_is_told_what_to_write(capsys, tmp_path, truth):
+    text = urdf(*truth)
+    text = text[: text.index("<inertial>")] + "</link></robot>"
+    status, (link,) = compare(capsys, tmp_path, text)
+    assert (status, link["causes"]) == (1, ["no <inertial>"])
+    assert link["expected"]["mass"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("<robot", "well-formed XML"),
+        ("", "well-formed XML"),
+        ("<html/>", "<robot>"),
+        ("<robot name='r'/>", "links that show a mesh"),
+        ("<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:include filename='a'/></robot>", "xacro"),
+        ('<!DOCTYPE x [<!ENTITY a "b">]><robot/>', "entities"),
+        (urdf([0, 0, 0], [1, 0, 0, 1, 0, 1]).replace('mass value="0.7"', 'mass value="heavy"'), "numbers"),
+    ],
+)
+def test_files_that_cannot_be_judged_are_refused_in_one_line(capsys, tmp_path, text, expected):
+    (tmp_path / "robot.urdf").write_text(text)
+    assert main(["inspect", "--compare", str(tmp_path / "robot.urdf")]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert expected in captured.err
+
+
+def test_the_printed_diagnosis_says_cause_and_remedy(capsys, tmp_path, truth):
+    (tmp_path / "robot.urdf").write_text(urdf(truth[0], 1e6 * truth[1]))
+    assert main(["inspect", "--compare", str(tmp_path / "robot.urdf")]) == 1
+    out = capsys.readouterr().out
+    for part in ("head (hammer): off", "kg mm^2", "expected: mass 0.7", "density"):
+        assert part in out
+    assert main(["inspect", "--compare", str(tmp_path / "robot.urdf"), "--verify"]) == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--model", "shell"),
+        ("--ballast", "1", "0", "0", "0"),
+        ("--scale", "0.001"),
+        ("hammer", "--model", "shell"),
+        ("hammer", "--ballast", "1", "0", "0", "0"),
+        ("hammer", "--scale", "0"),
+    ],
+)
+def test_what_a_comparison_would_pass_over_is_refused(capsys, tmp_path, truth, arguments):
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf(*truth))
+    assert main(["inspect", *arguments, "--compare", str(path)]) == 2
+    said = capsys.readouterr()
+    option = next(word for word in arguments if word.startswith("--"))
+    assert not said.out and said.err.count("\n") == 1 and option.lstrip("-") in said.err

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""What mass properties must keep under motion, scaling, mirroring, joining, cutting up and renumbering."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mass_solids import circle, moved, prism, rotation, sphere, together
+
+from rigid_proto_ros.mass.properties import MeshMoments
+from rigid_proto_ros.mass.tensor import principal_axes
+
+MODELS = st.sampled_from(["solid", "shell", "points"])
+SEEDS = st.integers(0, 2**31)
+lengths = st.floats(-3, 3).map(lambda e: 10.0**e)
+settings.register_profile("mass", deadline=None, max_examples=40)
+PROFILE = settings.get_profile("mass")
+
+
+@st.composite
+def bodies(draw):
+    """A body at random attitude and place: twisted star prism or ellipsoid, of sides from 1e-3 to 1e3."""
+    if draw(st.booleans()):
+        k = draw(st.integers(3, 9))
+        radii = draw(st.lists(st.floats(0.2, 2.0), min_size=k, max_size=k))
+        mesh = prism(circle(k) * np.array(radii)[:, None], draw(st.floats(0.1, 4.0)), draw(st.floats(-1, 1)), 3)
+    else:
+        mesh = sphere(draw(st.integers(3, 9)), [draw(st.floats(0.1, 3.0)) for _ in range(3)])
+    place = [draw(st.floats(-100, 100)) for _ in range(3)]
+    size = draw(lengths)
+    vertices, triangles = moved(mesh, place, draw(SEEDS))
+    return vertices * size, triangles
+
+
+def properties(mesh, model="solid", **options):
+    return MeshMoments(*mesh).mass_properties(model, mass=1.0, **options)
+
+
+def off(a, b):
+    """(COM difference over the gyration radius, inertia difference) of two mass properties."""
+    size = np.max(np.abs(b.inertia))
+    return np.max(np.abs(a.center_of_mass - b.center_of_mass)) / np.sqrt(size / b.mass), np.max(
+        np.abs(a.inertia - b.inertia)
+    ) / size
+
+
+def slack(mesh):
+    """Rounding of the vertices themselves by a motion: a few ulp of the coordinates against the thinnest extent."""
+    vertices = mesh[0]
+    thin = np.sqrt(np.linalg.eigvalsh(np.cov(vertices.T))[0])
+    return 200 * np.spacing(np.max(np.abs(vertices))) / thin + 1e-13
+
+
+@given(bodies(), SEEDS, MODELS)
+@settings(PROFILE)
+def test_rigid_motion_turns_the_tensor_and_moves_the_com(mesh, seed, model):
+    R = rotation(seed)
+    shift = np.random.default_rng(seed).normal(size=3) * np.ptp(mesh[0])
+    there = (mesh[0] @ R.T + shift, mesh[1])
+    a, b = properties(mesh, model), properties(there, model)
+    center, inertia = off(type(a)(1.0, R @ a.center_of_mass + shift, R @ a.inertia @ R.T), b)
+    assert max(center, inertia) <= slack(mesh) + slack(there)
+
+
+@given(bodies(), st.tuples(lengths, lengths, lengths), st.tuples(*[st.sampled_from([-1.0, 1.0])] * 3), MODELS)
+@settings(PROFILE)
+def test_scale_and_mirror_in_closed_form_equal_scaled_vertices(mesh, size, signs, model):
+    scale = np.array(size) * np.array(signs)
+    vertices, triangles = mesh
+    turned = triangles[:, ::-1].copy() if np.prod(signs) < 0 else triangles
+    scaled = (vertices * scale, turned)
+    center, inertia = off(properties(mesh, model, scale=scale), properties(scaled, model))
+    assert max(center, inertia) <= slack(mesh) + slack(scaled)
+
+
+@given(bodies(), bodies(), SEEDS)
+@settings(PROFILE)
+def test_disjoint_parts_add_up(first, second, seed):
+    second = (second[0] / np.ptp(second[0]) * np.ptp(first[0]), second[1])
+    second = (second[0] + (first[0].max(axis=0) - second[0].min(axis=0)) * 1.01, second[1])
+    a, b = (MeshMoments(*mesh).mass_properties(density=1.0) for mesh in (first, second))
+    both = MeshMoments(*together(first, second)).mass_properties(density=1.0)
+    mass = a.mass + b.mass
+    center = (a.mass * a.center_of_mass + b.mass * b.center_of_mass) / mass
+    inertia = a.inertia + b.inertia
+    for part in (a, b):
+        d = part.center_of_mass - center
+        inertia = inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    assert abs(both.mass - mass) <= 1e-13 * mass
+    far = np.spacing(np.max(np.abs(center))) / np.ptp(first[0])
+    assert np.max(np.abs(both.inertia - inertia)) <= (1e-12 + 10 * far) * np.max(np.abs(inertia))
+
+
+@given(bodies(), st.integers(0, 10))
+@settings(PROFILE)
+def test_subdivision_changes_neither_solid_nor_shell(mesh, seed):
+    vertices, triangles = mesh
+    # Midpoints of edges are exact when halves and sums are: round the coordinates first.
+    unit = 2.0 ** np.ceil(np.log2(np.max(np.abs(vertices))) - 30)
+    vertices = np.round(vertices / unit) * unit
+    corners = vertices[triangles]
+    middles = [0.5 * (corners[:, k] + corners[:, (k + 1) % 3]) for k in range(3)]
+    m = len(triangles)
+    fine = np.concatenate([vertices, *middles])
+    ab, bc, ca = (len(vertices) + k * m + np.arange(m) for k in range(3))
+    a, b, c = triangles.T
+    cut = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    for model in ("solid", "shell"):
+        center, inertia = off(properties((fine, cut), model), properties((vertices, triangles), model))
+        assert max(center, inertia) <= 1e-13 + 4 * np.spacing(np.max(np.abs(vertices))) / np.ptp(vertices)
+
+
+@given(bodies(), SEEDS, MODELS)
+@settings(PROFILE)
+def test_the_order_of_vertices_faces_and_corners_is_of_no_matter(mesh, seed, model):
+    vertices, triangles = mesh
+    random = np.random.default_rng(seed)
+    order = random.permutation(len(vertices))
+    place = np.argsort(order)
+    shuffled = place[triangles][random.permutation(len(triangles))]
+    shuffled = np.stack([np.roll(row, random.integers(3)) for row in shuffled])
+    center, inertia = off(properties((vertices[order], shuffled), model), properties(mesh, model))
+    assert max(center, inertia) <= 1e-13 + 2 * np.spacing(np.max(np.abs(vertices))) / np.ptp(vertices)
+
+
+@given(bodies(), st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)), st.sampled_from(["solid", "shell", "points", "bounding_box"]))  # fmt: skip
+@settings(PROFILE)
+def test_every_computed_tensor_meets_the_triangle_inequality(mesh, exponents, model):
+    scale = 10.0 ** np.array(exponents) / np.max(10.0 ** np.array(exponents))
+    # C/A beyond 1e12 is refused as a line, and the body itself may be thirty times as long as it is wide.
+    scale = np.maximum(scale, 1e-4)
+    a, b, c = principal_axes(properties(mesh, model, scale=scale).inertia)[0]
+    assert a > 0.0
+    assert a + b >= c * (1.0 - 1e-14)

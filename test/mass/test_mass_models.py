@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: MIT
+"""Inertia models, scale, density, mass and ballast: all closed form on ten numbers."""
+
+import numpy as np
+import pytest
+from mass_solids import box, circle, moved, prism, sphere
+
+from rigid_proto_ros.base.errors import InputError, MeshError, TensorError
+from rigid_proto_ros.mass.moments import Moments, point_moments, solid_moments
+from rigid_proto_ros.mass.moments_shell import shell_moments
+from rigid_proto_ros.mass.properties import INERTIA_MODELS, MeshMoments, explicit_mass_properties
+
+COMPUTED = ("solid", "shell", "points", "bounding_box")
+SCALES = ((2.0, 2.0, 2.0), (0.5, 3.0, 1.25), (-1.0, 1.0, 1.0), (-2.0, 0.3, -1.0), (1e-9, 1e-9, 1e-9), (-1e9, 1e9, 1e9))
+
+
+def close(a, b, relative=1e-13):
+    assert a.mass == pytest.approx(b.mass, rel=relative)
+    size = np.sqrt(np.max(np.abs(b.inertia)) / b.mass)
+    assert np.max(np.abs(a.center_of_mass - b.center_of_mass)) <= relative * size + np.spacing(
+        np.max(np.abs(b.center_of_mass))
+    )
+    assert np.max(np.abs(a.inertia - b.inertia)) <= relative * np.max(np.abs(b.inertia))
+
+
+@pytest.fixture(scope="module")
+def lopsided():
+    return moved(prism(circle(5) * [1.0, 0.6], 1.5, twist=0.8, layers=6), (0.4, -0.7, 0.2), 21)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("model", COMPUTED)
+def test_any_scale_is_that_of_scaled_vertices(lopsided, model, scale):
+    vertices, triangles = lopsided
+    scaled = vertices * np.array(scale)
+    turned = triangles[:, ::-1].copy() if np.prod(scale) < 0.0 else triangles
+    closed_form = MeshMoments(vertices, triangles).mass_properties(model, scale=scale, density=700.0)
+    anew = MeshMoments(scaled, turned).mass_properties(model, density=700.0)
+    if model == "bounding_box":  # turned boxes aren't the question here: scaling acts along the axes
+        anew = MeshMoments(scaled, turned).mass_properties(model, density=700.0)
+    close(closed_form, anew, 1e-12)
+
+
+@pytest.mark.parametrize("model", COMPUTED)
+def test_all_models_carry_the_same_mass(lopsided, model):
+    moments = MeshMoments(*lopsided)
+    solid = moments.mass_properties("solid", density=321.0)
+    assert moments.mass_properties(model, density=321.0).mass == solid.mass
+    assert moments.mass_properties(model, mass=4.5, density=321.0).mass == 4.5
+
+
+def test_points_are_equal_masses_at_referenced_vertices_alone(lopsided):
+    vertices, triangles = lopsided
+    stray = np.vstack([vertices, [[50.0, 60.0, 70.0]]])
+    properties = MeshMoments(stray, triangles).mass_properties("points", mass=2.0)
+    center = vertices.mean(axis=0)
+    offset = vertices - center
+    each = 2.0 / len(vertices)
+    expected = each * (np.sum(offset**2) * np.eye(3) - offset.T @ offset)
+    assert properties.center_of_mass == pytest.approx(center, rel=1e-13)
+    assert properties.inertia == pytest.approx(expected, rel=1e-12, abs=1e-13)
+    assert point_moments(stray, triangles).measure == len(vertices)
+
+
+def test_bounding_box_is_the_cuboid_about_the_boxs_centre(lopsided):
+    vertices, triangles = lopsided
+    properties = MeshMoments(vertices, triangles).mass_properties("bounding_box", mass=3.0)
+    a, b, c = np.ptp(vertices, axis=0)
+    assert properties.center_of_mass == pytest.approx(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)), abs=1e-15)
+    assert np.diag(properties.inertia) == pytest.approx(
+        3.0 / 12 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
+    )
+
+
+def test_shell_of_a_fine_sphere_approaches_two_thirds_m_r_squared():
+    moments = shell_moments(*sphere(200))
+    assert moments.measure == pytest.approx(4 * np.pi, rel=2e-4)
+    properties = MeshMoments(*sphere(200)).mass_properties("shell", mass=1.0)
+    assert np.diag(properties.inertia) == pytest.approx([2 / 3] * 3, rel=2e-4)
+
+
+def test_shell_of_a_box_is_the_sum_of_its_six_plates():
+    a, b, c = 1.0, 2.0, 3.0
+    plates = 2 * np.array([b * c, a * c, a * b])
+    mass = plates / plates.sum()
+    ixx = mass[0] * (b * b + c * c) / 12 + mass[1] * (c * c / 12 + b * b / 4) + mass[2] * (b * b / 12 + c * c / 4)
+    properties = MeshMoments(*box((a, b, c), 2)).mass_properties("shell", mass=1.0)
+    assert properties.inertia[0, 0] == pytest.approx(ixx, rel=1e-14)
+
+
+def test_shell_counts_a_concave_polygons_fan_once():
+    # A dart whose fan from the first corner leaves the polygon: corner 0 sees corner 2 from outside.
+    dart = np.array([[2.0, 1.0, 0], [0, 0.0, 0], [0.5, 1.0, 0], [0, 2.0, 0]])
+    triangles, starts = np.array([[0, 1, 2], [0, 2, 3]]), np.array([0, 2])
+    assert shell_moments(dart, triangles, starts).measure == pytest.approx(1.5, rel=1e-15)
+    turned = np.roll(dart, -1, axis=0)  # now the fan's first triangle turns against the polygon
+    moments = shell_moments(turned, triangles, starts)
+    assert moments.measure == pytest.approx(1.5, rel=1e-15)
+    assert moments.centroid == pytest.approx(shell_moments(dart, triangles, starts).centroid, rel=1e-14)
+    assert shell_moments(turned, triangles).measure > 1.6  # as loose triangles it counts the overlap
+
+
+def test_ballast_is_point_masses_added_by_the_parallel_axis_theorem(lopsided):
+    moments = MeshMoments(*lopsided)
+    scale = np.array([2.0, -1.0, 0.5])
+    bare = moments.mass_properties(scale=scale, density=500.0)
+    weights = ((0.7, 0.1, 0.2, 0.3), (1.4, -1.0, 0.0, 2.0))
+    loaded = moments.mass_properties(scale=scale, density=500.0, ballast=weights)
+    masses = np.array([bare.mass, 0.7, 1.4])
+    places = np.array([bare.center_of_mass, scale * [0.1, 0.2, 0.3], scale * [-1.0, 0.0, 2.0]])
+    center = masses @ places / masses.sum()
+    inertia = bare.inertia.copy()
+    for m, p in zip(masses, places - center, strict=True):
+        inertia += m * (p @ p * np.eye(3) - np.outer(p, p))
+    assert loaded.mass == pytest.approx(masses.sum(), rel=1e-15)
+    assert loaded.center_of_mass == pytest.approx(center, rel=1e-13)
+    assert loaded.inertia == pytest.approx(inertia, rel=1e-13, abs=1e-13)
+
+
+def test_ballast_far_from_the_origin_keeps_its_digits():
+    vertices, triangles = sphere(8)
+    near = MeshMoments(vertices, triangles).mass_properties(density=1.0, ballast=((1.0, 0.5, 0.25, 0.0),))
+    shift = 2.0**20
+    there = MeshMoments(np.round(vertices * 2**20) / 2**20 + shift, triangles)
+    far = there.mass_properties(density=1.0, ballast=((1.0, shift + 0.5, shift + 0.25, shift),))
+    again = MeshMoments(np.round(vertices * 2**20) / 2**20, triangles)
+    again = again.mass_properties(density=1.0, ballast=((1.0, 0.5, 0.25, 0.0),))
+    assert far.inertia == pytest.approx(again.inertia, rel=1e-14, abs=1e-14)
+    assert near.inertia == pytest.approx(again.inertia, rel=1e-4, abs=1e-5)
+
+
+def test_explicit_numbers_are_final_and_move_with_the_picture():
+    given = (0.2, 0.01, -0.02, 0.3, 0.03, 0.25)
+    plain = explicit_mass_properties(3.0, (1.0, 2.0, 3.0), given, scale=(2.0, -1.0, 1.0))
+    assert plain.mass == 3.0
+    assert plain.center_of_mass.tolist() == [2.0, -2.0, 3.0]
+    assert plain.inertia.tolist() == [[0.2, 0.01, -0.02], [0.01, 0.3, 0.03], [-0.02, 0.03, 0.25]]
+    loaded = explicit_mass_properties(3.0, (0.0, 0.0, 0.0), given, ballast=((1.0, 0.0, 0.0, 4.0),))
+    assert loaded.mass == 4.0
+    assert loaded.center_of_mass.tolist() == [0.0, 0.0, 1.0]
+    assert loaded.inertia[0, 0] == pytest.approx(0.2 + 3.0 * 1.0 + 1.0 * 9.0)
+
+
+def test_an_inward_surface_is_turned():
+    vertices, triangles = box((1.0, 2.0, 3.0))
+    inside_out = MeshMoments(vertices, triangles[:, ::-1].copy())
+    assert inside_out.turned
+    close(inside_out.mass_properties(), MeshMoments(vertices, triangles).mass_properties())
+
+
+def test_a_rescale_never_passes_over_the_mesh_again(monkeypatch, lopsided):
+    moments = MeshMoments(*lopsided)
+    for model in COMPUTED:
+        moments.mass_properties(model)
+    moments.vertices = moments.triangles = None
+    for model in COMPUTED:
+        for scale in (2.0, -0.5, (3.0, 3.0, -3.0)):
+            assert moments.mass_properties(model, scale=scale, ballast=((1.0, 0.0, 0.0, 0.0),)).mass > 1.0
+
+
+def test_moments_survive_json_to_the_last_bit(lopsided):
+    import json
+
+    moments = solid_moments(*lopsided)
+    again = Moments.from_dict(json.loads(json.dumps(moments.as_dict())))
+    assert again.measure == moments.measure
+    for name in ("reference", "center", "center_low", "second"):
+        assert getattr(again, name).tobytes() == getattr(moments, name).tobytes()
+
+
+def test_refusals_name_the_field_and_what_is_accepted():
+    moments = MeshMoments(*box())
+    for arguments, field in (
+        ({"scale": 0.0}, "scale"),
+        ({"scale": (1.0, 2.0)}, "scale"),
+        ({"scale": (1.0, float("nan"), 1.0)}, "scale"),
+        ({"scale": 1e10}, "scale"),
+        ({"mass": -1.0}, "mass"),
+        ({"mass": float("nan")}, "mass"),
+        ({"density": 0.0}, "density"),
+        ({"density": float("inf")}, "density"),
+        ({"ballast": ((-1.0, 0.0, 0.0, 0.0),)}, "ballast"),
+        ({"ballast": ((1.0, float("nan"), 0.0, 0.0),)}, "ballast"),
+    ):
+        with pytest.raises(InputError) as refused:
+            moments.mass_properties(**arguments)
+        assert refused.value.field == field
+    with pytest.raises(InputError, match=", ".join(INERTIA_MODELS[:4])):
+        moments.mass_properties("cuboid")
+
+
+def test_an_open_surface_is_refused_where_a_volume_is_needed_and_only_there():
+    vertices, triangles = box()
+    opened = MeshMoments(vertices, triangles[:-1], closed=False, closed_reason="open surface: 3 boundary edges")
+    for model in COMPUTED:
+        with pytest.raises(MeshError, match="--repair"):
+            opened.mass_properties(model, density=1000.0)
+    with pytest.raises(MeshError, match="3 boundary edges"):
+        opened.mass_properties("solid", mass=1.0)
+    for model in COMPUTED[1:]:
+        assert opened.mass_properties(model, mass=1.0).mass == 1.0
+
+
+def test_points_on_a_line_are_refused_by_the_models_name():
+    line = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    with pytest.raises(TensorError, match="points"):
+        MeshMoments(line, np.array([[0, 1, 2]]), closed=False).mass_properties("points", mass=1.0)
+
+
+def test_a_flat_surface_has_its_other_models():
+    square = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 1.0, 0], [0.0, 1.0, 0]])
+    flat = MeshMoments(square, np.array([[0, 1, 2], [0, 2, 3]]), closed=False)
+    for model in COMPUTED[1:]:
+        a, b, c = np.diag(flat.mass_properties(model, mass=1.0).inertia)
+        assert a + b == pytest.approx(c, rel=1e-14)

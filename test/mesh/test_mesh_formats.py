@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: MIT
+"""Reading meshes: the file's own vertices in the file's own order, polygons kept, known traps of other readers."""
+
+import hashlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text
+
+from rigid_proto_ros.base.errors import MeshError
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mesh import cache as mesh_cache
+from rigid_proto_ros.mesh import reading as mesh_io
+from rigid_proto_ros.mesh.numbers_in_text import read_numbers
+from rigid_proto_ros.mesh.reading import bundled_names, load_mesh
+
+
+def load(tmp_path, name: str, data: bytes):
+    path = tmp_path / name
+    path.write_bytes(data)
+    return load_mesh(str(path))
+
+
+def volume(mesh) -> float:
+    return mesh_body(mesh).moments.moments("solid").measure
+
+
+WHOLE = {
+    "a.obj": obj(),
+    "quads.obj": obj(faces=CUBE_QUADS),
+    "a.off": off(),
+    "quads.off": off(faces=CUBE_QUADS),
+    "a.stl": stl(),
+    "text.stl": stl_text(),
+    "a.ply": ply(),
+    "quads.ply": ply(faces=CUBE_QUADS),
+    "little.ply": ply_binary(faces=CUBE_QUADS),
+    "big.ply": ply_binary(big=True),
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_every_format_gives_the_cube_in_file_order(tmp_path, name):
+    mesh = load(tmp_path, name, WHOLE[name])
+    assert volume(mesh) == 1.0
+    assert mesh.polygons == (6 if name.startswith(("quads", "little")) else 12)
+    if not name.endswith("stl"):
+        assert mesh.vertices.tolist() == CUBE_VERTICES.tolist()
+    assert mesh.triangles.tolist() == CUBE_TRIANGLES.tolist() or name.endswith("stl")
+    assert mesh.sha256 == hashlib.sha256(WHOLE[name]).hexdigest()
+    assert mesh_body(mesh).moments.moments("shell").measure == pytest.approx(6.0, rel=1e-15)
+
+
+def test_stl_corners_are_one_vertex_when_bit_equal_in_order_of_appearance(tmp_path):
+    mesh = load(tmp_path, "a.stl", stl())
+    order = list(dict.fromkeys(CUBE_TRIANGLES.ravel().tolist()))
+    assert mesh.vertices.tolist() == CUBE_VERTICES[order].tolist()
+    nudged = CUBE_VERTICES.copy()
+    nudged = np.vstack([nudged, nudged[0] + [1e-7, 0, 0]])
+    faces = CUBE_TRIANGLES.tolist()
+    faces[0][0] = 8
+    assert len(load(tmp_path, "b.stl", stl(nudged, faces)).vertices) == 9
+
+
+def test_interleaved_negative_obj_indices_count_back_from_the_vertices_so_far(tmp_path):
+    text = []
+    for a, b, c in CUBE_TRIANGLES:
+        text += ["v {} {} {}".format(*CUBE_VERTICES[i]) for i in (a, b, c)]
+        text.append("f -3 -2 -1")
+    mesh = load(tmp_path, "interleaved.obj", "\n".join(text).encode())
+    assert len(mesh.vertices) == 36
+    assert volume(mesh) == 1.0
+
+
+def test_obj_corners_with_texture_and_normal_numbers_tabs_and_continued_lines(tmp_path):
+    text = obj(faces=CUBE_QUADS).decode()
+    text = text.replace("f 1 2 4 3", "f\t1/1/1 2//1 \\\n 4/2 3/3/3 # the first").replace("v ", "v\t")
+    text = "mtllib a.mtl\nvt 0 0\nvn 0 0 1\ng side\nusemtl m\ns 1\n" + text + "l 1 2\np 1\n"
+    mesh = load(tmp_path, "rich.obj", text.encode())
+    assert volume(mesh) == 1.0
+    assert mesh.polygons == 6
+
+
+def test_a_byte_order_mark_hides_no_vertex_of_an_obj(tmp_path):
+    mesh = load(tmp_path, "marked.obj", b"\xef\xbb\xbf" + obj())
+    assert np.array_equal(mesh.vertices, CUBE_VERTICES) and volume(mesh) == 1.0
+
+
+def test_obj_vertices_with_weights_or_colours_keep_their_coordinates(tmp_path):
+    text = "\n".join(line + " 0.1 0.2 0.3" if line.startswith("v ") else line for line in obj().decode().splitlines())
+    assert volume(load(tmp_path, "colours.obj", text.encode())) == 1.0
+
+
+def test_unreferenced_vertices_are_counted_and_carry_nothing(tmp_path):
+    mesh = load(tmp_path, "stray.obj", b"v 100 100 100\n" + obj(faces=CUBE_TRIANGLES + 1))
+    assert len(mesh.vertices) == 9
+    body = mesh_body(mesh)
+    assert body.moments.mass_properties(density=1.0).center_of_mass.tolist() == [0.5, 0.5, 0.5]
+    assert [finding.code for finding in body.verdict.findings] == ["unreferenced_vertices"]
+
+
+def test_coff_colours_and_comments_are_skipped(tmp_path):
+    lines = off(faces=CUBE_QUADS).decode().splitlines()
+    lines[0] = "COFF # with colours"
+    lines[2:10] = [line + " 255 0 0 255" for line in lines[2:10]]
+    lines[10:] = [line + " 0.5 0.5 0.5" for line in lines[10:]]
+    lines.insert(1, "# counts follow\n")
+    assert volume(load(tmp_path, "c.off", "\n".join(lines).encode())) == 1.0
+    one_line = off().replace(b"OFF\n", b"OFF ", 1)
+    assert volume(load(tmp_path, "d.off", one_line)) == 1.0
+
+
+def test_ply_triangle_strips_turn_every_other_triangle_and_restart(tmp_path):
+    # Two faces of the cube as strips of four, the other four as quads.
+    header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+    header += "element face 4\nproperty list uchar int vertex_index\n"
+    header += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    body = "\n".join(" ".join(map(str, v)) for v in CUBE_VERTICES.tolist()) + "\n"
+    body += "\n".join("4 " + " ".join(map(str, q)) for q in CUBE_QUADS[2:]) + "\n"
+    body += "9 0 1 2 3 -1 4 6 5 7\n"
+    mesh = load(tmp_path, "strips.ply", (header + body).encode())
+    assert volume(mesh) == 1.0
+    assert mesh.polygons == 4 + 4
+
+
+def test_concave_polygons_are_fanned_exactly(tmp_path):
+    outline = [(2.0, 1.0), (0.0, 0.0), (0.5, 1.0), (0.0, 2.0)]
+    for start in range(4):
+        ring = outline[start:] + outline[:start]
+        vertices = [(x, y, z) for z in (0.0, 1.0) for x, y in ring]
+        sides = [(i, 4 + i, 4 + (i + 1) % 4, (i + 1) % 4) for i in range(4)]
+        mesh = load(tmp_path, f"dart{start}.obj", obj(vertices, [(0, 1, 2, 3), (7, 6, 5, 4), *sides]))
+        body = mesh_body(mesh)
+        assert body.moments.moments("solid").measure == pytest.approx(1.5, rel=1e-15)
+        edges = sum(np.hypot(*np.subtract(ring[i], ring[i - 1])) for i in range(4))
+        assert body.moments.moments("shell").measure == pytest.approx(3.0 + edges, rel=1e-15)
+
+
+@given(st.lists(st.one_of(st.floats(allow_nan=False), st.floats(-1e3, 1e3), st.decimals(-1000, 1000, places=6)), min_size=1, max_size=30), st.sampled_from(["{!r}", "{:.6f}", "{:.17e}", "{:+.9G}"]))  # fmt: skip
+@settings(deadline=None, max_examples=150)
+def test_decimal_numbers_are_read_as_python_reads_them(values, form):
+    words = [form.format(float(value)) for value in values]
+    read, bad = read_numbers(" \n".join(words).encode(), 0, 100)
+    assert bad is None
+    assert read.tobytes() == np.array([float(word) for word in words]).tobytes()
+
+
+@pytest.mark.parametrize("word", ["1.2.3", "--1", "1e", "0x10", "1_000", "e5", ".", "+", "1d3"])
+def test_words_that_are_no_numbers_are_told(word):
+    read, bad = read_numbers(f"1 2 {word} 4".encode(), 0, 10)
+    assert (read.tolist(), bad) == ([1.0, 2.0], 4)
+
+
+def test_numbers_of_more_digits_than_a_double_holds_are_the_nearest_double():
+    random = np.random.default_rng(1)
+    words = [
+        f"{m}e{e}" for m, e in zip(random.integers(2**53, 10**18, 2000), random.integers(-22, 23, 2000), strict=True)
+    ]
+    for high in random.uniform(2.0**55, 2.0**59, 2000):  # halfway between two doubles, and one beside it
+        middle = int(high) + int(np.spacing(high)) // 2
+        words += [str(middle - 1), str(middle), str(middle + 1)]
+    read, bad = read_numbers(" ".join(words).encode(), 0, len(words))
+    assert bad is None and read.tolist() == [float(word) for word in words]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace(b"\n", b" "),
+        lambda text: text.replace(b"\n", b"\r"),
+        lambda text: text.replace(b"\n", b"\r\n"),
+        lambda text: b"\xef\xbb\xbf" + text,
+        lambda text: text.upper(),
+        lambda text: text.replace(b"solid test", b"solid of vertex 1 2 and an endfacet", 1),
+        lambda text: text.replace(b"endsolid", b"\n" * 33_000 + b"endsolid"),
+    ],
+    ids=["one line", "bare CR", "CRLF", "byte order mark", "capitals", "words in the name", "blank lines"],
+)
+def test_ascii_stl_in_every_spelling(tmp_path, change):
+    mesh = load(tmp_path, "a.stl", change(stl_text()))
+    assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
+
+
+def test_our_readers_agree_with_trimesh_on_files_it_writes(tmp_path, meshes):
+    trimesh = pytest.importorskip("trimesh")
+    mesh = load_mesh(str(meshes / "sword.obj"))
+    theirs = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+    for name, kind in (("a.off", "off"), ("a.ply", "ply"), ("a.stl", "stl"), ("b.stl", "stl_ascii"), ("a.glb", "glb")):
+        data = theirs.export(file_type=kind)
+        again = load(tmp_path, name, data.encode() if isinstance(data, str) else data)
+        assert len(again.triangles) == len(mesh.triangles), name
+        corners, expected = again.vertices[again.triangles], mesh.vertices[mesh.triangles]
+        assert np.max(np.abs(corners - expected)) <= 1e-7 * np.max(np.abs(expected)), name
+
+
+def test_bundled_names_and_package_uris_find_the_same_file():
+    assert {"t_handle", "hammer", "hollow_box"} <= set(bundled_names())
+    by_name, by_uri = load_mesh("t_handle"), load_mesh("package://rigid_proto_ros/bodies/t_handle.obj")
+    assert by_name.path == by_uri.path
+    assert by_name.sha256 == by_uri.sha256
+
+
+class TestCache:
+    @pytest.fixture(autouse=True)
+    def own_folder(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+        monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
+        monkeypatch.setattr(mesh_io, "CACHED_SIZE", 1)
+
+    def entries(self):
+        return sorted(path.suffix for path in mesh_cache.folder().iterdir())
+
+    def test_a_second_look_reads_and_computes_nothing(self, tmp_path, monkeypatch):
+        first = mesh_body(load(tmp_path, "a.obj", obj(faces=CUBE_QUADS)))
+        expected = {m: first.moments.mass_properties(m).inertia.tobytes() for m in ("solid", "shell", "points")}
+        assert self.entries() == [".json", ".npz"]
+
+        def never(*_args, **_options):
+            raise AssertionError("computed again")
+
+        monkeypatch.setattr("rigid_proto_ros.mesh.reading._read", never)
+        monkeypatch.setattr("rigid_proto_ros.mass.from_mesh.judge_surface", never)
+        for kernel in ("solid_moments", "shell_moments", "point_moments"):
+            monkeypatch.setattr(f"rigid_proto_ros.mass.properties.{kernel}", never)
+        again = mesh_body(load_mesh(str(tmp_path / "a.obj")))
+        assert {m: again.moments.mass_properties(m).inertia.tobytes() for m in expected} == expected
+        assert again.mesh.polygon_starts.tolist() == first.mesh.polygon_starts.tolist()
+        assert again.verdict == first.verdict
+
+    def test_another_content_under_the_same_name_is_another_entry(self, tmp_path):
+        assert volume(load(tmp_path, "a.obj", obj())) == 1.0
+        assert volume(load(tmp_path, "a.obj", obj(2 * CUBE_VERTICES))) == 8.0
+
+    @pytest.mark.parametrize("damage", [b"", b"{", b"PK\x03\x04junk", b"[1, 2]", b'{"verdict": 3}'])
+    def test_a_damaged_entry_is_done_again(self, tmp_path, damage):
+        assert volume(load(tmp_path, "a.obj", obj())) == 1.0
+        for path in mesh_cache.folder().iterdir():
+            path.write_bytes(damage)
+        assert volume(load_mesh(str(tmp_path / "a.obj"))) == 1.0
+
+    def test_a_folder_that_cannot_be_written_is_no_error(self, tmp_path, monkeypatch):
+        (tmp_path / "file").write_text("")
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+        assert volume(load(tmp_path, "a.obj", obj())) == 1.0
+
+    def test_it_can_be_turned_off(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+        assert mesh_cache.folder() is None
+        assert volume(load(tmp_path, "a.obj", obj())) == 1.0
+
+    def test_the_oldest_entries_go_when_the_folder_is_full(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(mesh_cache, "SIZE_LIMIT", 4000)
+        for k in range(1, 6):
+            load(tmp_path, f"{k}.obj", obj(k * CUBE_VERTICES))
+        assert 1 <= len(self.entries()) <= 4
+
+
+def test_a_mesh_error_names_field_and_file(tmp_path):
+    with pytest.raises(MeshError) as refused:
+        load(tmp_path, "bad.obj", b"v 1 2\nf 1 2 3\n")
+    assert refused.value.field == "bad.obj line 1"

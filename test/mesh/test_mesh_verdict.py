@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: MIT
+"""The verdict on a surface, its repair, and what may stand in for it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mass_solids import box, inward, moved, rotation, sphere, together
+from mesh_files import CUBE_QUADS, CUBE_VERTICES, moebius, obj
+
+from rigid_proto_ros.base.errors import InputError, MeshError
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.moments import solid_moments
+from rigid_proto_ros.mass.repair import Surface
+from rigid_proto_ros.mass.verdict import judge_surface, unit_suspicion
+from rigid_proto_ros.mesh import nesting as mesh_topology_nesting
+from rigid_proto_ros.mesh.hull import box_surface, convex_hull
+from rigid_proto_ros.mesh.reading import Mesh, load_mesh
+from rigid_proto_ros.mesh.topology import mesh_topology
+
+
+def body(surface, polygon_starts=None, **options):
+    vertices, triangles = surface
+    name = str(hash((vertices.tobytes(), triangles.tobytes())))
+    return mesh_body(Mesh("made", "/made.obj", vertices, triangles, polygon_starts, name), **options)
+
+
+def codes(made) -> dict[str, str]:
+    return {finding.code: finding.severity for finding in made.verdict.findings}
+
+
+def solid_volume(made) -> float:
+    return made.moments.moments("solid").measure
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+
+
+BALL = sphere(10)
+HOLLOW = together(box((4.0, 4.0, 4.0)), inward(sphere(10)))
+
+
+def test_a_closed_surface_gets_no_remark():
+    made = body(BALL)
+    assert codes(made) == {}
+    assert (made.verdict.watertight, made.verdict.winding_consistent, made.verdict.components) == (True, True, 1)
+
+
+def test_corners_split_for_textures_are_one_vertex_to_the_verdict():
+    vertices, triangles = BALL
+    soup = vertices[triangles].reshape(-1, 3)
+    made = body((soup, np.arange(len(soup)).reshape(-1, 3)))
+    assert made.verdict.closed
+    assert solid_volume(made) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+
+
+def test_cavities_are_kept():
+    made = body(HOLLOW)
+    assert codes(made) == {"cavities": "info"}
+    assert solid_volume(made) == pytest.approx(64.0 - solid_volume(body(BALL)), rel=1e-13)
+    assert solid_volume(body(inward(HOLLOW))) == solid_volume(made)
+
+
+def test_a_part_inside_another_wound_outward_counts_twice_and_is_told():
+    made = body(together(box((4.0, 4.0, 4.0)), BALL))
+    assert codes(made) == {"nested_components": "warning"}
+    assert solid_volume(made) > 64.0
+    repaired = body(together(box((4.0, 4.0, 4.0)), BALL), repair=True)
+    assert solid_volume(repaired) == pytest.approx(solid_volume(body(HOLLOW)), rel=1e-14)
+
+
+@pytest.mark.parametrize("shift", [(0.5, 0.5, 0.5), (0.31, 0.17, 0.05), (0.9, 0.0, 0.0)])
+def test_overlapping_parts_are_told(shift):
+    made = body(together(box(cells=3), moved(box(cells=3), shift, 2)))
+    assert codes(made)["overlapping_components"] == "warning"
+
+
+def test_crossing_bars_without_a_corner_inside_each_other_are_told():
+    made = body(together(box((4.0, 1.0, 1.0)), moved(box((1.0, 4.0, 0.5)), (0.1, 0.2, 0.05))))
+    assert codes(made) == {"overlapping_components": "warning"}
+
+
+def test_parts_apart_or_touching_are_not_called_overlapping():
+    assert codes(body(together(box(), moved(box(), (3.0, 0, 0))))) == {}
+    assert "overlapping_components" not in codes(body(together(box(), moved(box(), (1.0, 0, 0)))))
+    assert "overlapping_components" not in codes(body(together(box(), moved(box(), (1.0, 0.5, 0)))))
+
+
+def test_boxes_that_share_part_of_their_faces_and_of_their_inside_are_told():
+    # Every edge that meets the other box lies in one of its faces: no edge passes properly through a triangle.
+    made = body(together(box(), moved(box(), (0.5, 0, 0))))
+    assert codes(made) == {"overlapping_components": "warning"}
+
+
+def test_a_grid_of_touching_boxes_overlaps_nowhere():
+    parts = [moved(box(), (float(i), float(j), float(k))) for i in range(5) for j in range(5) for k in range(5)]
+    assert codes(body(together(*parts))) == {"non_manifold": "info"}
+
+
+def bubbles(count: int) -> tuple:
+    """A ball with count³ spherical bubbles."""
+    places = [(i, j, k) for i in range(count) for j in range(count) for k in range(count)]
+    middle = (count - 1) / 2
+    holes = [
+        inward(moved(sphere(4, (0.02, 0.02, 0.02)), tuple(0.12 * (x - middle) for x in place))) for place in places
+    ]
+    return together(sphere(12), *holes)
+
+
+def test_a_ball_with_many_bubbles_is_right_as_it_is():
+    made = body(bubbles(6), repair=True)
+    assert codes(made) == {"cavities": "info"}
+    one = solid_volume(body(sphere(4, (0.02, 0.02, 0.02))))
+    assert solid_volume(made) == pytest.approx(solid_volume(body(sphere(12))) - 216 * one, rel=1e-12)
+
+
+def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch):
+    monkeypatch.setattr(mesh_topology_nesting, "WORK_LIMIT", 3000)
+    made = body(bubbles(4), repair=True)
+    assert codes(made)["components_unchecked"] == "warning"
+    assert "component_inward" not in codes(made) and "repaired" not in codes(made)
+    one = solid_volume(body(sphere(4, (0.02, 0.02, 0.02))))
+    assert solid_volume(made) == pytest.approx(solid_volume(body(sphere(12))) - 64 * one, rel=1e-12)
+
+
+def test_an_open_surface_says_how_far_its_volume_depends_on_the_origin():
+    vertices, triangles = box((2.0, 2.0, 2.0))
+    made = body((vertices, triangles[:-2]))
+    message = made.verdict.reason
+    assert "4 boundary edges" in message
+    # Without one face of area 4 the sum runs by 4/3·2 between the origins on that face and on the one across.
+    assert "volume ambiguous: 5.33 to 8" in message
+    shifted = solid_moments(vertices + [1.0, 0, 0], triangles[:-2]).measure
+    assert 5.3 <= abs(shifted) <= 8.0
+
+
+@pytest.mark.parametrize("fraction", [0.1, 0.25, 0.5])
+def test_repair_turns_faces_to_agree(fraction):
+    vertices, triangles = BALL
+    flip = np.random.default_rng(1).random(len(triangles)) < fraction
+    broken = triangles.copy()
+    broken[flip] = broken[flip, ::-1]
+    made = body((vertices, broken))
+    assert codes(made)["inconsistent_winding"] == "error"
+    repaired = body((vertices, broken), repair=True)
+    assert solid_volume(repaired) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+    assert codes(repaired) == {"repaired": "warning"}
+
+
+def test_repair_keeps_a_cavity_whatever_the_faces_said():
+    vertices, triangles = HOLLOW
+    flip = np.random.default_rng(2).random(len(triangles)) < 0.3
+    broken = triangles.copy()
+    broken[flip] = broken[flip, ::-1]
+    assert solid_volume(body((vertices, broken), repair=True)) == pytest.approx(solid_volume(body(HOLLOW)), rel=1e-14)
+
+
+def test_repair_of_bodies_wound_apart(meshes):
+    repaired = mesh_body(load_mesh(str(meshes / "multibody.stl")), repair=True)
+    # Each body's volume by itself, whichever way the file winds it.
+    mesh = repaired.mesh
+    topology = mesh_topology(mesh.vertices, repaired.triangles)
+    parts = [
+        abs(solid_moments(mesh.vertices, repaired.triangles[topology.component == c]).measure)
+        for c in range(topology.components)
+    ]
+    assert solid_volume(repaired) == pytest.approx(sum(parts), rel=1e-13)
+
+
+def test_repair_turns_polygons_as_a_whole(meshes):
+    mesh = load_mesh(str(meshes / "sword_quads.obj"))
+    surface = Surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    chosen = np.random.default_rng(3).random(mesh.polygons) < 0.25
+    surface.turn(np.repeat(chosen, np.diff(mesh.polygon_starts)))
+    broken = dataclasses.replace(mesh, triangles=surface.triangles, sha256="broken")
+    repaired, whole = mesh_body(broken, repair=True), mesh_body(mesh)
+    assert solid_volume(repaired) == solid_volume(whole)
+    assert repaired.moments.moments("shell").measure == pytest.approx(whole.moments.moments("shell").measure, rel=1e-14)
+    assert codes(repaired)["nonplanar_polygons"] == "info"
+
+
+def test_repair_drops_copies_and_back_sides():
+    vertices, triangles = BALL
+    twice = body((vertices, np.concatenate([triangles, triangles])), repair=True)
+    both = body((vertices, np.concatenate([triangles, triangles[:, ::-1]])), repair=True)
+    assert solid_volume(twice) == solid_volume(both) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+
+
+def test_repair_welds_a_torn_surface():
+    vertices, triangles = BALL
+    soup = vertices[triangles].reshape(-1, 3)
+    soup = soup + np.random.default_rng(4).uniform(-1e-6, 1e-6, soup.shape)
+    torn = (soup, np.arange(len(soup)).reshape(-1, 3))
+    assert codes(body(torn))["open"] == "error"
+    repaired = body(torn, repair=True)
+    assert "welded" in repaired.verdict.findings[0].message
+    assert solid_volume(repaired) == pytest.approx(solid_volume(body(BALL)), rel=1e-5)
+
+
+def test_repair_caps_flat_holes_exactly():
+    vertices, triangles = box((1.0, 2.0, 3.0), 4)
+    missing = np.all(vertices[triangles][:, :, 2] == 1.5, axis=1)
+    repaired = body((vertices, triangles[~missing]), repair=True)
+    assert "capped 1 holes" in repaired.verdict.findings[0].message
+    assert solid_volume(repaired) == pytest.approx(6.0, rel=1e-15)
+    assert repaired.moments.moments("shell").measure == pytest.approx(22.0, rel=1e-14)
+    few = body((vertices, np.delete(triangles, [3, 40, 41, 90], axis=0)), repair=True)
+    assert solid_volume(few) == pytest.approx(6.0, rel=1e-15)
+
+
+def test_what_cannot_be_repaired_stays_refused():
+    made = body(moebius(), repair=True)
+    assert "Moebius" in made.verdict.findings[0].message
+    with pytest.raises(MeshError, match="--fallback"):
+        made.moments.mass_properties(mass=1.0)
+
+
+def test_repair_leaves_a_good_mesh_alone():
+    made = body(BALL, repair=True)
+    assert codes(made) == {}
+    assert made.triangles is BALL[1]
+
+
+def test_the_fallbacks_are_named_and_stand_in():
+    vertices, triangles = box((1.0, 2.0, 3.0))
+    opened = (vertices @ rotation(1).T, triangles[:-1])
+    hull = body(opened, fallback="hull")
+    assert solid_volume(hull) == pytest.approx(6.0, rel=1e-14)
+    assert codes(hull) == {"open": "error", "fallback": "warning"}
+    assert "convex hull" in hull.verdict.findings[-1].message
+    cuboid = body(opened, fallback="box")
+    assert solid_volume(cuboid) == pytest.approx(np.prod(np.ptp(opened[0], axis=0)), rel=1e-14)
+    solid, box_model = (cuboid.moments.mass_properties(m, mass=1.0).inertia for m in ("solid", "bounding_box"))
+    assert solid == pytest.approx(box_model, rel=1e-13, abs=1e-15)
+    assert codes(body(BALL, fallback="hull")) == {}  # nothing to stand in for
+    with pytest.raises(InputError, match="hull or box"):
+        body(opened, fallback="sphere")
+
+
+@given(st.integers(0, 2**31), st.integers(4, 60), st.sampled_from(["normal", "sphere", "grid"]), st.floats(-8, 0))
+@settings(deadline=None, max_examples=80)
+def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, exponent):
+    random = np.random.default_rng(seed)
+    points = random.normal(size=(count, 3))
+    if kind == "sphere":
+        points /= np.linalg.norm(points, axis=1)[:, None]
+    if kind == "grid":
+        points = np.round(points * 1.5)
+    points = np.unique(points, axis=0)
+    thin = 10.0**exponent
+    points = points * [1.0, 1.0, thin] @ rotation(seed % 100).T
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if len(points) < 4 or spread[2] < 1e-9 * spread[0]:
+        with pytest.raises(MeshError):
+            convex_hull(points)
+        return
+    triangles = convex_hull(points)
+    topology = mesh_topology(points, triangles)
+    assert (topology.unbalanced, topology.components) == (0, 1)
+    assert solid_moments(points, triangles).measure > 0.0
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    heights = np.einsum("fk,fpk->fp", normals, points[None] - a[:, None])
+    volume_scale = spread[0] ** 2 * spread[2]
+    assert heights.max() <= 1e-9 * volume_scale + 1e-14
+
+
+def test_the_box_surface_is_outward():
+    vertices, triangles = box_surface(np.zeros(3), np.array([1.0, 2.0, 3.0]))
+    assert solid_moments(vertices, triangles).measure == 6.0
+    assert mesh_topology(vertices, triangles).unbalanced == 0
+
+
+def test_nonplanar_polygons_say_how_far_and_how_much(tmp_path):
+    lifted = CUBE_VERTICES.copy()
+    lifted[7, 2] += 0.3
+    (tmp_path / "q.obj").write_bytes(obj(lifted, CUBE_QUADS))
+    mesh = load_mesh(str(tmp_path / "q.obj"))
+    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    (finding,) = [f for f in verdict.findings if f.code == "nonplanar_polygons"]
+    # The lifted corner and its neighbours' diagonal span a tetrahedron of 0.3·1·1/6.
+    assert "by up to 0.05" in finding.message
+
+
+@pytest.mark.parametrize(("side", "suspect"), [(400.0, True), (1.8, False), (0.02, False), (1e-4, True)])
+def test_sizes_that_no_metre_file_has_are_suspected(side, suspect):
+    assert (unit_suspicion(side) is not None) == suspect
+
+
+def test_thin_bodies_are_called_so():
+    assert codes(body(moved(box((1.0, 1e-4, 1e-4)), (0, 0, 0), 3))) == {"thin": "info"}
+
+
+def test_copied_vertices_at_minus_zero_are_welded_for_the_verdict():
+    vertices, triangles = box()
+    doubled = np.vstack([vertices - 0.5, -0.0 + (vertices - 0.5)])
+    doubled[len(vertices) :][doubled[len(vertices) :] == 0.0] = -0.0
+    mixed = triangles.copy()
+    mixed[::2] += len(vertices)
+    assert body((doubled, mixed)).verdict.closed
+
+
+def test_many_components_are_judged_in_bounded_work():
+    parts = [moved(box(), (3.0 * i, 3.0 * j, 3.0 * k)) for i in range(14) for j in range(14) for k in range(11)]
+    made = body(together(*parts))
+    assert codes(made) == {"components_unchecked": "warning"}
+    assert solid_volume(made) == pytest.approx(len(parts), rel=1e-13)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""What integrators keep: energy and momentum as a random walk of roundings, and the length of the quaternion."""
+
+import numpy as np
+import pytest
+from flights import spinning
+from one_segment import make_problem
+
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators.integrator import STRING
+from rigid_proto_ros.motion.loads import LoadSum
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.motion.string import StringSettings, tie
+from rigid_proto_ros.motion.variables import new_variables
+
+MOMENTS = np.array((1.0, 2.0, 3.0))
+BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag(MOMENTS))
+STEPPED = [name for name, integrator in INTEGRATORS.items() if integrator.kernel is not None]
+SPINS = [(0.9, 1.1, -0.7), (1.3, -0.2, 0.4), (-0.3, 0.5, 1.2), (0.6, 0.9, 0.1), (0.2, 1.4, -0.3), (1.0, -1.0, 1.0)]
+
+
+def free_problem(spin, body=BODY):
+    row = spinning(spin)
+    problem = make_problem(body, LoadSum(), np.zeros(3), 0.0, 0.0, True, State(0, row))
+    return problem, new_variables(row, problem)
+
+
+def energy_and_momentum(y):
+    """In long doubles, so that the measuring adds no rounding of its own: E and L (3,) in the world."""
+    w, q = y[4:7].astype(np.longdouble), y[0:4].astype(np.longdouble)
+    momentum = MOMENTS * w
+    twice = 2.0 * np.cross(q[:3], momentum)
+    return (w * momentum).sum() / 2.0, momentum + q[3] * twice + np.cross(q[:3], twice)
+
+
+def drifts(name, h, marks):
+    """Relative drifts of E and |L − L₀| (spins, marks, 2) after the given numbers of steps."""
+    kernel, found = INTEGRATORS[name].kernel, np.zeros((len(SPINS), len(marks), 2))
+    for i, spin in enumerate(SPINS):
+        problem, y = free_problem(spin)
+        energy, momentum = energy_and_momentum(y)
+        done = 0
+        for j, mark in enumerate(marks):
+            assert kernel(y, problem, h, mark - done) == mark - done
+            done = mark
+            now = energy_and_momentum(y)
+            found[i, j] = abs(now[0] / energy - 1.0), np.sqrt(((now[1] - momentum) ** 2).sum() / (momentum**2).sum())
+    return found
+
+
+def check_random_walk(found, marks, bound):
+    assert found.max() <= bound
+    typical = np.sqrt((found**2).mean(axis=0))
+    for quantity in typical.T:
+        # A random walk of roundings grows with n^½, a bias with n.
+        assert np.polyfit(np.log(marks), np.log(quantity), 1)[0] <= 0.7
+
+
+@pytest.mark.parametrize("h", [0.01, 0.1])
+@pytest.mark.parametrize("name", ["free_body", "lie_midpoint"])
+def test_energy_and_momentum_walk_at_random_over_a_million_steps(name, h):
+    marks = np.unique(np.logspace(3, 6, 13).astype(int))
+    # Measured up to 4e-13, slopes 0.4 to 0.6.
+    check_random_walk(drifts(name, h, marks), marks, 1e-12)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("name", ["free_body", "lie_midpoint"])
+def test_energy_and_momentum_walk_at_random_over_a_hundred_million_steps(name, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.SPINS", SPINS[:3])
+    marks = np.unique(np.logspace(4, 8, 17).astype(int))
+    check_random_walk(drifts(name, 0.01, marks), marks, 1e-11)
+
+
+@pytest.mark.parametrize("name", STEPPED)
+@pytest.mark.parametrize("blocks", [1, pytest.param(10, marks=pytest.mark.stress)])
+def test_attitude_stays_a_rotation_for_a_million_steps(name, blocks):
+    """The normal suite takes the first hundred thousand of them."""
+    problem, y = free_problem(SPINS[0])
+    h, worst = 1e-3, 0.0
+    for _ in range(blocks):
+        assert INTEGRATORS[name].kernel(y, problem, h, 100_000) == 100_000
+        R = matrix_from_quaternion(y[0:4])
+        worst = max(worst, np.abs(R.T @ R - np.eye(3)).max())
+    assert worst <= 4e-15  # measured 1.1e-15
+
+
+def pendulum(stiffness, h):
+    """A heavy body on a pull-only string without damping, stepped by discrete_gradient; the largest energy error."""
+    settings = StringSettings(
+        attached=True, attach=(0.2, 0.1, 0.4), stiffness=stiffness, damping_ratio=0.0, rest_length=1.0
+    )
+    row = np.array([0.3, 0.1, -1.2, 0.0, 0.0, 0.0, 1.0, 0.2, 0.5, 0.0, 0.3, -0.4, 0.8])
+    state, gravity = State(0, row), np.array((0.0, 0.0, -9.81))
+    string = tie(settings, settings.attach, settings.target, BODY, state, 0)
+    problem = make_problem(BODY, LoadSum(), gravity, 0.0, 0.0, True, state, string)
+    return problem, new_variables(row, problem), string, gravity
+
+
+def total_energy(y, string, gravity):
+    q, w = y[0:4], y[4:7]
+    position = np.array((0.3, 0.1, -1.2)) + y[7:10]
+    knot = position + matrix_from_quaternion(q) @ np.array((0.2, 0.1, 0.4))
+    stretch = max(0.0, float(np.linalg.norm(knot)) - string.rest_length)
+    kinetic = 0.5 * float(y[10:13] @ y[10:13]) + 0.5 * float((MOMENTS * w) @ w)
+    return kinetic, kinetic - float(gravity @ position) + 0.5 * string.stiffness * stretch**2
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
+def test_discrete_gradient_keeps_energy_through_slack_and_taut_at_any_stiffness(stiffness):
+    h = 1e-3
+    problem, y, string, gravity = pendulum(stiffness, h)
+    kernel = INTEGRATORS["discrete_gradient"].kernel
+    _, start = total_energy(y, string, gravity)
+    largest, worst = 0.0, 0.0
+    for _ in range(1000):
+        assert kernel(y, problem, h, 10) == 10
+        kinetic, energy = total_energy(y, string, gravity)
+        largest, worst = max(largest, kinetic), max(worst, abs(energy - start))
+    # ω_s h from 0.01 to 1000; one rounding of the knot's place, in the energy as measured here, weighs √(2 k E) ε.
+    assert worst <= 1e-9 * largest
+
+
+def test_every_integrator_that_carries_a_string_says_so():
+    assert {n for n, i in INTEGRATORS.items() if STRING in i.carries} >= {"rk4", "rkmk4", "dop853", "auto"}

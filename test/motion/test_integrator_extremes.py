@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Forces from 1e-300 up, steps from a nanosecond to 1000 s, spins from 1e-200: a right state, a refusal, or a stop in the
+last good state; never a NaN and never an exception.
+"""
+
+import numpy as np
+import pytest
+from flights import flight, wrench
+
+from rigid_proto_ros.base.errors import CommandRefused
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators.integrator import ANGULAR_DAMPING, STRING
+from rigid_proto_ros.motion.string import StringSettings
+
+FRAMES = ("world", "body", "world@point/.1,.2,.3", "body@point/.1,-.2,.3")
+
+
+def magnitude(rng, low, high):
+    return 10.0 ** rng.uniform(low, high)
+
+
+def hostile_flight(name, seed):
+    rng, integrator = np.random.default_rng(seed), INTEGRATORS[name]
+    moments = np.sort(rng.uniform(0.5, 1.0, 3)) * magnitude(rng, -9, 9)
+    body = make_body(magnitude(rng, -9, 9), (0.0, 0.0, 0.0), np.diag(moments))
+    row = np.zeros(13)
+    row[0:3] = rng.normal(size=3) * magnitude(rng, -9, 9)
+    row[6] = 1.0
+    row[7:10] = rng.normal(size=3) * magnitude(rng, -200, 9)
+    row[10:13] = rng.normal(size=3) * rng.choice((0.0, magnitude(rng, -200, 6)))
+    string = StringSettings()
+    if STRING in integrator.carries and rng.random() < 0.5:
+        string = StringSettings(
+            attached=True,
+            attach=tuple(rng.normal(size=3) * magnitude(rng, -3, 1)),
+            target=tuple(row[0:3] + rng.normal(size=3) * magnitude(rng, -3, 1)),
+            stiffness=magnitude(rng, -12, 6) * body.mass,
+            damping_ratio=rng.choice((0.0, 0.1, 1.0)),
+            rest_length=rng.choice((0.0, 0.5)),
+            bilateral=bool(rng.random() < 0.5),
+        )
+    return rng, flight(
+        body,
+        integrator=name,
+        step_s=magnitude(rng, -9, 3),
+        initial=row,
+        gravity=np.array((0.0, 0.0, -9.81)) * rng.integers(0, 2),
+        linear_damping=rng.choice((0.0, magnitude(rng, -12, 9))),
+        angular_damping=rng.choice((0.0, magnitude(rng, -12, 9))) if ANGULAR_DAMPING in integrator.carries else 0.0,
+        string=string,
+    )
+
+
+def check(name, seed):
+    rng, simulation = hostile_flight(name, seed)
+    setup = simulation.setup
+    force, torque = (
+        tuple(rng.normal(size=3) * magnitude(rng, -300, 300 if rng.random() < 0.3 else 6)) for _ in range(2)
+    )
+    try:
+        simulation.submit(wrench(str(rng.choice(FRAMES)), force, torque))
+    except CommandRefused as refusal:
+        assert refusal.reason in ("integrator", "magnitude")
+    # auto resolves whatever is fast, so its flight is short where something is.
+    longest = 10 * setup.step_ns if name != "auto" else min(10 * setup.step_ns, 10**4)
+    for _ in range(3):
+        until = simulation.time_ns + int(rng.integers(1, longest + 1))
+        state = simulation.advance(until)
+        assert np.isfinite(state.row).all()
+        assert abs(float((state.orientation_xyzw**2).sum()) - 1.0) <= 1e-14
+        if simulation.failure:
+            return
+        assert state.time_ns == until
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_extremes_end_in_a_state_a_refusal_or_a_stop(name):
+    for seed in range(40):
+        check(name, seed)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_extremes_end_in_a_state_a_refusal_or_a_stop_many_times(name):
+    for seed in range(1000, 4000):
+        check(name, seed)

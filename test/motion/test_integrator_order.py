@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""The order of each integrator, measured with all the loads it carries, against high-precision series."""
+
+import numpy as np
+import pytest
+from flights import SECOND
+from integrator_scenes import Scene, error, flown, scene_for
+
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING
+from rigid_proto_ros.motion.integrators.taylor import taylor_steps_of_degree
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.motion.variables import new_variables, to_row
+
+FLOOR = 2e-15
+"""What rounding leaves after a second of these motions: errors of the orders' tests lie at least 1e3 times above it."""
+
+STEPS = (1, 2, 4, 5, 8, 10, 16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160, 200, 250, 320, 400, 500)
+ORDERED = [name for name, i in INTEGRATORS.items() if i.order is not None and name != "taylor"]
+ON_A_STRING = [name for name in ORDERED if STRING in INTEGRATORS[name].carries and name != "dop853"]
+
+STRINGS = {
+    "bilateral": StringSettings(True, (0.3, -0.2, 0.25), (0.1, 0.2, 1.2), 300.0, 0.0, 0.1, 0.8, True),
+    "rest length 0": StringSettings(True, (0.3, -0.2, 0.25), (0.1, 0.2, 1.2), 300.0, 0.0, 0.1, 0.0, False),
+    "slack and taut": StringSettings(True, (0.3, -0.2, 0.25), (0.1, 0.2, 1.2), 100.0, 0.0, 0.3, 0.9, False),
+}
+
+
+def measured_order(errors) -> tuple[float, int]:
+    """Slope of log error against log h by least squares over errors in the asymptotic range, and how many there are."""
+    used = [(n, e) for n, e in errors if 1e3 * FLOOR <= e <= 1e-2]
+    counts, sizes = np.array(used).T
+    return -np.polyfit(np.log(counts), np.log(sizes), 1)[0], len(used)
+
+
+def check(name, scene, seconds=1, steps=STEPS):
+    reference = scene.reference([seconds])[0]
+    errors = [(n, error(flown(name, scene, seconds * SECOND // n, seconds * SECOND), reference)) for n in steps]
+    order, used = measured_order(errors)
+    assert used >= 4
+    assert abs(order - INTEGRATORS[name].order) <= 0.2, errors
+
+
+@pytest.mark.parametrize("name", ORDERED)
+def test_order_under_loads(name):
+    # Measured within 0.05 of the declared order.
+    scene = scene_for(INTEGRATORS[name])
+    if name == "dop853":
+        check(name, scene, 4, (5, 8, 10, 16, 20))
+    else:
+        check(name, scene)
+
+
+@pytest.mark.parametrize("degree", [4, 6, 8])
+def test_order_of_taylor_series_is_their_degree(degree):
+    scene = scene_for(INTEGRATORS["taylor"])
+    reference = scene.reference([1.0])[0]
+    problem, start = scene.problem_and_start()
+    errors = []
+    for n in STEPS:
+        y, row = new_variables(start.row, problem), np.empty(13)
+        assert taylor_steps_of_degree(y, problem, 1.0 / n, n, degree) == n
+        to_row(y, problem, 1.0, row)
+        errors.append((n, error(State(SECOND, row), reference)))
+    order, used = measured_order(errors)
+    assert used >= 4
+    assert abs(order - degree) <= 0.2, errors  # measured within 0.1
+
+
+@pytest.mark.parametrize("name", ["euler", "midpoint", "rk4"])
+def test_order_without_the_gyroscopic_term_against_the_motion_of_that_equation(name):
+    integrator = INTEGRATORS[name]
+    check(name, Scene(integrator.carries - {STRING}))
+    assert NO_GYROSCOPIC_TERM in integrator.carries
+
+
+@pytest.mark.parametrize("string", STRINGS)
+@pytest.mark.parametrize("name", ON_A_STRING)
+def test_order_on_a_string_through_slack_and_taut(name, string):
+    finest = (200, 250, 320, 400, 500, 640, 800, 1000)
+    coarse = (16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160)
+    first_order = INTEGRATORS[name].order == 1
+    steps = (1000, 2000, 4000, 8000, 16000, 32000, 64000, 128000) if first_order else (*coarse, *finest)
+    check(name, scene_for(INTEGRATORS[name], string=STRINGS[string]), 1, steps)
+
+
+@pytest.mark.parametrize("string", STRINGS)
+def test_dop853_loses_nothing_where_the_string_turns_slack_or_taut(string):
+    """Its errors leave too few digits to measure order 8 on a string; a step across the kink would err by 1e-4."""
+    scene = scene_for(INTEGRATORS["dop853"], string=STRINGS[string])
+    reference = scene.reference([1])[0]
+    assert error(flown("dop853", scene, SECOND // 40, SECOND), reference) <= 1e-9  # measured up to 6e-11

@@ -1,0 +1,371 @@
+# SPDX-License-Identifier: MIT
+"""Damping a million and more times faster than the motion beside it: no step is wasted on it, and the accuracy is kept."""
+
+import math
+
+import numpy as np
+import pytest
+from flights import SECOND, flight, spinning, wrench
+from mpmath import mp, mpc, mpf
+from random_scenes import log_uniform, random_body
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.string import StringSettings
+
+MOMENTS = (0.02, 0.03, 0.04)
+BODY = make_body(2.0, np.zeros(3), np.diag(MOMENTS))
+NEEDLE = make_body(2.0, np.zeros(3), np.diag([2e-6, 0.03, 0.03 + 1e-6]))
+MOST_EVALUATIONS = 12_000
+"""Explicit steps would need 1e6 and more, each an evaluation of a series."""
+
+
+def distance(row, attitude, position, velocity, spin) -> float:
+    """The measure of accuracy, by 1 m, between a state row and what should be there."""
+    turn = (Rotation.from_quat(attitude).inv() * Rotation.from_quat(row[3:7])).magnitude()
+    moved = np.linalg.norm(row[0:3] - position)
+    sped = np.linalg.norm(row[7:10] - velocity) / max(np.linalg.norm(velocity), 1.0)
+    spun = np.linalg.norm(row[10:13] - spin) / max(np.linalg.norm(spin), 1.0)
+    return max(turn, moved, sped, spun)
+
+
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("rate", [1e6, 1e8, 1e9, 1e13])
+def test_a_spin_soon_goes_as_fast_as_its_torque_keeps_up(rate, accuracy):
+    damping, torque, spin = rate * MOMENTS[2], 3.0 * rate * MOMENTS[2], 20.0
+    simulation = flight(
+        BODY, integrator="auto", accuracy=accuracy, initial=spinning((0, 0, spin)), angular_damping=damping
+    )
+    simulation.submit(wrench("body@com", torque=(0, 0, torque)))
+    row = simulation.advance(SECOND).row
+    with mp.workdps(40):
+        slow, fast = mpf(torque) / mpf(damping), mpf(damping) / mpf(MOMENTS[2])
+        kept = mp.exp(-fast)
+        angle = slow + (spin - slow) * (1 - kept) / fast
+        half = [float(mp.sin(angle / 2)), float(mp.cos(angle / 2))]
+        speed = float(slow + (spin - slow) * kept)
+    error = distance(row, (0, 0, *half), np.zeros(3), np.zeros(3), np.array([0, 0, speed]))
+    assert error <= accuracy
+    assert simulation.force_evaluations <= MOST_EVALUATIONS
+    assert simulation.steps <= 300
+
+
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-9])
+@pytest.mark.parametrize("rate", [1e6, 1e9, 1e13])
+def test_a_force_that_turns_with_the_body_pushes_it_round_through_honey(rate, accuracy):
+    spin, force = 5.0, 4.0 * rate
+    row = spinning((0, 0, spin))
+    row[7] = 0.5
+    simulation = flight(BODY, integrator="auto", accuracy=accuracy, initial=row, linear_damping=rate * BODY.mass)
+    simulation.submit(wrench("body@com", (force, 0, 0)))
+    row = simulation.advance(SECOND).row
+    with mp.workdps(40):
+        c, g, turn = mpf(rate), mpf(force) / 2, mpc(0, spin)
+        round_, kept = mp.exp(turn), mp.exp(-c)
+        velocity = g * (round_ - kept) / (turn + c) + mpf("0.5") * kept
+        place = g / (turn + c) * ((round_ - 1) / turn - (1 - kept) / c) + mpf("0.5") * (1 - kept) / c
+    position = np.array([float(place.real), float(place.imag), 0.0])
+    speed = np.array([float(velocity.real), float(velocity.imag), 0.0])
+    error = distance(row, (0, 0, np.sin(spin / 2), np.cos(spin / 2)), position, speed, np.array([0, 0, spin]))
+    assert error <= accuracy
+    assert simulation.force_evaluations <= MOST_EVALUATIONS
+
+
+@pytest.mark.parametrize("ratio", [1e4, 1e6])
+def test_a_body_creeps_down_on_a_string_that_is_all_damper(ratio):
+    stiffness, mass, g = 50.0, 2.0, -9.81
+    string = StringSettings(True, (0, 0, 0), (0, 0, 0), stiffness, 0.0, ratio, 0.0)
+    start = np.array([0.3, 0, 0, 0, 0, 0, 1, 0, 0, 2.0, 0, 0, 0])
+    simulation = flight(
+        BODY, integrator="auto", accuracy=1e-9, initial=start, gravity=np.array([0, 0, g]), string=string
+    )
+    row = simulation.advance(SECOND).row
+    with mp.workdps(40):
+        k, c = mpf(stiffness) / mass, 2 * mpf(ratio) * mp.sqrt(mpf(stiffness) / mass)
+        root = mp.sqrt(c * c / 4 - k)
+        slow, fast = -k / (c / 2 + root), -c / 2 - root
+
+        def creep(at, speed, pull):
+            rest = pull / k
+            a = (speed - fast * (at - rest)) / (slow - fast)
+            b = at - rest - a
+            return rest + a * mp.exp(slow) + b * mp.exp(fast), a * slow * mp.exp(slow) + b * fast * mp.exp(fast)
+
+        x, u = creep(mpf("0.3"), mpf(0), mpf(0))
+        z, w = creep(mpf(0), mpf(2), mpf(g))
+    error = distance(
+        row, (0, 0, 0, 1), np.array([float(x), 0, float(z)]), np.array([float(u), 0, float(w)]), np.zeros(3)
+    )
+    assert error <= 1e-9
+    assert simulation.force_evaluations <= MOST_EVALUATIONS
+
+
+def cross(a, b):
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def turned(q):
+    x, y, z, w = q / math.sqrt(q @ q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def stiff_reference(
+    body, row, until, *, angular=0.0, linear=0.0, load=None, gravity=0.0, string=None, tied=None, tolerance=1e-10
+):
+    """The state row by SciPy's Radau (order 5) from the equations of docs/physics.md, begun anew where a pull-only string's law changes.
+
+    load: (axes, point, force, torque). string: settings, and as tied (stiffness, damping).
+    """
+    inverse = np.linalg.inv(body.inertia)
+    axes, point, force, torque = load or ("body", np.zeros(3), np.zeros(3), np.zeros(3))
+    point, force, torque = np.array(point), np.array(force), np.array(torque)
+    attach, target, rest = np.zeros(3), np.zeros(3), 0.0
+    if tied is not None:
+        attach, target, rest = np.array(string.attach), np.array(string.target), string.rest_length
+    one_sided = tied is not None and not string.bilateral and rest > 0.0
+
+    def span(s, R):
+        return s[:3] + R @ attach - target, s[7:10] + R @ cross(s[10:], attach)
+
+    def stretch(_, s):
+        a, _ = span(s, turned(s[3:7]))
+        return math.sqrt(a @ a) - rest
+
+    def tension(_, s):
+        a, rate = span(s, turned(s[3:7]))
+        length = math.sqrt(a @ a)
+        return tied.stiffness * (length - rest) + tied.damping * (a @ rate) / length
+
+    def rates(_, s, pulls):
+        R, q, v, w = turned(s[3:7]), s[3:7], s[7:10], s[10:]
+        f = R.T @ force if axes == "world" else force
+        t = (R.T @ torque if axes == "world" else torque) + cross(point, f)
+        pull = R @ f - linear * v + np.array([0, 0, gravity * body.mass])
+        if pulls:
+            a, rate = span(s, R)
+            free = rest == 0.0
+            F = -tied.stiffness * a - tied.damping * rate if free else -tension(0.0, s) * a / math.sqrt(a @ a)
+            pull = pull + F
+            t = t + cross(attach, R.T @ F)
+        dw = inverse @ (t - angular * w - cross(w, body.inertia @ w))
+        dq = 0.5 * np.array([*(q[3] * w + cross(q[:3], w)), -(q[:3] @ w)])
+        return np.concatenate([v, dq, pull / body.mass, dw])
+
+    def flown(s, begin, end, pulls, ends):
+        found = solve_ivp(
+            rates, (begin, end), s, "Radau", rtol=tolerance, atol=0.01 * tolerance, args=(pulls,), events=ends
+        )
+        assert found.success
+        return found
+
+    def event(of, direction):
+        def value(t, s, pulls):
+            return of(t, s)
+
+        value.terminal, value.direction = True, direction
+        return value
+
+    state, now = np.array(row), 0.0
+    while now < until:
+        x = stretch(0.0, state) if one_sided else 1.0
+        pulls = tied is not None and (not one_sided or (x > 0.0 and tension(0.0, state) > 0.0))
+        ends = None
+        if one_sided:
+            ends = (
+                [event(tension, -1)]
+                if pulls
+                else [event(stretch, 1)]
+                if x <= 0.0
+                else [event(tension, 1), event(stretch, -1)]
+            )
+        found = flown(state, now, until, pulls, ends)
+        if found.t[-1] == until:
+            return found.y[:, -1]
+        # Up to the event once more: what is interpolated there is less exact than steps are.
+        of, at = next(
+            (e, t[0])
+            for e, t in zip((stretch, stretch) if x <= 0.0 else (tension, stretch), found.t_events, strict=False)
+            if len(t)
+        )
+        for _ in range(3):
+            reached = flown(state, now, at, pulls, None).y[:, -1]
+            slope = rates(at, reached, pulls)
+            small = 1e-6 / max(1.0, float(abs(slope).max()))
+            at -= of(at, reached) / (
+                (of(at, reached + small * slope) - of(at, reached - small * slope)) / (2.0 * small)
+            )
+        # Begun a hair on, where the law is beyond doubt.
+        state, now = reached + 1e-12 * slope, at + 1e-12
+    return state
+
+
+START = np.array([0.2, -0.1, 0.9, 0.1, 0.3, -0.2, 0.9, 0.3, -0.5, 0.2, 3.0, 4.0, 5.0])
+START[3:7] /= np.linalg.norm(START[3:7])
+LOAD = ("world", (0.1, 0.0, 0.1), (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+TURNING = ("body", (0.1, 0.0, 0.1), (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+SOFT = StringSettings(True, (0.1, 0.15, 0.2), (0.0, 0.0, 0.0), 50.0, 0.0, 1e4, 0.0)
+LONG = StringSettings(True, (0.1, 0.15, 0.2), (0.0, 0.0, 0.0), 50.0, 0.0, 1e4, 0.7, True)
+SCENES = {
+    "spin under a world force": (BODY, {"angular": 2e6, "load": LOAD}),
+    "slaved spin": (BODY, {"angular": 2e6, "load": ("world", (0, 0, 0), (0, 0, 0), (6e6, 2e6, 4e6))}),
+    "needle, one axis stiff": (NEEDLE, {"angular": 0.2, "load": TURNING}),
+    "body force, linear damping": (BODY, {"linear": 2e8, "load": TURNING}),
+    "everything damped": (BODY, {"linear": 2e7, "angular": 3e5, "load": LOAD, "gravity": -9.81}),
+    "string of rest length 0": (BODY, {"string": SOFT, "gravity": -9.81}),
+    "string pulls and pushes": (BODY, {"string": LONG, "gravity": -9.81}),
+    "string and damped spin": (BODY, {"string": LONG, "angular": 3e4, "load": LOAD}),
+}
+
+
+SLOW_TO_JUDGE = [name for name in SCENES if "string" in SCENES[name][1]]
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.stress] * (n in SLOW_TO_JUDGE)) for n in SCENES])
+def test_stiff_damping_of_every_kind_keeps_the_accuracy(name):
+    body, scene = SCENES[name]
+    simulation = flown(body, START, scene, 1e-7)
+    # In portions, as a publisher asks.
+    for k in range(1, 6):
+        row = simulation.advance(k * SECOND // 25).row
+    exact = stiff_reference(body, START, 0.2, **scene, tied=simulation.string)
+    assert distance(row, exact[3:7], exact[:3], exact[7:10], exact[10:]) <= 1e-7 * 0.2
+    assert "radau" in simulation.choice
+    assert simulation.force_evaluations <= MOST_EVALUATIONS
+
+
+def flown(body, row, scene, accuracy):
+    """A Simulation of a scene, as ``stiff_reference`` takes it, at time 0."""
+    simulation = flight(
+        body,
+        integrator="auto",
+        accuracy=accuracy,
+        initial=row,
+        angular_damping=scene.get("angular", 0.0),
+        linear_damping=scene.get("linear", 0.0),
+        gravity=np.array([0, 0, scene.get("gravity", 0.0)]),
+        string=scene.get("string", StringSettings()),
+    )
+    if "load" in scene:
+        axes, point, force, torque = scene["load"]
+        frame = f"{axes}@point/{','.join(repr(float(x)) for x in point)}"
+        simulation.submit(wrench(frame, np.array(force).tolist(), np.array(torque).tolist()))
+    return simulation
+
+
+def stiff_scene(seed):
+    """Any body with stiff damping of one kind or several: of its spin, its flight, its string, taut or slack at first, with loads or without."""
+    rng = np.random.default_rng(seed)
+    body = random_body(rng)
+    smallest, arm = body.principal_moments.min(), np.sqrt(body.principal_moments.max() / body.mass)
+    row = np.zeros(13)
+    row[:3], row[3:7], row[7:10] = rng.normal(size=3), rng.normal(size=4), rng.normal(size=3)
+    row[3:7] /= np.linalg.norm(row[3:7])
+    row[10:13] = rng.choice([0.0, 0.3, 20.0]) * rng.normal(size=3) / 1.7
+    scene = {"gravity": -9.81 if rng.random() < 0.6 else 0.0}
+    tied = rng.random() < 0.75
+    if tied:
+        scene["string"] = StringSettings(
+            attached=True,
+            attach=tuple((arm * rng.normal(size=3)).tolist()),
+            target=tuple(rng.normal(size=3).tolist()),
+            damping_ratio=log_uniform(rng, 1.0, 1e6),
+            frequency=log_uniform(rng, 2.0, 100.0),
+            rest_length=float(rng.choice([0.0, 0.5, 1.0])),
+            bilateral=bool(rng.random() < 0.35),
+        )
+    angular = log_uniform(rng, 3e4, 1e10) if rng.random() < (0.4 if tied else 0.7) else 0.0
+    linear = log_uniform(rng, 3e4, 1e10) if rng.random() < 0.25 else 0.0
+    if rng.random() < 0.7:
+        # Half of the loads are as strong as what damps them.
+        strong = rng.random() < 0.5
+        push, turn = (max(linear / 10, 1.0), max(angular / 10, 1.0)) if strong else (1.0, 1.0)
+        force = push * body.mass * log_uniform(rng, 0.3, 30.0) * rng.normal(size=3)
+        torque = turn * smallest * log_uniform(rng, 0.3, 30.0) * rng.normal(size=3)
+        point = np.zeros(3) if strong else arm * rng.normal(size=3)
+        scene["load"] = (str(rng.choice(["world", "body"])), point, force, torque)
+    return body, row, {**scene, "angular": angular * smallest, "linear": linear * body.mass}
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(40), pytest.param(range(40, 1000), marks=pytest.mark.stress)], ids=["few", "many"]
+)
+def test_stiff_damping_of_any_scene_costs_little_and_all_accuracies_agree(seeds):
+    for seed in seeds:
+        body, row, scene = stiff_scene(seed)
+        size = np.sqrt(np.trace(body.inertia) / body.mass)
+        fine, coarse = flown(body, row, scene, 1e-10), flown(body, row, scene, 1e-7)
+        if "radau" not in coarse.choice:
+            continue
+        exact = fine.advance(SECOND // 5).row
+        row = coarse.advance(SECOND // 5).row
+        assert not fine.failure and not coarse.failure, seed
+        assert coarse.steps <= 2000 or coarse.too_slow, seed
+        away = distance(row, exact[3:7], exact[:3], exact[7:10], exact[10:])
+        assert away <= 1e-7 * 0.2 * max(1.0, 1.0 / size), seed
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("seed", range(1000, 1200))
+def test_stiff_damping_of_any_scene_keeps_the_accuracy(seed):
+    body, row, scene = stiff_scene(seed)
+    size = np.sqrt(np.trace(body.inertia) / body.mass)
+    simulation = flown(body, row, scene, 1e-7)
+    got = simulation.advance(SECOND // 10).row
+    exact = stiff_reference(body, row, 0.1, **scene, tied=simulation.string, tolerance=1e-9)
+    away = distance(got, exact[3:7], exact[:3], exact[7:10], exact[10:])
+    assert away <= 1e-7 * 0.1 * max(1.0, 1.0 / size)
+
+
+def test_a_pull_only_string_that_is_all_damper_catches_a_body_and_lets_it_go():
+    string = StringSettings(True, (0, 0, 0), (0, 0, 0), 50.0, 0.0, 1e6, 0.5)
+    start = np.array([0, 0, 0.0, 0, 0, 0, 1, 0, 0, 4.0, 0, 0, 0])
+    simulation = flight(
+        BODY, integrator="auto", accuracy=1e-9, initial=start, gravity=np.array([0, 0, -9.81]), string=string
+    )
+    row = simulation.advance(SECOND // 5).row
+    # Up with 4 m/s it comes to the end at 0.5 m, stops within a millionth of a second at a rate λ, and falls when the damper lets it go.
+    with mp.workdps(30):
+        g, v, rate = mpf("9.81"), mpf(4), 2 * mpf(10) ** 6 * mp.sqrt(mpf(50) / 2)
+        caught = (v - mp.sqrt(v * v - g)) / g
+        coming = mp.sqrt(v * v - g)
+        held = mp.log(1 + rate * coming / g) / rate
+        fallen = mpf("0.2") - caught - held
+        z, w = mpf("0.5") + (coming - g * held) / rate - g * fallen**2 / 2, -g * fallen
+    assert "radau" in simulation.choice
+    assert abs(row[2] - float(z)) <= 1e-9
+    assert abs(row[9] - float(w)) <= 1e-9
+    assert simulation.force_evaluations <= MOST_EVALUATIONS
+    assert simulation.accuracy_floor == ""
+
+
+def test_a_motion_that_takes_more_steps_than_the_clock_leaves_time_for_says_so():
+    string = StringSettings(True, (0, 0, 0), (0, 0, 0), 1e12, 0.0, 0.0, 0.0)
+    start = np.array([0.1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.1])
+    simulation = flight(BODY, integrator="auto", initial=start, string=string)
+    simulation.advance(1000)
+    assert simulation.too_slow == ""
+    simulation.advance(SECOND // 10)
+    assert "slower than real time" in simulation.too_slow
+    tiny = flight(BODY, integrator="rk4", step_s=1e-7, initial=START)
+    tiny.advance(SECOND // 50)
+    assert "slower than real time" in tiny.too_slow
+    calm = flight(BODY, integrator="auto", initial=START, angular_damping=2e6)
+    calm.advance(SECOND)
+    assert calm.too_slow == ""
+
+
+def test_portions_have_no_bearing_on_stiff_steps():
+    def state(portion_ns):
+        simulation = flight(BODY, integrator="auto", initial=START, angular_damping=2e6, string=LONG)
+        for at in range(portion_ns, SECOND // 10, portion_ns):
+            simulation.advance(at)
+        return simulation.advance(SECOND // 10).sha256()
+
+    assert len({state(10**9), state(10**6), state(123_457)}) == 1

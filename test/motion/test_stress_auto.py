@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""auto keeps its word: each committed step errs by at most accuracy·h, against the exact flow from that step's own start."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flights import SECOND
+from local_error import FLOOR, committed_steps, local_error
+from random_scenes import DURATION_S, random_scene
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from problems import PROBLEMS
+from work_precision_ours import simulation_of
+
+ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)
+SCENES = 10
+STRESS_SCENES = 300
+STRESS_SCENES_A_TEST = 10
+STEPS_PER_SCENE = 6
+LONGEST_S = 2.0
+"""Of a benchmark's problem; the fastest string takes 1e5 steps a second."""
+
+
+def allowed(step, accuracy):
+    """accuracy·h, or the floor where that is more and reported."""
+    assert step.floor_binds or accuracy * step.length >= FLOOR
+    return max(accuracy * step.length, FLOOR)
+
+
+def shares(simulation, duration_s, accuracy, seed):
+    """Of what is allowed, what each of some steps of a flight took; and their lengths [s]."""
+    steps = committed_steps(simulation, round(duration_s * SECOND), STEPS_PER_SCENE, np.random.default_rng(seed))
+    assert not simulation.failure
+    assert np.isfinite(simulation.state.row).all()
+    return [(local_error(step) / allowed(step, accuracy), step.length) for step in steps]
+
+
+def check(seeds):
+    worst, judged, failures = 0.0, 0, []
+    for seed in seeds:
+        for accuracy in ACCURACIES:
+            for share, length in shares(random_scene(seed, "auto", accuracy), DURATION_S, accuracy, seed):
+                worst, judged = max(worst, share), judged + 1
+                if share > 1.0:
+                    failures.append(
+                        f"seed {seed}, accuracy {accuracy:g}: a step of {length:.3g} s errs {share:.3g} of it"
+                    )
+    print(f"{judged} steps, the worst takes {worst:.2f} of what is allowed")
+    assert judged >= len(seeds)
+    assert not failures, "\n".join(failures)
+
+
+def test_auto_meets_its_accuracy_in_random_scenes():
+    check(range(SCENES))
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("first", range(1000, 1000 + STRESS_SCENES, STRESS_SCENES_A_TEST))
+def test_auto_meets_its_accuracy_in_three_hundred_random_scenes(first):
+    check(range(first, first + STRESS_SCENES_A_TEST))
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_auto_meets_its_accuracy_on_the_benchmarks_problems(name, accuracy):
+    problem = PROBLEMS[name]
+    found = shares(simulation_of(problem, "auto", 1e-3, accuracy), min(problem.duration, LONGEST_S), accuracy, 1)
+    # Free rotation is one exact step and commits none.
+    print(f"{len(found)} steps, the worst takes {max((s for s, _ in found), default=0.0):.2f} of what is allowed")
+    assert all(share <= 1.0 for share, _ in found)

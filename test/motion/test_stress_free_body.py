@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""The exact torque-free step over every class of body and spin, against 30 digits: never a NaN, never a surprise."""
+
+import math
+import zlib
+
+import numpy as np
+import pytest
+from mpmath import mp
+from numba import njit
+from reference_double_double import attitude_angle, free_step
+from reference_motion import angle_between, free_motion
+
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.problem import GYROSCOPIC, MOMENTS, SIZE
+from rigid_proto_ros.motion.variables import VARIABLES
+
+EPSILON = 2.0**-52
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+STEPS_PER_CLASS = 300
+STRESS_STEPS_PER_CLASS = 100_000
+LONGEST = 3.0
+"""rad. Beyond it a rounding of the start grows with the motion itself, and the closed form below judges."""
+
+
+def log_uniform(rng, low, high):
+    return 10.0 ** rng.uniform(math.log10(low), math.log10(high))
+
+
+def direction(rng):
+    w = rng.normal(size=3)
+    return w / np.sqrt((w * w).sum())
+
+
+def body_of(second_moments):
+    """Ascending principal moments of a body with these second moments: A + B ≥ C by construction."""
+    x, y, z = second_moments
+    return np.sort([y + z, z + x, x + y])
+
+
+def generic(rng):
+    return body_of([log_uniform(rng, 1e-3, 1.0) for _ in range(3)]), direction(rng)
+
+
+def near_equal_first(rng):
+    a, c = rng.uniform(0.6, 1.0), rng.uniform(1.01, 1.19)
+    return np.array([a, a * (1.0 + log_uniform(rng, 1e-16, 1e-2)), c]), direction(rng)
+
+
+def near_equal_last(rng):
+    a, b = rng.uniform(0.1, 0.98), 1.0
+    return np.array([a, b, b * (1.0 + min(log_uniform(rng, 1e-16, 1e-2), a))]), direction(rng)
+
+
+def near_sphere(rng):
+    b = 1.0 + log_uniform(rng, 1e-16, 1e-2)
+    return np.array([1.0, b, b * (1.0 + log_uniform(rng, 1e-16, 1e-2))]), direction(rng)
+
+
+def sphere(rng):
+    return np.full(3, rng.uniform(0.1, 10.0)), direction(rng)
+
+
+def rod(rng):
+    return body_of([1.0, log_uniform(rng, 1e-9, 1e-3), log_uniform(rng, 1e-9, 1e-3)]), direction(rng)
+
+
+def plate(rng):
+    return body_of([1.0, log_uniform(rng, 1e-3, 1.0), log_uniform(rng, 1e-9, 1e-3)]), direction(rng)
+
+
+def separatrix(rng):
+    """L² = 2E·I₂ to within 1e-16 ... 1e-2, or as nearly as doubles allow."""
+    moments = body_of([log_uniform(rng, 1e-2, 1.0) for _ in range(3)])
+    A, B, C = moments
+    w = np.array([rng.normal(), rng.normal(), 0.0])
+    w[2] = rng.choice([-1.0, 1.0]) * math.sqrt(A * (B - A) / (C * (C - B))) * w[0]
+    w[2] *= 1.0 + rng.choice([0.0, 1.0, -1.0]) * log_uniform(rng, 1e-16, 1e-2)
+    if rng.random() < 0.2:
+        w[1] = 0.0
+    return moments, w / np.sqrt((w * w).sum())
+
+
+def on_axis(rng):
+    """Along an axis, or off it by anything down to the smallest doubles."""
+    w = np.zeros(3)
+    w[rng.integers(3)] = rng.choice([-1.0, 1.0])
+    if rng.random() < 0.7:
+        w[rng.integers(3)] += log_uniform(rng, 1e-300, 1e-3)
+    return body_of([log_uniform(rng, 1e-3, 1.0) for _ in range(3)]), w
+
+
+def slow(rng):
+    """Spins down to 1e-300 rad/s, and none at all."""
+    size = 0.0 if rng.random() < 0.1 else log_uniform(rng, 1e-300, 1e-150)
+    return body_of([log_uniform(rng, 1e-3, 1.0) for _ in range(3)]), size * direction(rng)
+
+
+CLASSES = (
+    generic,
+    near_equal_first,
+    near_equal_last,
+    near_sphere,
+    sphere,
+    rod,
+    plate,
+    separatrix,
+    on_axis,
+    slow,
+)
+
+
+def cases(draw, count):
+    """moments, ω, h: |ω|h log-uniform in 1e-6 ... 3 rad, spins 1e-3 ... 1e3 rad/s unless slow, moments 1e-12 ... 1e6."""
+    rng = np.random.default_rng(zlib.crc32(draw.__name__.encode()))
+    moments, spins, steps = np.empty((count, 3)), np.empty((count, 3)), np.empty(count)
+    for k in range(count):
+        moments[k], spins[k] = draw(rng)
+        moments[k] *= log_uniform(rng, 1e-12, 1e6)
+        if draw is not slow:
+            spins[k] *= log_uniform(rng, 1e-3, 1e3)
+        size = np.abs(spins[k]).max()
+        steps[k] = log_uniform(rng, 1e-6, LONGEST) / (math.sqrt(3.0) * size) if size else 1.0
+    return moments, spins, steps
+
+
+@njit
+def worst_errors(kernel, moments, spins, steps):
+    """Largest attitude error/(ε (1 + |ω|h)) [rad], rate error/(ε |ω| (1 + |ω|h)), and the first case that went wrong."""
+    attitude, rate = 0.0, 0.0
+    p, y = np.zeros(SIZE), np.zeros(VARIABLES)
+    p[GYROSCOPIC] = 1.0
+    for k in range(len(steps)):
+        p[MOMENTS : MOMENTS + 3] = moments[k]
+        y[:] = 0.0
+        y[3] = 1.0
+        y[4:7] = spins[k]
+        if kernel(y, p, steps[k], 1) != 1 or not np.isfinite(y).all():
+            return attitude, rate, k
+        reference = free_step(moments[k], IDENTITY, spins[k], steps[k])
+        largest = np.abs(spins[k]).max()
+        if largest == 0.0:
+            if y[3] != 1.0 or y[4] != 0.0 or y[5] != 0.0 or y[6] != 0.0:
+                return attitude, rate, k
+            continue
+        scaled = spins[k] / largest
+        size = math.sqrt(scaled[0] ** 2 + scaled[1] ** 2 + scaled[2] ** 2)
+        turned = 1.0 + largest * size * steps[k]
+        attitude = max(attitude, attitude_angle(y[:4], reference[:4]) / (EPSILON * turned))
+        for j in range(3):
+            rate = max(rate, abs(y[4 + j] - reference[4 + j, 0]) / largest / (size * EPSILON * turned))
+    return attitude, rate, -1
+
+
+def check(draw, count):
+    attitude, rate, wrong = worst_errors(INTEGRATORS["free_body"].kernel, *cases(draw, count))
+    assert wrong == -1, f"case {wrong} of {draw.__name__}"
+    print(f"{draw.__name__}: attitude {attitude:.1f}, rate {rate:.1f} of eps (1 + |w|h)")
+    assert attitude <= 50.0
+    assert rate <= 50.0
+
+
+@pytest.mark.parametrize("draw", CLASSES, ids=lambda draw: draw.__name__)
+def test_exact_step_is_exact(draw):
+    check(draw, STEPS_PER_CLASS)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("draw", CLASSES, ids=lambda draw: draw.__name__)
+def test_exact_step_is_exact_a_hundred_thousand_times(draw):
+    check(draw, STRESS_STEPS_PER_CLASS)
+
+
+def long_step(moments, spin, time):
+    p, y = np.zeros(SIZE), np.zeros(VARIABLES)
+    p[MOMENTS : MOMENTS + 3], p[GYROSCOPIC] = moments, 1.0
+    y[3], y[4:7] = 1.0, spin
+    assert INTEGRATORS["free_body"].kernel(y, p, time, 1) == 1
+    assert np.isfinite(y).all()
+    return y
+
+
+def check_long(count):
+    """One step over up to 1e6 rad, against Jacobi's closed form."""
+    rng = np.random.default_rng(7)
+    worst = 0.0
+    for draw in (generic, near_equal_first, near_equal_last, rod, plate):
+        for _ in range(count):
+            moments, spin = draw(rng)
+            turned = log_uniform(rng, 3.0, 1e6)
+            y = long_step(moments, spin, turned)
+            with mp.workdps(60):
+                R, _ = free_motion(np.diag(moments), spin, turned)
+            worst = max(worst, angle_between(y[:4], R) / (EPSILON * (1.0 + turned)))
+    print(f"long steps: {worst:.1f} of eps (1 + |w|h)")
+    assert worst <= 50.0
+
+
+def test_one_step_over_a_million_radians():
+    check_long(5)
+
+
+@pytest.mark.stress
+def test_one_step_over_a_million_radians_many_times():
+    check_long(400)
+
+
+def check_hostile(count):
+    """|ω|h up to 1e300, every class: finite, and energy and |L| kept. Nothing can say what the attitude is by then."""
+    rng = np.random.default_rng(11)
+    for draw in CLASSES:
+        for _ in range(count):
+            moments, spin = draw(rng)
+            y = long_step(moments, spin, log_uniform(rng, 1e6, 1e300))
+            size = np.abs(spin).max() or 1.0
+            before, after = spin / size, y[4:7] / size
+            for weight in (moments, moments**2):
+                kept = (weight * before**2).sum()
+                assert abs((weight * after**2).sum() - kept) <= 1e-12 * kept
+
+
+def test_no_step_is_too_long_to_end():
+    check_hostile(20)
+
+
+@pytest.mark.stress
+def test_no_step_is_too_long_to_end_many_times():
+    check_hostile(5000)

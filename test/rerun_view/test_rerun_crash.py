@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""A recording outlives its recorder: killed or cut anywhere, it opens and shows what had been flushed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun_flight as flight
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, repair, whole_bytes
+from rigid_proto_ros.rerun_view.viewers import viewer_program
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("crash") / "whole.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, flight.rows(400))
+    observer.close()
+    return path
+
+
+def frame_starts(data: bytes) -> list[int]:
+    """Offsets at which the file's frames begin, and where the last one before the end mark ends."""
+    at, starts = HEADER_BYTES, []
+    while True:
+        starts.append(at)
+        kind, length = FRAME_HEAD.unpack_from(data, at)
+        if kind == 0:
+            return starts
+        at += FRAME_HEAD.size + length
+
+
+def test_a_file_cut_anywhere_is_read_as_far_as_it_is_whole(recording, tmp_path):
+    data = recording.read_bytes()
+    whole = read_session(recording)
+    starts = frame_starts(data)
+    offsets = np.random.default_rng(3).integers(starts[2], len(data), 40).tolist()
+    # And at, just before and just behind every border between frames.
+    offsets += [start + d for start in starts[3:] for d in (-1, 0, 1, FRAME_HEAD.size)]
+    offsets += [len(data) - 1, len(data) - 40]
+    cut = tmp_path / "cut.rrd"
+    for offset in offsets:
+        cut.write_bytes(data[:offset])
+        session = read_session(cut)
+        n = len(session.times)
+        assert not session.complete or offset > starts[-1]
+        assert session.rows.tobytes() == whole.rows[:n].tobytes()
+        assert session.events == whole.events[: len(session.events)]
+        if offset >= starts[-1]:
+            assert n == len(whole.times)
+
+
+def test_repair_makes_a_file_that_is_complete_again(recording, tmp_path):
+    data = recording.read_bytes()
+    starts = frame_starts(data)
+    cut, repaired = tmp_path / "cut.rrd", tmp_path / "repaired.rrd"
+    cut.write_bytes(data[: starts[-1] - 7])
+    before = read_session(cut)
+    repair(cut, repaired)
+    after = read_session(repaired)
+    assert after.complete
+    assert after.rows.tobytes() == before.rows.tobytes()
+    assert np.array_equal(after.times, before.times)
+    assert after.events == before.events
+    verified = subprocess.run([viewer_program(), "rrd", "verify", str(repaired)], capture_output=True, check=False)
+    assert verified.returncode == 0, verified.stderr
+
+
+def test_what_is_no_recording_is_refused_in_one_line(recording, tmp_path):
+    data = recording.read_bytes()
+    damaged, inside = bytearray(data), frame_starts(data)[len(frame_starts(data)) // 2]
+    damaged[inside + 30 : inside + 200] = bytes(170)
+    for name, content in {
+        "empty.rrd": b"",
+        "text.rrd": b"not a recording at all",
+        "head.rrd": data[: HEADER_BYTES + 5],
+        "damaged.rrd": bytes(damaged),
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError) as refusal:
+            read_session(tmp_path / name)
+        assert "\n" not in str(refusal.value) and name in str(refusal.value)
+    with pytest.raises(InputError, match="No such file"):
+        read_session(tmp_path / "nowhere.rrd")
+
+
+RECORDER = """
+import os, sys, time
+import rerun_flight as flight
+from rigid_proto_ros.rerun_view import RerunObserver
+observer = RerunObserver(record=sys.argv[1])
+states = flight.rows(100_000)
+observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+observer.body_changed(0, flight.BODY)
+for k, row in enumerate(states):
+    observer.state(k * flight.PERIOD_NS, row)
+    print(k + 1, flush=True)
+    time.sleep(0.01)
+    # The first flush loads what Rerun needs.
+    while k == 0 and os.path.getsize(sys.argv[1]) < 10_000:
+        time.sleep(0.01)
+"""
+
+
+def test_kill_9_loses_at_most_a_second(tmp_path):
+    path = tmp_path / "killed.rrd"
+    recorder = subprocess.Popen(
+        [sys.executable, "-c", RECORDER, str(path)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])},
+    )
+    try:
+        published = [int(recorder.stdout.readline()) for _ in range(270)][-1]
+        os.kill(recorder.pid, signal.SIGKILL)
+        published = max([published, *(int(line) for line in recorder.stdout if line.endswith("\n"))])
+    finally:
+        recorder.kill()
+        recorder.wait()
+        recorder.stdout.close()
+    session = read_session(path)
+    states = flight.rows(100_000)
+    assert session.rows.tobytes() == states[: len(session.rows)].tobytes()
+    # 100 states a second were published; the flush comes every 0.5 s.
+    assert published - len(session.times) <= 100
+    assert whole_bytes(path)[0] <= path.stat().st_size

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""What a viewer shows first follows from what the flight is about, and its plots have room for their curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun", reason="rerun-sdk is not installed: no recordings")
+
+from rerun.chunk import RrdReader  # noqa: E402
+
+from rigid_proto_ros.cli.main import main  # noqa: E402
+from rigid_proto_ros.rerun_view import appearance  # noqa: E402
+from rigid_proto_ros.rerun_view import entities as e  # noqa: E402
+from rigid_proto_ros.rerun_view.inertia_shapes import skewed  # noqa: E402
+from rigid_proto_ros.rerun_view.layout import Subject, layout  # noqa: E402
+from rigid_proto_ros.rerun_view.plots import Ranges  # noqa: E402
+from rigid_proto_ros.rerun_view.reader import record_batches  # noqa: E402
+from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
+
+
+@pytest.mark.parametrize(
+    "subject, told_by",
+    [
+        (Subject(falls=True), e.POSITION),
+        (Subject(tied=True), e.STRING_LINE_DISTANCE),
+        (Subject(dropped_term=True), e.ANGULAR_MOMENTUM_ANGLE),
+        (Subject(ghost=True), e.GHOST_ANGLE),
+        (Subject(), e.ANGULAR_MOMENTUM),
+    ],
+)
+def test_what_tells_most_of_a_flight_is_in_the_tab_in_front(subject: Subject, told_by: str) -> None:
+    # Every plot is among those for debugging; one that is made twice is in the lesson too.
+    assert len(layout(1.0, "lesson", subject).plots[told_by]) == 2
+
+
+def test_the_box_is_shown_around_a_body_whose_principal_axes_are_not_those_of_its_drawing() -> None:
+    assert skewed(np.asarray(read_scene("l_bracket", {}).setup.body.inertia))
+    for straight in ("book", "t_handle", "hollow_box", "spinning_top"):
+        assert not skewed(np.asarray(read_scene(straight, {}).setup.body.inertia)), straight
+    hidden = f"- /{e.BOUNDING_BOX}/**"
+    shown = {k: str(layout(1.0, "lesson", Subject(skewed=k)).flights[0].contents) for k in (False, True)}
+    assert hidden in shown[False] and hidden not in shown[True]
+
+
+def test_no_curve_lies_on_the_edge_of_its_plot() -> None:
+    ranges = Ranges()
+    ranges.note(e.ENERGY, np.array([[0.0, 50.64], [0.0, np.nan]]))
+    ranges.note(e.ENERGY, np.array([[-3.0, 2.0]]))
+    ranges.note(e.ANGULAR_MOMENTUM_ANGLE, np.array([3e-14]))
+    axes = ranges.axes()
+    low, high = axes[e.ENERGY]
+    assert low - 1e-9 < -8.0 or low < -3.0
+    assert low < -3.0 and high > 50.64
+    # Rounding of a constant isn't blown up.
+    assert np.ptp(axes[e.ANGULAR_MOMENTUM_ANGLE]) >= 1.0
+
+
+def test_page_and_recording_name_energies_and_components_alike() -> None:
+    names = [name for name, _ in e.SERIES[e.ENERGY]]
+    assert names[:3] == ["translational", "rotational", "gravity"] == [name for name, _ in appearance.ENERGY_SERIES]
+    assert e.SERIES[e.ANGULAR_VELOCITY_PRINCIPAL] is appearance.OMEGA_SERIES
+
+
+def column(path, entity: str, component: str) -> list:
+    return [
+        value
+        for found, static, batch in record_batches(path)
+        if found == entity and not static and component in batch.schema.names
+        for value in batch.column(component).to_pylist()
+    ]
+
+
+def test_the_recording_of_a_body_on_a_string_draws_the_strings_line_through_the_com_at_rest(tmp_path) -> None:
+    path = tmp_path / "plumb_line.rrd"
+    assert main(["simulate", "plumb_line", "--duration", "40", "--record", str(path), "--json"]) == 0
+    distances = np.ravel(column(path, e.STRING_LINE_DISTANCE, "Scalars:scalars"))
+    size = float(np.linalg.norm(read_scene("plumb_line", {}).setup.surface.extent))
+    assert distances[0] > 0.1 * size and distances[-1] < 1e-3 * size  # measured 0.12 m and 1e-5 m
+    line = np.array(column(path, e.STRING_LINE, "LineStrips3D:strips")[-1][0])
+    com = np.array(column(path, e.CENTRE, "Transform3D:translation")[-1][0])
+    along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+    assert np.linalg.norm(np.cross(along, com - line[0])) < 1e-3 * size
+    assert np.dot(along, com - line[0]) > 0.0  # on from the knot, not back to the hand
+
+
+def test_a_finished_recording_says_how_far_its_plots_reach(tmp_path) -> None:
+    path = tmp_path / "thrown.rrd"
+    assert main(["simulate", "thrown_hammer", "--duration", "1", "--record", str(path), "--json"]) == 0
+    reader = RrdReader(str(path))
+    (blueprint,) = reader.blueprints()
+    ends = [
+        end
+        for chunk in reader.stream(store=blueprint)
+        if chunk.entity_path.endswith("/ScalarAxis")
+        for end in chunk.to_record_batch().column("ScalarAxis:range").to_pylist()
+    ]
+    # The height of the COM goes from 1.5 m to 2.77 m and back.
+    assert any(low <= -0.5 and 3.0 <= high <= 5.0 for ((low, high),) in ends), ends
+    com = np.array([points[-1] for points in column(path, e.COM_TRAIL, "Points3D:positions")])
+    assert com[:, 2].max() == pytest.approx(2.77, abs=0.02) and abs(com[:, 1]).max() < 1e-6

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""Viewers on this machine come, go and die without the flight noticing."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun_flight as flight
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.rerun_view import RerunObserver, ports, viewers
+from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, complaints, headless_viewer, show
+
+WAIT_S = 180.0
+
+
+@pytest.fixture
+def viewer():
+    try:
+        with headless_viewer(1200, 800) as client:
+            yield client
+    except InputError as error:
+        if DRIVERS in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+def wait_for(condition):
+    """The first true value of ``condition()``, asked for again and again."""
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.1)
+    raise AssertionError("nothing came of it in time")
+
+
+def listening_addresses(port: int) -> set[str]:
+    """Local addresses (hex) of the sockets that listen on a port, from the kernel's table."""
+    found = set()
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        for line in Path(table).read_text().splitlines()[1:]:
+            fields = line.split()
+            address, hex_port = fields[1].split(":")
+            if fields[3] == "0A" and int(hex_port, 16) == port:
+                found.add(address)
+    return found
+
+
+LOOPBACK_HEX = "0100007F"
+
+
+def test_a_taken_default_port_moves_on_and_a_taken_asked_one_is_refused():
+    with socket.socket() as taken:
+        taken.bind((ports.LOOPBACK, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert ports.choose_port("rerun_port", None, port) > port
+        with pytest.raises(InputError, match="rerun_port"):
+            ports.choose_port("rerun_port", port, 1)
+        with pytest.raises(InputError, match="web_port"):
+            RerunObserver(viewer="web", web_port=port)
+    with pytest.raises(InputError, match="viewer"):
+        RerunObserver(viewer="holodeck")
+
+
+def test_everything_served_listens_on_loopback_only_and_ends_with_close():
+    lines = []
+    observer = RerunObserver(viewer="web", report=lines.append)
+    flight.fly(observer, flight.rows(10))
+    page = wait_for(lambda: _page(observer.web_address))
+    web_port = int(observer.web_address.split(":")[2].split("/")[0])
+    live_port = int(observer.live_address.split(":")[2].split("/")[0])
+    assert b"html" in page.lower()
+    assert any(observer.web_address in line for line in lines)
+    assert any(observer.live_address in line for line in lines)
+    assert listening_addresses(web_port) == {LOOPBACK_HEX}
+    assert listening_addresses(live_port) == {LOOPBACK_HEX}
+    observer.close()
+    wait_for(lambda: not listening_addresses(web_port))
+
+
+def _page(address: str) -> bytes:
+    try:
+        with urllib.request.urlopen(address, timeout=5) as answer:
+            return answer.read()
+    except OSError:
+        return b""
+
+
+WATCHED_RUN = """
+import time
+from rigid_proto_ros.rerun_view import RerunObserver
+observer = RerunObserver(viewer="web")
+print(observer._processes[0].process.pid, flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux ends a child with its parent")
+def test_a_killed_run_leaves_no_viewer_behind():
+    run = subprocess.Popen(
+        [sys.executable, "-c", WATCHED_RUN],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    try:
+        viewer_pid = int(run.stdout.readline())
+        assert _is_running(viewer_pid)
+    finally:
+        run.kill()
+        run.wait()
+        run.stdout.close()
+    wait_for(lambda: not _is_running(viewer_pid))
+
+
+def _is_running(pid: int) -> bool:
+    """Neither gone nor a zombie that nobody has collected."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_missing_viewer_is_a_warning_and_the_run_is_recorded(tmp_path, monkeypatch):
+    monkeypatch.setattr(viewers, "viewer_program", lambda: None)
+    monkeypatch.setenv("DISPLAY", ":99")
+    for mode in ("web", "native"):
+        lines = []
+        path = tmp_path / f"{mode}.rrd"
+        observer = RerunObserver(record=str(path), viewer=mode, report=lines.append)
+        flight.fly(observer, flight.rows(10))
+        observer.close()
+        assert any("no viewer" in line for line in lines)
+        assert len(read_session(path).times) == 10
+
+
+def test_without_a_display_the_command_that_opens_a_viewer_elsewhere_is_told(monkeypatch):
+    monkeypatch.setattr(viewers, "has_display", lambda: False)
+    lines = []
+    observer = RerunObserver(viewer="native", report=lines.append)
+    observer.close()
+    # Without --connect the program would pour the stream back into the server that it reads it from.
+    assert any(line.endswith(f": rerun --connect {observer.live_address}") for line in lines)
+
+
+def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(viewer):
+    observer = RerunObserver(viewer="serve")
+    flight.fly(observer, flight.rows(80))
+    viewer.open(observer.live_address)
+
+    def shown() -> list[int]:
+        recordings = viewer.get_state().recordings
+        return [t.end for r in recordings for t in r.timelines if t.name == e.SIM_TIME]
+
+    wait_for(lambda: 79 * flight.PERIOD_NS in shown())
+    observer.reset()
+    for k, row in enumerate(flight.rows(40)):
+        observer.state(k * flight.PERIOD_NS, row)
+    wait_for(lambda: 39 * flight.PERIOD_NS in shown())
+    viewer.take_screenshot()
+    assert complaints(viewer) == []
+    # A body ten times as large is looked at from ten times as far.
+    near = camera_distances(viewer)
+    observer.body_changed(400_000_000, replace(flight.BODY, scale=10.0 * flight.SCALE))
+    wait_for(lambda: max(camera_distances(viewer)) > 5.0 * max(near))
+    assert complaints(viewer) == []
+    observer.close()
+
+
+def camera_distances(viewer) -> list[float]:
+    """Of the views whose camera goes with the body's size."""
+    blueprint = viewer.get_blueprint(of="recording").blueprint
+    eyes = [
+        node["EyeControls3D"]["position"] for node in blueprint.values() if "position" in node.get("EyeControls3D", {})
+    ]
+    distances = sorted(float(np.linalg.norm(eye)) for eye in eyes)
+    # One is Poinsot's picture, which has the same size for every body.
+    return [distance for distance in distances if abs(distance - np.linalg.norm([2.5, -2.0, 1.0])) > 1e-3]
+
+
+def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(viewers.ViewerProcess, "stop", lambda self: (self.process.kill(), self.process.wait()))
+    path = tmp_path / "session.rrd"
+    states = flight.rows(600)
+    observer = RerunObserver(record=str(path), viewer="serve")
+    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+    observer.body_changed(0, flight.BODY)
+    for part in range(3):
+        try:
+            with headless_viewer(400, 300) as client:
+                client.open(observer.live_address)
+                for k in range(200 * part, 200 * part + 200):
+                    observer.state(k * flight.PERIOD_NS, states[k])
+                    time.sleep(0.001)
+        except InputError as error:
+            if DRIVERS in str(error):
+                pytest.skip(str(error))
+            raise
+    observer.close()
+    assert observer.error == ""
+    assert read_session(path).rows.tobytes() == states.tobytes()
+
+
+@pytest.mark.parametrize("initial_view", ["lesson", "debugging", "plain"])
+def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, initial_view):
+    path = tmp_path / "session.rrd"
+    observer = RerunObserver(record=str(path), initial_view=initial_view)
+    flight.fly(observer, flight.rows(80))
+    observer.mesh_changed(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32)
+    observer.body_changed(780_000_000, flight.BODY)
+    observer.ghost_began(790_000_000, flight.BODY)
+    observer.ghost_state(790_000_000, flight.rows(80)[79])
+    observer.close()
+    show(viewer, path)
+    for at_s in (0.0, 0.25, 0.35, 0.79):
+        viewer.set_time(e.SIM_TIME, duration=at_s, play_state="paused")
+        viewer.take_screenshot()
+        assert complaints(viewer) == []
+    expected = {"lesson": "Flight", "debugging": "All shapes", "plain": "Plain"}[initial_view]
+    assert expected in {view.name for view in viewer.get_state().views if view.visible}

@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: MIT
+"""What a recording holds is what the run published: states and scalars exactly, poses to float32."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun_flight as flight
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
+from rigid_proto_ros.simulation.observer import BodySnapshot
+
+COUNT = 101
+
+
+@pytest.fixture(scope="module")
+def states() -> np.ndarray:
+    return flight.rows(COUNT)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory, states) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "session.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, states)
+    observer.close()
+    assert observer.error == ""
+    return path
+
+
+def column(path: Path, entity: str, name: str) -> tuple[np.ndarray, list]:
+    """(sim times [ns], cells) of a component over all chunks of an entity, static ones left out."""
+    times, cells = [], []
+    for found, static, batch in record_batches(path):
+        if found == entity and not static and name in batch.schema.names:
+            times.extend(batch.column(e.SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
+            cells.extend(batch.column(name).to_pylist())
+    return np.array(times), cells
+
+
+def test_states_come_back_bit_for_bit_with_their_times(recording, states):
+    session = read_session(recording)
+    assert session.complete
+    assert np.array_equal(session.times, flight.PERIOD_NS * np.arange(COUNT))
+    assert session.rows.tobytes() == states.tobytes()
+
+
+def test_scene_mesh_and_event_lines_come_back_exactly(recording):
+    session = read_session(recording)
+    assert session.scene == flight.SCENE
+    assert session.mesh_sha256 == flight.SHA256
+    assert np.array_equal(session.vertices, flight.VERTICES)
+    assert np.array_equal(session.triangles, flight.TRIANGLES)
+    assert session.events == [
+        (200_000_000, flight.event_line(200_000_000, "poke")),
+        (305_000_000, flight.event_line(305_000_000, "wrench")),
+    ]
+    assert [time_ns for time_ns, _ in session.refusals] == [500_000_000]
+
+
+def test_mesh_is_logged_once_however_long_the_run(tmp_path, states):
+    path = tmp_path / "long.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, flight.rows(9000))
+    observer.close()
+    session = read_session(path)
+    assert session.mesh_chunks == 1
+    assert len(session.times) == 9000
+
+
+def test_every_published_state_has_its_pose_to_float32(recording, states):
+    times, translations = column(recording, e.BODY, "Transform3D:translation")
+    _, quaternions = column(recording, e.BODY, "Transform3D:quaternion")
+    assert np.array_equal(times, flight.PERIOD_NS * np.arange(COUNT))
+    assert np.array_equal(np.array(translations)[:, 0], states[:, 0:3].astype(np.float32))
+    assert np.array_equal(np.array(quaternions)[:, 0], states[:, 3:7].astype(np.float32))
+
+
+def test_mesh_hangs_on_the_com_so_that_it_is_where_the_state_says(recording):
+    times, translations = column(recording, e.BODY_MESH, "Transform3D:translation")
+    _, scales = column(recording, e.BODY_MESH, "Transform3D:scale")
+    assert times.tolist() == [0]
+    assert np.allclose(translations[0], -flight.COM, rtol=1e-7)
+    assert np.allclose(scales[0], flight.SCALE, rtol=1e-7)
+
+
+def test_plotted_energies_and_momentum_are_those_of_the_states(recording, states):
+    # Independent of the code under test: quaternion by its own product, one state at a time.
+    def rotate(q, v):
+        t = 2.0 * np.cross(q[:3], v)
+        return v + q[3] * t + np.cross(q[:3], t)
+
+    times, energies = column(recording, e.ENERGY, "Scalars:scalars")
+    _, momenta = column(recording, e.ANGULAR_MOMENTUM, "Scalars:scalars")
+    _, angles = column(recording, e.ANGULAR_MOMENTUM_ANGLE, "Scalars:scalars")
+    _, rates = column(recording, e.ANGULAR_VELOCITY_PRINCIPAL, "Scalars:scalars")
+    assert np.array_equal(times, flight.PERIOD_NS * np.arange(COUNT))
+    start = None
+    for k, row in enumerate(states):
+        L = rotate(row[3:7], flight.INERTIA @ row[10:13])
+        start = L if start is None else start
+        translational = 0.5 * flight.MASS * row[7:10] @ row[7:10]
+        rotational = 0.5 * row[10:13] @ flight.INERTIA @ row[10:13]
+        potential = -flight.MASS * flight.GRAVITY @ row[0:3]
+        expected = [translational, rotational, potential, translational + rotational + potential]
+        assert np.allclose(energies[k], expected, rtol=1e-13, atol=1e-13)
+        assert np.allclose(momenta[k], [*L, np.linalg.norm(L)], rtol=1e-13, atol=1e-15)
+        cosine = np.clip(L @ start / np.linalg.norm(L) / np.linalg.norm(start), -1.0, 1.0)
+        assert np.isclose(np.radians(angles[k][0]), np.arccos(cosine), atol=1e-7)
+        # In principal axes the energy is a sum of squares, and the largest moment has the last component.
+        moments = np.linalg.eigvalsh(flight.INERTIA)
+        assert np.isclose(0.5 * moments @ np.square(rates[k]), rotational, rtol=1e-12)
+        assert np.isclose(np.linalg.norm(np.multiply(moments, rates[k])), np.linalg.norm(L), rtol=1e-12)
+
+
+def test_arrows_stand_at_their_points_and_only_while_the_load_acts(recording, states):
+    times, vectors = column(recording, f"{e.LOADS}/poke/force", "Arrows3D:vectors")
+    _, origins = column(recording, f"{e.LOADS}/poke/force", "Arrows3D:origins")
+    acting = [bool(v) for v in vectors]
+    assert set(times[acting]) == set(range(200_000_000, 400_000_001, flight.PERIOD_NS))
+    assert times[np.logical_not(acting)].tolist() == [400_000_000]
+    for time_ns, vector, origin in zip(times, vectors, origins, strict=True):
+        if not vector:
+            continue
+        row = states[time_ns // flight.PERIOD_NS]
+        t = 2.0 * np.cross(row[3:6], flight.POKE.point)
+        point = row[0:3] + flight.POKE.point + row[6] * t + np.cross(row[3:6], t)
+        ends = np.array([origin[0], np.add(origin[0], vector[0])])
+        assert min(np.linalg.norm(ends - point, axis=1)) < 1e-6
+        assert np.allclose(np.cross(vector[0], flight.POKE.force), 0.0, atol=1e-6)
+        assert np.dot(vector[0], flight.POKE.force) > 0.0
+
+
+def test_a_load_that_begins_between_states_is_shown_from_its_own_time(recording):
+    times, vectors = column(recording, f"{e.LOADS}/wrench/force", "Arrows3D:vectors")
+    assert times[0] == 305_000_000
+    assert all(vectors)
+    torque_times, torques = column(recording, f"{e.LOADS}/wrench/torque", "Arrows3D:vectors")
+    assert torque_times[0] == 305_000_000 and len(torques[0]) == 1
+
+
+def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states):
+    path = tmp_path / "change.rrd"
+    observer = RerunObserver(record=str(path))
+    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+    observer.body_changed(0, flight.BODY)
+    observer.state(0, states[0])
+    heavier = BodySnapshot(24.0, flight.COM + 0.01, 2.0 * flight.INERTIA, flight.SCALE, flight.GRAVITY, "solid", "rk4")
+    observer.body_changed(5_000_000, heavier)
+    observer.state(flight.PERIOD_NS, states[1])
+    observer.close()
+    times, translations = column(path, e.BODY_MESH, "Transform3D:translation")
+    assert times.tolist() == [0, 5_000_000]
+    assert np.allclose(translations[1], -heavier.center_of_mass, rtol=1e-6)
+    _, energies = column(path, e.ENERGY, "Scalars:scalars")
+    velocity = states[1, 7:10]
+    assert np.isclose(energies[1][0], 0.5 * 24.0 * velocity @ velocity, rtol=1e-13)
+
+
+def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
+    path = tmp_path / "meshes.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, states[:20])
+    observer.mesh_changed(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32)
+    observer.body_changed(200_000_000, flight.BODY)
+    observer.state(200_000_000, states[20])
+    observer.reset()
+    observer.state(0, states[21])
+    observer.close()
+    before, after = read_session(tmp_path / "meshes.run1.rrd"), read_session(path)
+    assert (before.mesh_chunks, after.mesh_chunks) == (2, 1)
+    assert np.array_equal(before.vertices, flight.VERTICES) and before.mesh_sha256 == flight.SHA256
+    assert np.array_equal(after.vertices, 2.0 * flight.VERTICES) and after.mesh_sha256 == "ab" * 32
+    first = column(tmp_path / "meshes.run1.rrd", e.BODY_MESH, "Transform3D:scale")
+    second = column(tmp_path / "meshes.run1.rrd", e.BODY_MESH + "_2", "Transform3D:scale")
+    scale = flight.SCALE.tolist()
+    assert first[0].tolist() == [0, 200_000_000] and np.allclose(first[1], [[scale], [[1e-9] * 3]])
+    assert second[0].tolist() == [0, 200_000_000] and np.allclose(second[1], [[[1e-9] * 3], [scale]])
+
+
+def test_a_reset_keeps_the_run_before_beside_the_new_one(tmp_path, states):
+    path = tmp_path / "session.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, states[:50])
+    observer.reset()
+    for k, row in enumerate(states[50:60]):
+        observer.state(k * flight.PERIOD_NS, row)
+    observer.close()
+    newest, before = read_session(path), read_session(tmp_path / "session.run1.rrd")
+    assert newest.rows.tobytes() == states[50:60].tobytes()
+    assert before.rows.tobytes() == states[:50].tobytes()
+    assert newest.mesh_chunks == before.mesh_chunks == 1
+    assert newest.scene == before.scene == flight.SCENE
+    assert newest.events == []
+
+
+def test_a_run_that_never_left_time_zero_is_not_kept_at_a_reset(tmp_path, states):
+    path = tmp_path / "session.rrd"
+    observer = RerunObserver(record=str(path))
+    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+    observer.body_changed(0, flight.BODY)
+    observer.state(0, states[0])
+    observer.reset()
+    observer.state(0, states[1])
+    observer.close()
+    assert [p.name for p in tmp_path.iterdir()] == ["session.rrd"]
+    assert read_session(path).rows.tobytes() == states[1:2].tobytes()
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_a_recording_of_unknown_length_is_complete_without_an_index_that_would_grow_in_memory(tmp_path):
+    sizes = {}
+    for open_ended in (False, True):
+        path = tmp_path / f"{open_ended}.rrd"
+        observer = RerunObserver(record=str(path), open_ended=open_ended)
+        flight.fly(observer, flight.rows(80))
+        observer.close()
+        session = read_session(path)
+        assert session.complete and session.rows.tobytes() == flight.rows(80).tobytes()
+        sizes[open_ended] = path.stat().st_size
+        assert whole_bytes(path)[1]
+        # What stands behind the last piece: the mark of the end, and the index or nothing.
+        assert (sizes[open_ended] - whole_bytes(path)[0] == FRAME_HEAD.size) == open_ended
+    assert sizes[True] < sizes[False]
+
+
+def test_recording_can_be_switched_on_and_off_in_flight(tmp_path, states):
+    observer = RerunObserver()
+    flight.fly(observer, states[:30])
+    first, second = tmp_path / "first.rrd", tmp_path / "second.rrd"
+    observer.start_recording(str(first))
+    for k in range(30, 40):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    assert observer.recording == str(first)
+    observer.stop_recording()
+    assert observer.recording == ""
+    for k in range(40, 50):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer.start_recording(str(second))
+    for k in range(50, 60):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer.close()
+    assert read_session(first).rows.tobytes() == states[30:40].tobytes()
+    assert read_session(second).rows.tobytes() == states[50:60].tobytes()
+    assert read_session(first).mesh_chunks == read_session(second).mesh_chunks == 1
+
+
+@pytest.mark.parametrize("name", ["taken/session.rrd", "session.mcap", "."])
+def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, name):
+    (tmp_path / "taken").touch()  # no folder can be made where a file is
+    with pytest.raises(InputError, match="record"):
+        RerunObserver(record=str(tmp_path / name))
+
+
+def test_a_disk_that_is_full_from_the_start_is_refused(tmp_path):
+    if not Path("/dev/full").exists():
+        pytest.skip("needs /dev/full")
+    (tmp_path / "full.rrd").symlink_to("/dev/full")
+    with pytest.raises(InputError, match="[Nn]o space"):
+        RerunObserver(record=str(tmp_path / "full.rrd"))
+
+
+def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states):
+    path = tmp_path / "session.rrd"
+    errors = []
+    observer = RerunObserver(record=str(path), on_error=errors.append)
+    flight.fly(observer, states[:20])
+    observer._flusher.flush_now()
+    observer.body_changed(200_000_000, None)
+    for k in range(20, 40):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer.close()
+    assert len(errors) == 1 and observer.recording == ""
+    session = read_session(path)
+    assert session.complete and session.rows.tobytes() == states[:20].tobytes()
+
+
+FULL_IN_FLIGHT = """
+import resource, signal, sys
+import rerun_flight as flight
+from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.reader import read_session
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
+errors = []
+observer = RerunObserver(record=sys.argv[1], on_error=errors.append)
+flight.fly(observer, flight.rows(12_000))
+observer.close()
+assert len(errors) == 1 and sys.argv[1] in errors[0], errors
+assert observer.recording == "" and observer.error
+session = read_session(sys.argv[1])
+assert not session.complete and 0 < len(session.times) < 12_000, session.summary()
+"""
+
+
+def test_a_file_that_cannot_grow_in_flight_stops_the_recording_and_keeps_what_is_there(tmp_path):
+    # A limit on the file's size stands in for a full disk: the write fails in the same place.
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_IN_FLIGHT, str(tmp_path / "session.rrd")],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    path = folder / "session.rrd"
+    errors = []
+    observer = RerunObserver(record=str(path), on_error=errors.append)
+    flight.fly(observer, states[:20])
+    observer._flusher.flush_now()
+    path.unlink()
+    folder.rmdir()
+    for k in range(20, 40):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer._flusher.flush_now()
+    assert observer.recording == "" and str(path) in observer.error
+    for k in range(40, 60):
+        observer.state(k * flight.PERIOD_NS, states[k])
+    observer.close()
+    assert len(errors) == 1
+
+
+def test_rerun_is_not_imported_when_nobody_watches():
+    code = (
+        "import sys; from rigid_proto_ros.rerun_view import RerunObserver; o = RerunObserver(); o.reset(); o.close(); "
+        "sys.exit('rerun' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], env=os.environ, check=False).returncode == 0

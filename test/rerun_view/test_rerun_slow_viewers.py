@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""What viewers can't do to a run: slow it down, keep it from ending, let its memory grow; and what late ones still see."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import rerun_flight as flight
+from rerun.chunk import RrdReader
+
+from rigid_proto_ros.rerun_view import RerunObserver, viewers
+from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.reader import read_session
+
+WAIT_S = 180.0
+
+RUN_WITH_A_STOPPED_VIEWER = """
+import sys, time
+import rerun_flight as flight
+from rigid_proto_ros.rerun_view import RerunObserver
+path, states = sys.argv[1], flight.rows(200)
+observer = RerunObserver(record=path, viewer="serve")
+observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+observer.body_changed(0, flight.BODY)
+observer.state(0, states[0])
+print(observer.live_address, flush=True)
+sys.stdin.readline()
+streams = observer._flusher._writer.streams
+k, deadline = 1, time.monotonic() + 150.0
+while k < 200 and time.monotonic() < deadline:
+    observer.state(k * flight.PERIOD_NS, states[k])
+    observer.body_changed(k * flight.PERIOD_NS, flight.BODY)
+    if k == 150:
+        # Thousands of messages are more than the server keeps back for a viewer.
+        while not any(stream.behind for stream in streams):
+            time.sleep(0.05)
+    k += 1
+behind = any(stream.behind for stream in streams)
+observer.close()
+print("behind" if behind else "never behind", k, repr(observer.error), flush=True)
+"""
+
+
+def test_a_viewer_that_no_longer_reads_holds_up_neither_the_run_nor_its_end(tmp_path):
+    path = tmp_path / "session.rrd"
+    run = subprocess.Popen(
+        [sys.executable, "-c", RUN_WITH_A_STOPPED_VIEWER, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(Path(__file__).parents[1])])},
+    )
+    watcher = None
+    try:
+        address = run.stdout.readline().strip()
+        saved = tmp_path / "seen.rrd"
+        watcher = viewers.ViewerProcess("--connect", address, "--save", str(saved))
+        _wait_for(lambda: saved.exists() and saved.stat().st_size > 10_000)
+        watcher.process.send_signal(signal.SIGSTOP)
+        said, _ = run.communicate("go\n", timeout=WAIT_S)
+        assert said.splitlines()[-1] == "behind 200 ''"
+        assert run.returncode == 0
+    finally:
+        run.kill()
+        run.wait()
+        if watcher is not None:
+            watcher.process.kill()
+            watcher.process.wait()
+    assert read_session(path).rows.tobytes() == flight.rows(200).tobytes()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts threads as Linux shows them")
+def test_resets_and_bodies_of_every_size_leave_no_threads_behind(tmp_path):
+    def one_more_run() -> None:
+        observer.reset()
+        for k, row in enumerate(flight.rows(4)):
+            observer.body_changed(k, replace(flight.BODY, scale=flight.SCALE * 10.0 ** (k % 2)))
+            observer.state(k * flight.PERIOD_NS, row)
+        observer._flusher.flush_now()
+
+    observer = RerunObserver(record=str(tmp_path / "session.rrd"), viewer="serve")
+    try:
+        observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+        observer.body_changed(0, flight.BODY)
+        for _ in range(3):
+            one_more_run()
+        before = _threads_of_this_process()
+        for _ in range(12):
+            one_more_run()
+        # A run that has just ended may still be leaving.
+        _wait_for(lambda: one_more_run() or _threads_of_this_process() <= before + 2)
+    finally:
+        observer.close()
+
+
+def _threads_of_this_process() -> int:
+    return len(os.listdir("/proc/self/task"))
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_body(tmp_path):
+    observer = RerunObserver(viewer="serve", live_memory_limit="4MB")
+    saved = tmp_path / "seen.rrd"
+    watcher = None
+    try:
+        observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
+        observer.body_changed(0, flight.BODY)
+        observer.status(0, "motion", "flying")
+        states = flight.rows(1000)
+        for k in range(40_000):
+            observer.state(k * 1_000_000, states[k % 1000])
+            if k % 2000 == 1999:
+                # Or viewers would be spared most of it, and nothing would have to be dropped.
+                observer._flusher.flush_now()
+        watcher = viewers.ViewerProcess("--connect", observer.live_address, "--save", str(saved))
+        _wait_for(lambda: e.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
+        seen = _entities(saved)
+        assert min(seen[e.STATE]) > 0, "nothing was dropped, so nothing is shown"
+        for entity in (e.BODY_MESH, e.INERTIA_BOX, e.INERTIA_ELLIPSOID, e.BOUNDING_BOX, e.POINSOT_ELLIPSOID):
+            assert any(at >= 0 for at in seen[entity]), entity
+    finally:
+        if watcher is not None:
+            watcher.stop()
+        observer.close()
+
+
+def _entities(path: Path) -> dict[str, list[int]]:
+    """Per entity the simulated times [ns] of a recording that may still be growing; −1 for what holds at all times."""
+    found: dict[str, list[int]] = {}
+    if not path.exists():
+        return found
+    try:
+        for chunk in RrdReader(path).stream():
+            batch = chunk.to_record_batch()
+            times = found.setdefault(str(chunk.entity_path).lstrip("/"), [])
+            if e.SIM_TIME in batch.schema.names:
+                times += [int(t.value) for t in batch.column(e.SIM_TIME)]
+            else:
+                times.append(-1)
+    except Exception:  # noqa: BLE001
+        # Cut where the viewer has got to.
+        pass
+    return found
+
+
+def _wait_for(condition) -> None:
+    deadline = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < deadline, "nothing came of it in time"
+        threading.Event().wait(0.1)

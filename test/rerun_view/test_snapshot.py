@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Pictures without a display show the body where the recorded state says it is."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+import rerun_flight as flight
+from PIL import Image
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli import snapshot as command
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.layout import BACKGROUND
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_blank
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("snapshot") / "session.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, flight.rows(60))
+    observer.close()
+    return path
+
+
+def arguments(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    parser.set_defaults(run=command.run)
+    return parser.parse_args(words)
+
+
+def take(*words: str) -> None:
+    args = arguments(*words)
+    try:
+        assert args.run(args) == 0
+    except InputError as error:
+        if DRIVERS in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+def test_the_body_is_in_the_middle_of_the_flight_view(tmp_path):
+    picture = tmp_path / "flight.png"
+    recording = tmp_path / "session.rrd"
+    observer = RerunObserver(record=str(recording))
+    # Without gravity: of a body that falls the path is shown, and the body where it has come to.
+    flight.fly(observer, flight.rows(60), dataclasses.replace(flight.BODY, gravity=np.zeros(3)))
+    observer.close()
+    take(str(recording), "--at", "0.3", "-o", str(picture), "--view", "flight")
+    with Image.open(picture) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=float)
+    drawn = np.abs(pixels - BACKGROUND).sum(axis=2) > 60
+    height, width = drawn.shape
+    centre = drawn[int(0.45 * height) : int(0.55 * height), int(0.45 * width) : int(0.55 * width)]
+    assert centre.mean() > 0.9
+    assert 0.02 < drawn.mean() < 0.6
+
+
+def test_the_whole_layout_is_drawn_also_from_a_cut_file(recording, tmp_path):
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(recording.read_bytes()[:-2000])
+    picture = tmp_path / "all.png"
+    take(str(cut), "--at", "0.3", "-o", str(picture), "--size", "1200x700")
+    assert not is_blank(picture.read_bytes())
+    with Image.open(picture) as image:
+        assert image.width == 1200 and 600 < image.height <= 700
+
+
+@pytest.mark.stress
+def test_tabs_and_views_behind_the_front_one_can_be_drawn_by_name(recording, tmp_path):
+    for name in ("debugging", "State", "Plain"):
+        picture = tmp_path / f"{name}.png"
+        take(str(recording), "--at", "0.3", "-o", str(picture), "--view", name, "--size", "1000x600")
+        assert not is_blank(picture.read_bytes())
+    with Image.open(tmp_path / "State.png") as part, Image.open(tmp_path / "debugging.png") as whole:
+        assert part.width < whole.width == 1000
+    args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"), "--view", "nothing")
+    with pytest.raises(InputError, match="Debugging.*Flight.*Lesson"):
+        args.run(args)
+
+
+def test_a_bag_is_drawn_as_the_recording_of_the_same_flight(tmp_path):
+    pytest.importorskip("mcap")
+    bag, rrd = tmp_path / "s.mcap", tmp_path / "s.rrd"
+    assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(bag), "--record", str(rrd)]) == 0
+    pictures = []
+    for session in (bag, rrd):
+        picture = session.with_suffix(session.suffix + ".png")
+        take(str(session), "--at", "0.4", "-o", str(picture), "--view", "Flight", "--size", "800x500")
+        with Image.open(picture) as image:
+            pictures.append(np.asarray(image.convert("RGB"), dtype=float))
+    assert pictures[0].shape == pictures[1].shape
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.5
+    args = arguments(str(bag), "--at", "0.6", "-o", str(tmp_path / "x.png"))
+    with pytest.raises(InputError, match="^--at: "):
+        args.run(args)
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (["--at", "-0.1", "-o", "x.png"], "--at"),
+        (["--at", "0.6", "-o", "x.png"], "--at"),
+        (["--at", "nan", "-o", "x.png"], "--at"),
+        (["--at", "0.1", "-o", "x.jpg"], "-o"),
+        (["--at", "0.1", "-o", "taken/x.png"], "-o"),
+        (["--at", "0.1", "-o", "x.png", "--size", "wide"], "--size"),
+        (["--at", "0.1", "-o", "x.png", "--size", "10x10"], "--size"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_with_what_would_be_accepted(recording, tmp_path, monkeypatch, words, field):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").touch()
+    args = arguments(str(recording), *words)
+    with pytest.raises(InputError, match=f"^{field}: "):
+        args.run(args)
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path):
+    args = arguments(str(tmp_path / "none.rrd"), "--at", "0", "-o", str(tmp_path / "x.png"))
+    with pytest.raises(InputError, match="No such file"):
+        args.run(args)
+
+
+def test_a_machine_without_drivers_is_told_what_to_install(recording, tmp_path, monkeypatch):
+    # The Vulkan loader finds no driver at this place.
+    monkeypatch.setenv("VK_ICD_FILENAMES", str(tmp_path / "none.json"))
+    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "none.json"))
+    monkeypatch.setenv("LIBGL_DRIVERS_PATH", str(tmp_path))
+    monkeypatch.setenv("WGPU_BACKEND", "vulkan")
+    args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"))
+    with pytest.raises(InputError, match="mesa-vulkan-drivers") as refusal:
+        args.run(args)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_picture_of_one_colour_counts_as_blank():
+    data = io.BytesIO()
+    Image.new("RGB", (300, 200), BACKGROUND).save(data, format="png")
+    assert is_blank(data.getvalue())

@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: MIT
+"""Every topic and service of the node, through real processes and messages."""
+
+import hashlib
+import json
+import math
+
+import numpy as np
+import pytest
+from command_rig import inertia_message, point_message, stamp_ns, vector, wrench_message
+from scipy.spatial.transform import Rotation
+
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.commands import ClearWrench, WrenchCommand
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SECOND = 10**9
+MS = 10**6
+
+
+def row_of(pose: dict, twist: dict) -> np.ndarray:
+    """x, q, v, ω world from a pose and a twist."""
+    p, q = pose["pose"]["position"], pose["pose"]["orientation"]
+    v, w = twist["twist"]["linear"], twist["twist"]["angular"]
+    return np.array([p["x"], p["y"], p["z"], q["x"], q["y"], q["z"], q["w"], *v.values(), *w.values()])
+
+
+def expected_row(scene: dict, commands, time_ns: int) -> np.ndarray:
+    """The same in an offline simulation, for commands (time_ns, topic, frame, force, torque)."""
+    scenario = make_scenario(scene)
+    simulation = Simulation(scenario.setup)
+    for at_ns, topic, frame, force, torque in commands:
+        if topic == "clear":
+            simulation.submit(ClearWrench(), at_ns)
+            continue
+        read = parse_frame(frame, set(scenario.setup.contacts))
+        simulation.submit(WrenchCommand(topic == "wrench", read, force, torque, at_ns, frame, b""), at_ns)
+    state = simulation.advance(time_ns)
+    return np.concatenate([state.row[:10], state.angular_velocity])
+
+
+def send_and_compare(rig, commands, time_ns: int) -> None:
+    """Commands by message, each stamped; then the published state is the offline one, to the bit."""
+    rig.start_over(paused=True)
+    for at_ns, topic, frame, force, torque in commands:
+        rig.publish(topic, wrench_message(at_ns, frame, force, torque))
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    pose, twist = rig.state_at(time_ns)
+    published, offline = row_of(pose, twist), expected_row(rig.scene, commands, time_ns)
+    assert published[:10].tobytes() == offline[:10].tobytes(), np.abs(published - offline).max()
+    # Turned to world axes by another formula.
+    assert published[10:] == pytest.approx(offline[10:], rel=1e-14, abs=1e-15)
+
+
+def test_a_wrench_holds_replaces_the_one_before_and_ends_by_a_zero_one_or_by_the_timeout(rig):
+    zero = (0.0, 0.0, 0.0)
+    commands = [
+        (100 * MS, "wrench", "world@tip", (0.01, 0.0, 0.02), zero),
+        (300 * MS, "wrench", "body", (0.0, 0.01, 0.0), (1e-5, 0.0, 0.0)),
+        (500 * MS, "wrench", "", zero, zero),
+        (600 * MS, "wrench", "vertex/3", (0.0, 0.01, 0.0), zero),
+    ]
+    # The last is held 1.5 s of simulated time: until 2.1 s.
+    send_and_compare(rig, commands, 2300 * MS)
+    ended = expected_row(rig.scene, [*commands, (2100 * MS, "clear", "", zero, zero)], 2300 * MS)
+    assert ended.tobytes() == expected_row(rig.scene, commands, 2300 * MS).tobytes()
+    assert np.abs(ended - expected_row({**rig.scene, "wrench_timeout": 0.0}, commands, 2300 * MS)).max() > 1e-4
+
+
+def test_pokes_add_to_each_other_and_to_the_wrench_and_impulses_act_at_once(rig):
+    zero = (0.0, 0.0, 0.0)
+    commands = [
+        (100 * MS, "wrench", "world@com", (0.01, 0.0, 0.02), zero),
+        (110 * MS, "poke", "world@tip", (0.1, 0.0, 0.0), zero),
+        (120 * MS, "poke", "body@left;duration=0.3", (0.0, 0.05, 0.0), zero),
+        (120 * MS, "poke", "body@left;duration=0.3", (0.0, 0.05, 0.0), zero),
+        (125 * MS, "poke", "normal@vertex/5", (0.2, 0.0, 0.0), zero),
+        (130 * MS, "poke", "world@tip;impulse", (1e-3, 0.0, 0.0), (0.0, 1e-6, 0.0)),
+    ]
+    send_and_compare(rig, commands, 500 * MS)
+    one_less = expected_row(rig.scene, commands[:2] + commands[3:], 500 * MS)
+    assert np.abs(one_less - expected_row(rig.scene, commands, 500 * MS)).max() > 1e-3
+
+
+def test_pose_twist_and_odometry_are_one_state_stamped_with_publication_times(rig):
+    rig.until(lambda: rig.heard_count("odom") > 30, "states")
+    odometry = {stamp_ns(m): m for m in rig.heard("odom")}
+    checked = 0
+    for time_ns, odom in list(odometry.items())[5:25]:
+        assert time_ns % (10 * MS) == 0
+        pose, twist = rig.state_at(time_ns)
+        row = row_of(pose, twist)
+        assert odom["pose"]["pose"] == pose["pose"]
+        # An Odometry's twist is in body axes, a TwistStamped's in those of its frame: the world's.
+        R = Rotation.from_quat(row[3:7])
+        linear, angular = odom["twist"]["twist"]["linear"], odom["twist"]["twist"]["angular"]
+        assert R.apply(list(linear.values())) == pytest.approx(row[7:10], abs=1e-13)
+        assert R.apply(list(angular.values())) == pytest.approx(row[10:13], abs=1e-12)
+        assert (pose["header"]["frame_id"], twist["header"]["frame_id"]) == ("world", "world")
+        assert (odom["header"]["frame_id"], odom["child_frame_id"]) == ("world", "rigid_body")
+        checked += 1
+    assert checked == 20
+    times = sorted(odometry)
+    assert {b - a for a, b in zip(times, times[1:], strict=False)} == {10 * MS}
+
+
+def test_applied_says_when_each_command_began_with_its_frame_resolved(rig):
+    rig.start_over(paused=True)
+    rig.publish("wrench", wrench_message(200 * MS, "tip", (0.0, 1e-3, 0.0)))
+    rig.publish("poke", wrench_message(250 * MS, "world@vertex/3;duration=0.125", (0.0, 1e-3, 0.0), (1e-6, 0.0, 0.0)))
+    rig.publish("poke", wrench_message(300 * MS, "normal@left;impulse", (1e-4, 0.0, 0.0)))
+    rig.publish("poke", wrench_message(0, "world@ray/0,0,3/0,0,-1", (0.0, 0.0, 1e-3)))
+    rig.until_received(rig.sent)
+    paused_ns = rig.now_ns()
+    rig.pause(False)
+    applied = sorted(
+        rig.until(lambda: len(rig.heard("applied")) >= 4 and rig.heard("applied"), "applied"), key=stamp_ns
+    )
+    assert [stamp_ns(m) for m in applied] == [paused_ns, 200 * MS, 250 * MS, 300 * MS]
+    frames = [m["header"]["frame_id"] for m in applied]
+    scenario = make_scenario(rig.scene)
+    corner = scenario.setup.surface.vertices[3]
+    assert frames[0].startswith("world@point/")
+    assert frames[1] == "body@point/0.0,0.0,0.07"
+    assert frames[2] == f"world@point/{','.join(repr(float(x)) for x in corner)};duration=0.125"
+    assert frames[3] == "body@point/0.0,-0.05,0.0;impulse"
+    normal = scenario.setup.surface.inward_normal([0.0, -0.05, 0.0])
+    assert applied[3]["wrench"]["force"] == vector(1e-4 * normal)
+    # Each is a frame that the node takes: the same command again.
+    for frame in frames:
+        parse_frame(frame)
+
+
+def chain_is_whole(events: list[dict]) -> None:
+    """Every line's sha256 is that of all lines so far, each without its own, as the README says."""
+    digest = hashlib.sha256()
+    for event in events:
+        digest.update((json.dumps({k: event[k] for k in ("time_ns", "kind", "content")}) + "\n").encode())
+        assert event["sha256"] == digest.hexdigest(), event
+
+
+def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_since_the_reset(rig):
+    rig.trigger("reset")
+    rig.publish("wrench", wrench_message(0, "world", (0.0, 0.0, 1e-3)))
+    rig.publish("poke", wrench_message(300 * MS, "tip", (0.0, 1e-3, 0.0)))
+    rig.publish("string/attach", point_message(0, "body/mesh", (0.0, 0.0, 0.07)))
+    rig.publish("string/target", point_message(0, "world", (0.0, 0.0, 0.5)))
+    rig.publish("inertia/set", inertia_message(0, "", 0.02, (0, 0, 0), (1e-5, 0, 0, 2e-5, 0, 2.5e-5)))
+    rig.schedule(
+        "{t: 0.0, set: {gravity: [0.0, 0.0, -1.0]}}", "{t: 0.0, string: release}", "{t: 0, service: clear_wrench}"
+    )
+    rig.set(mass=1.0, linear_damping=0.001)
+    rig.trigger("clear_wrench")
+    rig.trigger("string/release")
+    rig.pause(True)
+    rig.trigger("step")
+    rig.pause(False)
+    rig.wait_event("poke")
+    kinds = {}
+    for event in rig.events():
+        kinds[event["kind"]] = kinds.get(event["kind"], 0) + 1
+    assert kinds == {
+        "reset": 1,
+        "wrench": 1,
+        "poke": 1,
+        "string_attach": 1,
+        "string_target": 1,
+        "inertia": 1,
+        "set": 2,
+        "string_release": 2,
+        "clear_wrench": 2,
+        "pause": 2,
+        "step": 1,
+    }
+    events = rig.events()
+    chain_is_whole(events)
+    times = [event["time_ns"] for event in events]
+    assert times == sorted(times)
+    # A new chain begins at the next reset.
+    rig.trigger("reset")
+    rig.until(lambda: rig.events()[-1]["kind"] == "reset", "the reset")
+    chain_is_whole(rig.events()[-1:])
+
+
+def test_a_refused_command_leaves_no_event(rig):
+    rig.publish(
+        "wrench", wrench_message(0, "nowhere", (1.0, 0.0, 0.0)), wrench_message(0, "world", (math.nan, 0.0, 0.0))
+    )
+    rig.counters()
+    assert rig.events() == []
+
+
+def test_inertia_is_latched_and_comes_again_at_every_change_with_its_time(rig):
+    scenario = make_scenario(rig.scene)
+    mass = scenario.setup.body.mass
+    message = rig.until(lambda: (m := rig.heard("inertia", last=1)[0])["inertia"]["m"] == mass and m, "the inertia")
+    I, com = scenario.setup.body.inertia, scenario.setup.body.center_of_mass
+    assert message["header"]["frame_id"] == "rigid_body/mesh"
+    assert message["inertia"] == {
+        "m": scenario.setup.body.mass,
+        "com": vector(com),
+        "ixx": I[0, 0],
+        "ixy": I[0, 1],
+        "ixz": I[0, 2],
+        "iyy": I[1, 1],
+        "iyz": I[1, 2],
+        "izz": I[2, 2],
+    }
+    rig.start_over(paused=True)
+    before = len(rig.heard("inertia"))
+    rig.set(mass=2.0)
+    rig.schedule("{t: 0.6, set: {scale: [2.0]}}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    heard = rig.until(lambda: len(rig.heard("inertia")) >= before + 2 and rig.heard("inertia"), "inertia twice")
+    assert [m["inertia"]["m"] for m in heard[before:]] == [2.0, 2.0]
+    assert stamp_ns(heard[before + 1]) == 600 * MS
+    assert heard[before + 1]["inertia"]["ixx"] == pytest.approx(4 * heard[before]["inertia"]["ixx"], rel=1e-12)
+    # Who comes late gets the last one.
+    rig.do("listen", topic=rig.name("inertia"), type="InertiaStamped", latched=True)
+    assert (
+        rig.until(lambda: len(rig.heard("inertia")) > len(heard) and rig.heard("inertia"), "latched")[-1] == heard[-1]
+    )
+
+
+def test_an_inertia_message_makes_the_model_explicit_and_the_parameters_follow_together(rig):
+    rig.set(ballast__nut=[0.01, 0.0, 0.0, 0.07])
+    rig.publish(
+        "inertia/set", inertia_message(0, "rigid_body/mesh", 0.5, (0.01, 0.0, 0.02), (1e-3, 1e-5, 0, 2e-3, 0, 2.5e-3))
+    )
+    rig.wait_event("inertia")
+    names = ("inertia_model", "explicit_inertia.mass", "explicit_inertia.center_of_mass", "explicit_inertia.tensor")
+    rig.until(lambda: rig.get("inertia_model")["inertia_model"] == "explicit", "the parameters")
+    values = rig.get(*names, "ballast.nut")
+    assert values["explicit_inertia.mass"] == 0.5
+    assert values["explicit_inertia.center_of_mass"] == [0.01, 0.0, 0.02]
+    assert values["explicit_inertia.tensor"] == [1e-3, 1e-5, 0.0, 2e-3, 0.0, 2.5e-3]
+    assert values["ballast.nut"] == [0.0, 0.0, 0.0, 0.07]
+    rig.until(lambda: rig.heard("inertia", last=1)[0]["inertia"]["m"] == 0.5, "the inertia")
+    # In the body frame the centre of mass counts from the present one.
+    rig.publish("inertia/set", inertia_message(0, "body", 0.5, (0.0, 0.01, 0.0), (1e-3, 1e-5, 0, 2e-3, 0, 2.5e-3)))
+    rig.wait_event("inertia", 2)
+    expected = [0.01, 0.01, 0.02]
+    rig.until(lambda: rig.get(names[2])[names[2]] == pytest.approx(expected, abs=1e-15), "the centre of mass")
+
+
+def test_the_inertia_that_was_received_sent_back_changes_nothing(rig):
+    changes = {"scale": [1.1, 1.3, 1.7], "ballast.nut": [0.013, 0.01, 0.05, 0.02]}
+    rig.set_named(changes, atomically=True)
+    rig.pause(True)
+    rig.trigger("step")
+    mass = make_scenario({**rig.scene, **changes}).setup.body.mass
+    received = rig.until(lambda: (m := rig.heard("inertia", last=1)[0])["inertia"]["m"] == mass and m, "the inertia")
+    message = {**received, "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": received["header"]["frame_id"]}}
+    pose, twist = rig.state_at(int(rig.diagnostics()["sim_time_ns"]))
+    count = len(rig.heard("inertia"))
+    rig.publish("inertia/set", message)
+    rig.until_received(rig.sent)
+    # The change acts with the next step, from the paused instant on; a stop before that shows pose and twist unchanged.
+    rig.trigger("step")
+    rig.wait_event("inertia")
+    again = rig.until(lambda: len(rig.heard("inertia")) > count and rig.heard("inertia", last=1), "inertia")[0]
+    assert again["inertia"] == received["inertia"]
+    assert stamp_ns(again) == stamp_ns(pose) == stamp_ns(twist)
+    values = rig.get("ballast.nut", "inertia_model")
+    assert values == {"ballast.nut": [0.0, 0.01, 0.05, 0.02], "inertia_model": "explicit"}
+
+
+def test_in_flight_other_mass_properties_leave_the_mesh_where_it_is_and_another_size_the_centre_of_mass(rig):
+    rig.start_over(paused=True)
+    rig.schedule(
+        "{t: 0.3, set: {ballast.nut: [0.05, 0.01, 0.05, 0.02]}}", "{t: 0.6, set: {scale: [2.0, 1.0, 0.5], mass: 0.1}}"
+    )
+    rig.publish("poke", wrench_message(100 * MS, "world@com;impulse", (1e-3, 2e-3, -1e-3)))
+    rig.until_received(rig.sent)
+    rig.forget("inertia")
+    rig.pause(False)
+
+    def both():
+        messages = rig.heard("inertia", last=2)
+        return [stamp_ns(message) for message in messages] == [300 * MS, 600 * MS] and messages
+
+    old = make_scenario(rig.scene).setup.body.center_of_mass
+    new = np.array(list(rig.until(both, "inertia at both times")[0]["inertia"]["com"].values()))
+    rows = {ms: row_of(*rig.state_at(ms * MS)) for ms in (300, 310, 600, 610)}
+    before, after = rows[300], rows[310]
+    # No force acts: the new centre of mass goes on as the point of the moving mesh that it is.
+    shift = Rotation.from_quat(before[3:7]).apply(new - old)
+    assert np.linalg.norm(shift) > 1e-3
+    velocity = before[7:10] + np.cross(before[10:13], shift)
+    # Measured 1e-16 and 3e-17.
+    assert after[7:10] == pytest.approx(velocity, abs=1e-14)
+    assert after[:3] == pytest.approx(before[:3] + shift + 0.01 * velocity, abs=1e-15)
+    # Grown in place.
+    before, after = rows[600], rows[610]
+    assert after[7:10].tobytes() == before[7:10].tobytes()
+    assert after[:3] == pytest.approx(before[:3] + 0.01 * before[7:10], abs=1e-15)
+
+
+def test_schedule_takes_an_entry_of_any_kind_or_a_list_whole_and_refuses_all_else_by_name(rig):
+    before = rig.counters()
+    good = {
+        "{t: 0.5, set: {linear_damping: 0.25}}": ["set"],
+        "{t: 0.5, string: release}": ["string_release"],
+        "{t: 0.5, service: clear_wrench}": ["clear_wrench"],
+        "t: 0.5\nset:\n  step: 0.002": ["set"],
+        "{t: 0.5, string: {attach: tip, target: [0, 0, 0.1]}}": ["string_attach", "string_target"],
+        "{t: 0.5, force: [0, 0, 1.0e-3]}": ["poke"],
+        "{t: 0.5, at: tip, push: 1.0e-3, duration: 0.1}": ["poke"],
+        "{t: 0.5, impulse: [0, 0, 1.0e-6], repeat: 2, every: 0.0}": ["poke", "poke"],
+        "{t: 0.5, wrench: {at: tip, torque: [0, 0, 1.0e-6]}}": ["wrench"],
+        "- {t: 0.4, string: release}\n- {t: 0.4, impulse: [0, 0, 1.0e-6]}": ["string_release", "poke"],
+        '[{"t": 0.4, "impulse": [0, 0, 1e-6]}, {"t": 0.4, "set": {"density": 7800}}, {"t": 0.4, "service": "clear_wrench"}]': [
+            *("poke", "set", "clear_wrench")
+        ],
+    }
+    bad = {
+        **dict.fromkeys(("", "[]", "nonsense", "{t: 0.5}", "{set: {mass: 1.0}}", "{t: -1.0, set: {mass: 1.0}}"), 1),
+        **dict.fromkeys(("{t: .nan, set: {mass: 1}}", "{t: 0.5, set: {}}", "{t: 0.5, set: {masss: 1.0}}"), 1),
+        **dict.fromkeys(("{t: 0.5, set: {mass: -1.0}}", "{t: 0.5, set: {mass: .inf}}", "{t: 0.5, service: reset}"), 1),
+        **dict.fromkeys(("{t: 0.5, string: release, set: {mass: 1.0}}", "{t: 0.5, set: {mass: 1.0}", "\t"), 1),
+        **dict.fromkeys(("{t: 0.5, set: {world_frame: map}}", "{t: 0.5, set: {contacts.tip: [0.0, 0.0, 0.0]}}"), 1),
+        **dict.fromkeys(("[" * 5000, "!!python/object:os.system {t: 0}", "{t: 0.5, wrench: {}}"), 1),
+        **dict.fromkeys(("{script: [{t: 0.5, service: clear_wrench}]}", '[{"t": NaN, "string": "release"}]'), 1),
+        "{t: 0.5, impulse: [0, 0, 1], repeat: 5001, every: 0.1}": 1,
+        # A list is taken or refused as a whole, and counts as many as it has entries.
+        "[{t: 0.5, string: release}, {t: 0.5, set: {masss: 1.0}}, {t: 0.5, service: clear_wrench}]": 3,
+        "[{t: 0.5, string: release}, {t: 0.5, string: {attach: nowhere}}]": 2,
+        "[{t: 0.5, string: release}, 5]": 2,
+    }
+    rig.start_over(paused=True)
+    rig.schedule(*good, *bad)
+    taken = len(good) + 3
+    rig.sent += taken - len(good) + sum(bad.values()) - len(bad)
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    kinds = [kind for kinds in good.values() for kind in kinds]
+    for kind in set(kinds):
+        rig.wait_event(kind, kinds.count(kind))
+    gained = rig.gained(before, "schedule_received", "commands_received")
+    assert gained == {
+        "schedule_received": taken + sum(bad.values()),
+        "commands_received": taken + sum(bad.values()),
+        "refused_total": sum(bad.values()),
+        "refused_schedule": sum(bad.values()),
+    }
+    acted = [(event["time_ns"], event["kind"]) for event in rig.events() if event["kind"] != "pause"]
+    # Lists by their bytes, of which the length comes first; then by kind.
+    lists = [kinds for text, kinds in good.items() if text[0] in "-["]
+    assert [kind for time_ns, kind in acted if time_ns == 2 * SECOND // 5] == [k for kinds in lists for k in kinds]
+    ranks = {"string_attach": 2, "string_target": 2, "wrench": 3, "poke": 4}
+    single = [ranks.get(kind, 0) for time_ns, kind in acted if time_ns == SECOND // 2]
+    assert single == sorted(single) and len(acted) == len(kinds)
+    assert rig.get("linear_damping", "step") == {"linear_damping": 0.25, "step": 0.002}
+
+
+def test_a_list_is_judged_in_the_scene_that_it_makes_and_one_refused_in_any_entry_leaves_no_trace(rig):
+    rig.set(integrator="free_body")
+    before = rig.counters()
+    poke = '{"t": 0.2, "at": "tip", "force": [0, 0, 0.001]}'
+    rig.start_over(paused=True)
+    rig.schedule(f'[{{"t": 0.1, "set": {{"linear_damping": 0.5}}}}, {poke}, {{"t": 5000, "string": "release"}}]')
+    rig.schedule(f"[{poke}]", f'[{{"t": 0.2, "set": {{"integrator": "auto"}}}}, {poke}]')
+    rig.sent += 3
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    rig.wait_event("poke")
+    assert [event["kind"] for event in rig.events() if event["kind"] != "pause"] == ["set", "poke"]
+    gained = rig.gained(before)
+    assert gained == {"refused_total": 4, "refused_integrator": 4}
+
+
+def test_a_scheduled_change_that_fits_no_more_when_its_time_comes_is_refused_then(rig):
+    before = rig.counters()
+    rig.start_over(paused=True)
+    rig.schedule("{t: 0.3, set: {mesh: '', inertia_model: explicit}}", "{t: 0.6, set: {inertia_model: solid}}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    rig.until(lambda: rig.now_ns() > 700 * MS, "the time after it")
+    assert rig.gained(before) == {"refused_total": 1, "refused_schedule": 1}
+    assert rig.get("inertia_model") == {"inertia_model": "explicit"}
+    rig.set(mesh="t_handle", inertia_model="solid", atomically=True)
+
+
+def energy_at_the_start(scene: dict) -> float:
+    return Simulation(make_scenario(scene).setup).kinetic_energy
+
+
+def test_the_string_topics_tie_move_and_release_through_messages(rig):
+    rig.set(string__timeout=0.5, string__stiffness=1.0)
+    rig.publish("string/attach", point_message(0, "rigid_body/mesh", (0.0, -0.05, 0.0)))
+    rig.publish("string/target", point_message(0, "", (0.3, 0.0, 0.2)))
+    (target,) = rig.wait_event("string_target")
+    rig.until(lambda: rig.now_ns() > target["time_ns"] + 700 * MS, "the timeout")
+    rig.pause(True)
+    report = rig.diagnostics()
+    # The string's energy is gone with it; what it gave to the body stays.
+    assert float(report["potential_energy"]) == 0.0
+    assert float(report["kinetic_energy"]) > 2.0 * energy_at_the_start(rig.scene)
+    attach = [event for event in rig.events() if event["kind"] == "string_attach"]
+    assert attach[0]["content"]["point"] == [0.0, -0.05, 0.0]
+    rig.pause(False)
+    rig.set(string__timeout=0.0)
+    rig.publish("string/target", point_message(0, "world", (0.3, 0.0, 0.2)))
+    rig.wait_event("string_target", 2)
+    assert float(rig.diagnostics()["potential_energy"]) > 0.0
+    assert rig.trigger("string/release")["success"]
+    rig.wait_event("string_release")
+    assert float(rig.diagnostics()["potential_energy"]) == 0.0
+
+
+def test_scene_is_latched_follows_every_change_and_carries_the_meshs_hash(rig):
+    scenario = make_scenario(rig.scene)
+    text = rig.heard("scene", last=1)[0]["data"]
+    assert f"# mesh_sha256: {scenario.body_mesh.mesh.sha256}" in text
+    before = len(rig.heard("scene"))
+    rig.set(mass=1.25)
+    rig.schedule("{t: 0.0, set: {gravity: [0.0, 0.0, -2.0]}}")
+    rig.publish("inertia/set", inertia_message(0, "", 0.5, (0.01, 0.0, 0.02), (1e-3, 0, 0, 2e-3, 0, 2.5e-3)))
+    texts = rig.until(lambda: len(rig.heard("scene")) >= before + 3 and rig.heard("scene"), "three scenes")[before:]
+    assert "mass: 1.25" in texts[0]["data"]
+    assert "gravity: [0.0, 0.0, -2.0]" in texts[-1]["data"]
+    assert "explicit_inertia.mass: 0.5" in texts[-1]["data"]

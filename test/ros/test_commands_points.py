@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: MIT
+"""The same load, said in different frames, moves the body the same way; loads that only look alike don't."""
+
+import numpy as np
+import pytest
+from flights import SECOND
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SCENE = {
+    "mesh": "t_handle",
+    "density": 7850.0,
+    "scale": [1.5, 0.8, 2.0],
+    "initial.position": [0.3, -0.2, 0.5],
+    "initial.orientation_xyzw": [0.2, -0.4, 0.4, 0.8],
+    "initial.linear_velocity": [0.1, 0.2, -0.1],
+    "initial.angular_velocity": [0.5, -2.0, 3.0],
+    "integrator": "rk4",
+    "wrench_timeout": 0.0,
+}
+
+
+def scenario(**contacts):
+    return make_scenario({**SCENE, **{f"contacts.{n}": list(p) for n, p in contacts.items()}})
+
+
+def flown(scene, *commands, seconds: float = 1.0) -> np.ndarray:
+    """The state row after commands (time_ns, frame, force, torque, held)."""
+    simulation = Simulation(scene.setup)
+    for time_ns, frame, force, torque, held in commands:
+        read = parse_frame(frame, set(scene.setup.contacts))
+        simulation.submit(WrenchCommand(held, read, tuple(force), tuple(torque), 0, frame, b""), time_ns)
+    row = simulation.advance(round(seconds * SECOND)).row
+    assert not simulation.refused
+    return row
+
+
+def relative_difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest difference of position, attitude, velocity and spin, each relative to its own size."""
+    parts = (slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13))
+    return max(np.abs(a[p] - b[p]).max() / np.abs(b[p]).max() for p in parts)
+
+
+def text(point) -> str:
+    return ",".join(repr(float(x)) for x in point)
+
+
+VERTEX = 17
+FORCE = (0.3, -0.2, 0.4)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    mesh = scenario().body_mesh
+    return scenario(tip=mesh.surface.vertices[VERTEX])
+
+
+@pytest.fixture(scope="module")
+def corner(scene) -> np.ndarray:
+    return scene.body_mesh.surface.vertices[VERTEX]
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["wrench", "poke"])
+@pytest.mark.parametrize("axes", ["world", "body"])
+def test_a_point_named_by_vertex_contact_or_coordinates_is_one_point(scene, corner, axes, held):
+    # Equal to the bit: all three settle on the same doubles.
+    start = SECOND // 10
+    points = (f"vertex/{VERTEX}", "tip", f"point/{text(corner)}")
+    ends = [flown(scene, (start, f"{axes}@{p}", FORCE, (0.0, 0.0, 0.0), held)) for p in points]
+    still = flown(scene)
+    assert relative_difference(ends[0], still) > 1e-3
+    for end in ends[1:]:
+        assert relative_difference(end, ends[0]) <= 1e-12
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["wrench", "poke"])
+def test_a_body_force_off_the_centre_is_that_force_and_the_torque_r_cross_f_at_the_centre(scene, corner, held):
+    arm = corner * np.array(SCENE["scale"]) - scene.setup.body.center_of_mass
+    start = SECOND // 10
+    torque = (0.01, 0.02, -0.03)
+    at_com = flown(scene, (start, "body@com", FORCE, np.cross(arm, FORCE) + torque, held))
+    for point in (f"vertex/{VERTEX}", "tip", f"point/{text(corner)}"):
+        assert relative_difference(flown(scene, (start, f"body@{point}", FORCE, torque, held)), at_com) <= 1e-12
+    # A point alone is in body axes; `body` alone is the centre of mass.
+    assert relative_difference(flown(scene, (start, "tip", FORCE, torque, held)), at_com) <= 1e-12
+    assert relative_difference(flown(scene, (start, "body", FORCE, np.cross(arm, FORCE) + torque, held)), at_com) == 0
+
+
+def test_the_mesh_origin_is_a_point_like_any_other(scene):
+    start = SECOND // 10
+    ends = [flown(scene, (start, f"world@{p}", FORCE, (0, 0, 0), False)) for p in ("origin", "point/0,0,0")]
+    assert relative_difference(ends[0], ends[1]) <= 1e-12
+    assert relative_difference(ends[0], flown(scene, (start, "world@com", FORCE, (0, 0, 0), False))) > 1e-3
+
+
+@pytest.mark.parametrize("axes", ["world", "body"])
+@pytest.mark.parametrize("held", [True, False], ids=["wrench", "poke"])
+def test_a_ray_acts_where_it_first_meets_the_turning_body_and_stays_with_that_point(scene, axes, held):
+    start = SECOND // 10
+    state = Simulation(scene.setup).advance(start)
+    surface, body = scene.setup.surface, scene.setup.body
+    R = Rotation.from_quat(state.orientation_xyzw).as_matrix()
+    centre = surface.vertices[surface.triangles[40]].mean(axis=0)
+    normal = surface.inward_normal(centre) / np.array(SCENE["scale"])
+    target = state.position + R @ body.point(centre)
+    outside = target - 0.5 * (R @ normal) / np.linalg.norm(normal)
+    # From half a metre out nothing else of this convex face's side is in the way.
+    frame = f"{axes}@ray/{text(outside)}/{text(target - outside)}"
+    by_ray = flown(scene, (start, frame, FORCE, (0, 0, 0), held))
+    by_point = flown(scene, (start, f"{axes}@point/{text(centre)}", FORCE, (0, 0, 0), held))
+    assert relative_difference(by_ray, by_point) <= 1e-12
+
+
+def test_a_ray_that_misses_when_it_takes_effect_is_refused_and_the_motion_goes_on(scene):
+    simulation = Simulation(scene.setup)
+    frame = parse_frame("world@ray/100,100,100/1,0,0")
+    simulation.submit(WrenchCommand(False, frame, FORCE, (0, 0, 0), 0, frame.text, b""), SECOND // 2)
+    assert not simulation.refused
+    end = simulation.advance(SECOND).row
+    assert simulation.refused == {"ray_miss": 1}
+    assert (end == Simulation(scene.setup).advance(SECOND).row).all()
+
+
+def test_normal_axes_push_along_the_inward_normal_of_the_scaled_surface(scene):
+    """Inward normals of a scaled surface go with the inverse of the scale; a corner's is settled at the mesh."""
+    surface, scale = scene.setup.surface, np.array(SCENE["scale"])
+    a, b, c = surface.vertices[surface.triangles[40]]
+    centre = (a + b + c) / 3
+    inward = -np.cross((b - a) * scale, (c - a) * scale)
+    inward /= np.linalg.norm(inward)
+    start = SECOND // 10
+    pushed = flown(scene, (start, f"normal@point/{text(centre)}", (2.0, 0, 0), (0, 0, 0), True))
+    same = flown(scene, (start, f"body@point/{text(centre)}", 2.0 * inward, (0, 0, 0), True))
+    assert relative_difference(pushed, same) <= 1e-12
+
+
+# A fixed world torque, a world force at a body point and a body force at a body point, against plain equations of
+# motion integrated by SciPy's DOP853 at rtol 1e-13.
+
+
+def reference(scene, load, seconds: float) -> np.ndarray:
+    """x, q, v, ω body after ``seconds`` under load(R) = (force world, torque about the COM in body axes)."""
+    body = scene.setup.body
+    I = body.inertia
+
+    def derivative(t, y):
+        q, w = y[3:7], y[10:13]
+        R = Rotation.from_quat(q).as_matrix()
+        force, torque = load(R)
+        x, y_, z, s = q
+        qdot = 0.5 * np.array(
+            [
+                s * w[0] + y_ * w[2] - z * w[1],
+                s * w[1] + z * w[0] - x * w[2],
+                s * w[2] + x * w[1] - y_ * w[0],
+                -x * w[0] - y_ * w[1] - z * w[2],
+            ]
+        )
+        return np.concatenate([y[7:10], qdot, force / body.mass, np.linalg.solve(I, torque - np.cross(w, I @ w))])
+
+    start = scene.setup.initial
+    end = solve_ivp(derivative, (0.0, seconds), start, method="DOP853", rtol=1e-13, atol=1e-15)
+    assert end.success
+    y = end.y[:, -1]
+    y[3:7] *= np.sign(y[3:7] @ start[3:7]) / np.linalg.norm(y[3:7]) or 1.0
+    return y
+
+
+def aligned(row, other) -> np.ndarray:
+    """The row with the sign of its quaternion as the other's."""
+    row = row.copy()
+    row[3:7] *= np.sign(row[3:7] @ other[3:7])
+    return row
+
+
+def test_three_loads_that_look_alike_differ_on_a_turning_body_as_the_equations_of_motion_say(scene, corner):
+    """Each of the three against its reference, and their differences: measured 6e-12 relative at most, 0.1 and more apart."""
+    arm = corner * np.array(SCENE["scale"]) - scene.setup.body.center_of_mass
+    R0 = Rotation.from_quat(scene.setup.initial[3:7]).as_matrix()
+    force_world = np.array([0.02, -0.01, 0.03])
+    force_body = R0.T @ force_world
+    torque_world = R0 @ np.cross(arm, force_body)
+    seconds = 1.0
+    loads = {
+        "a torque fixed in the world": (
+            ("world@com", force_world, torque_world),
+            lambda R: (force_world, R.T @ torque_world),
+        ),
+        "a world force at a body point": (
+            ("world@tip", force_world, (0.0, 0.0, 0.0)),
+            lambda R: (force_world, np.cross(arm, R.T @ force_world)),
+        ),
+        "a body force at a body point": (
+            ("body@tip", force_body, (0.0, 0.0, 0.0)),
+            lambda R: (R @ force_body, np.cross(arm, force_body)),
+        ),
+    }
+    computed, expected = {}, {}
+    for name, ((frame, force, torque), load) in loads.items():
+        computed[name] = flown(scene, (0, frame, force, torque, True), seconds=seconds)
+        expected[name] = aligned(reference(scene, load, seconds), computed[name])
+        assert relative_difference(computed[name], expected[name]) <= 1e-10, name
+    names = list(loads)
+    for one, other in ((names[0], names[1]), (names[1], names[2]), (names[0], names[2])):
+        apart, should_be = computed[one] - computed[other], expected[one] - expected[other]
+        size = np.abs(should_be).max()
+        assert size > 0.05, (one, other)
+        assert np.abs(apart - should_be).max() <= 1e-9 * size, (one, other)

@@ -1,0 +1,486 @@
+# SPDX-License-Identifier: MIT
+"""What the node refuses, each with its reason, and that it flies on untouched: by message, by the group and by fuzz."""
+
+import math
+import random
+import struct
+import time
+
+import numpy as np
+import pytest
+from command_rig import COMMANDS, inertia_message, point_message, wrench_message
+
+from rigid_proto_ros.messages import cdr
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SECOND = 10**9
+HUGE = (1e15, 0.0, 0.0)
+NAN, INF = math.nan, math.inf
+DAY = 24 * 3600 * SECOND
+
+FRAMES = (
+    *(
+        "nowhere",
+        "world@nowhere",
+        "map@com",
+        "@com",
+        "world@",
+        "world@com@com",
+        "com@world",
+        "WORLD",
+        " world",
+        "world ",
+        "vertex",
+    ),
+    *("vertex/", "vertex/-1", "vertex/1.0", "vertex/99999999", "vertex/0/0", "vertex/٣", "point/1,2", "point/1,2,3,4"),
+    *(
+        "point/1, 2, 3",
+        "point/nan,0,0",
+        "point/0x1,0,0",
+        "point/1,2,three",
+        "ray/0,0,0",
+        "ray/0,0,0/0,0,0",
+        "ray/0,0,3/0,0,-1/0",
+    ),
+    *(
+        "normal",
+        "normal@com",
+        "world;duration",
+        "world;duration=0",
+        "world;duration=-1",
+        "world;duration=inf",
+        "world;duration=1e10",
+    ),
+    *(
+        "world;duration=0.1;duration=0.1",
+        "world;impulse;impulse",
+        "world;impulse;duration=0.1",
+        "world;impuls",
+        "world;",
+        ";",
+    ),
+    *(
+        "body/mesh",
+        "\x01",
+        "w" * 10_000,
+        "point/" + "1" * 10_000 + ",0,0",
+        "日本",
+        "tip/0",
+        "right@",
+        "world@tip;duration=1e-10",
+    ),
+)
+REFUSED = {
+    "frame": [
+        *(("poke", wrench_message(0, frame, (1e-3, 0.0, 0.0))) for frame in FRAMES),
+        *(
+            ("wrench", wrench_message(0, f, (1e-3, 0.0, 0.0)))
+            for f in ("nowhere", "tip;impulse", "tip;duration=0.1", "x" * 10_000)
+        ),
+        ("poke", wrench_message(0, "normal@tip", (1.0, 1.0, 0.0))),
+        ("poke", wrench_message(0, "normal@tip", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+        *(
+            ("string/target", point_message(0, frame, (0, 0, 0)))
+            for frame in ("body", "world@com", "map", "x" * 10_000)
+        ),
+        *(
+            ("string/attach", point_message(0, frame, (0, 0, 0)))
+            for frame in ("tip", "mesh", "world/mesh", "x" * 10_000)
+        ),
+        *(
+            ("inertia/set", inertia_message(0, f, 1, (0, 0, 0), (1, 0, 0, 1, 0, 1)))
+            for f in ("world", "mesh", "x" * 10_000)
+        ),
+    ],
+    "nonfinite": [
+        *(("poke", wrench_message(0, "tip", f)) for f in ((NAN, 0, 0), (0, INF, 0), (0, 0, -INF))),
+        ("wrench", wrench_message(0, "", (0, 0, 0), (NAN, 0, 0))),
+        ("poke", wrench_message(0, "ray/0,0,3/0,0,-1", (NAN, 0, 0))),
+        ("poke", wrench_message(0, "point/1e999,0,0", (1, 0, 0))),
+        ("string/target", point_message(0, "", (NAN, 0, 0))),
+        ("string/attach", point_message(0, "body", (0, INF, 0))),
+        ("inertia/set", inertia_message(0, "", NAN, (0, 0, 0), (1, 0, 0, 1, 0, 1))),
+        ("inertia/set", inertia_message(0, "body", 1, (0, INF, 0), (1, 0, 0, 1, 0, 1))),
+        ("inertia/set", inertia_message(0, "", 1, (0, 0, 0), (1, NAN, 0, 1, 0, 1))),
+    ],
+    "magnitude": [
+        *(("poke", wrench_message(0, f, HUGE)) for f in ("", "tip", "world@tip", "body;impulse", "normal@tip")),
+        *(("wrench", wrench_message(0, "", f)) for f in ((1e308, 0, 0), (-1e308, 1e308, 1e308))),
+        ("wrench", wrench_message(0, "", (0, 0, 0), (0, 1e12, 0))),
+        ("poke", wrench_message(0, "point/1e300,0,0", (1.0, 1.0, 0))),
+        ("string/target", point_message(0, "", (1e200, 0, 0))),
+        ("string/target", point_message(0, "", (1e60, 0, 0))),
+        ("string/attach", point_message(0, "body", (1e308, 0, 0))),
+    ],
+    "schedule": [
+        ("schedule", {"data": text})
+        for text in (
+            "{t: 0, set: {gyroscopic: !!bool x}}",
+            "{t: !!int '', set: {density: 2}}",
+            "{t: 0, set: {gravity: !!set {1, 2, 3}}}",
+            "{t: 0, set: {gravity: {1, 2, 3}}}",
+            "{t: 1, set: {gravity: [&a [1, 1, 1], &b [*a, *a, *a], [*b, *b, *b]]}}",
+            "{t: 1, set: &a {density: 2, <<: *a}}",
+            "{t: 0, set: {density: 2}, repeat: 1000000, every: 0.001}",
+            "{t: 0, wrench: {force: [0, 0, 1], duration: 700000}}",
+            "{t: 0, set: {record: somewhere.mcap}}",
+            "{t: 0, set: {mesh: '~nosuchuser/part.obj'}}",
+            "{t: 0, set: {mesh: " + 300 * "a" + "}}",
+            "{t: 2026-13-45, set: {density: 2}}",
+            "[]",
+        )
+    ],
+    "ray_miss": [
+        ("poke", wrench_message(0, "ray/10,10,10/1,0,0", (1e-3, 0, 0))),
+        ("wrench", wrench_message(0, "world@ray/0,0,3/0,0,1", (1e-3, 0, 0))),
+    ],
+    "tensor": [
+        *(("inertia/set", inertia_message(0, "", m, (0, 0, 0), (1, 0, 0, 1, 0, 1))) for m in (0.0, -1.0, 1e200)),
+        *(
+            ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 0), tensor))
+            for tensor in (
+                (1, 0, 0, 1, 0, 3),
+                (1, 0, 0, -1, 0, 1),
+                (0, 0, 0, 0, 0, 0),
+                (1, 5, 0, 1, 0, 1),
+                (1e-14, 0, 0, 1, 0, 1),
+            )
+        ),
+        ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 1e200), (1, 0, 0, 1, 0, 1))),
+    ],
+}
+
+
+def stamps_out_of_reach(horizon_s: int) -> list:
+    """Neither past, nor within the horizon, nor within a day of the system's clock."""
+    return [
+        ("poke", wrench_message((horizon_s + 60) * SECOND, "tip", (1e-3, 0, 0))),
+        ("wrench", wrench_message(1_000_000 * SECOND, "tip", (1e-3, 0, 0))),
+        ("string/target", point_message(2_147_483_647 * SECOND, "", (0, 0, 0))),
+        ("string/attach", point_message(100_000_000 * SECOND, "body", (0, 0, 0))),
+        ("inertia/set", inertia_message(100_000_000 * SECOND, "", 1, (0, 0, 0), (1, 0, 0, 1, 0, 1))),
+        ("schedule", {"data": "{t: 1e8, service: clear_wrench}"}),
+    ]
+
+
+@pytest.mark.parametrize("reason", [*REFUSED, "stamp"])
+def test_everything_of_a_kind_is_refused_with_its_reason_and_counted_and_the_body_flies_on(rig, reason):
+    commands = REFUSED.get(reason) or stamps_out_of_reach(3600)
+    before = rig.counters()
+    for topic in COMMANDS:
+        messages = [message for t, message in commands if t == topic]
+        if messages:
+            rig.publish(topic, *messages)
+    gained = rig.gained(before)
+    assert gained == {"refused_total": len(commands), f"refused_{reason}": len(commands)}
+    report = rig.diagnostics()
+    assert report["state"] == "flying"
+    assert not rig.heard("applied")
+    # Torque-free all the while: not one of them has touched it.
+    assert float(report["angular_momentum_drift"]) < 1e-9
+
+
+def test_after_one_refusal_of_each_kind_the_flight_is_that_without_any_command_to_the_bit(rig):
+    rig.start_over(paused=True)
+    for commands in (*REFUSED.values(), stamps_out_of_reach(3600)):
+        rig.publish(*commands[0])
+    rig.schedule("{t: 1", "5", "{t: 1, set: {masse: 1}}", "{t: 1, set: {mass: -1}}", "{t: 1, push: 1}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    simulation = Simulation(make_scenario(rig.scene).setup)
+    for k in range(1, 101):
+        time_ns = k * SECOND // 100
+        pose = rig.state_at(time_ns)[0]["pose"] if k in (1, 50, 100) else None
+        row = simulation.advance(time_ns).row.tolist()
+        assert pose is None or [*pose["position"].values(), *pose["orientation"].values()] == row[:7]
+
+
+def test_refusals_are_warned_of_at_most_once_a_second(rig):
+    log = rig.node_process.log
+    warned = log.read_text().count("refused:")
+    start = time.monotonic()
+    rig.do("repeat", topic=rig.name("wrench"), content=wrench_message(0, "mars"), count=300, rate=100.0)
+    rig.sent += 300
+    rig.until_received(rig.sent)
+    elapsed_s = time.monotonic() - start
+    # One at once, then one for each full second that has passed: however slow the machine, never more.
+    assert 2 <= log.read_text().count("refused:") - warned <= 1 + elapsed_s
+
+
+def test_what_is_refused_when_it_is_to_act_is_warned_of_too(rig):
+    log = rig.node_process.log
+    rig.pause(True)
+    rig.publish("poke", wrench_message(0, "world@ray/5,5,5/1,0,0", (1e-3, 0.0, 0.0)))
+    rig.until_received(rig.sent)
+    warned = log.read_text().count("refused: ray")
+    rig.pause(False)
+    rig.until(lambda: log.read_text().count("refused: ") > warned and "5.0,5.0,5.0" in log.read_text(), "a warning")
+
+
+def test_a_change_that_the_integrator_cant_carry_is_refused_and_counted_naming_those_that_can(rig):
+    rig.start_over(paused=False)
+    ((accepted, reason),) = rig.set(integrator="free_body")
+    assert accepted, reason
+    before = rig.counters()
+    ((accepted, reason),) = rig.set(gyroscopic=False)
+    assert not accepted
+    assert "rk4" in reason
+    rig.publish("wrench", wrench_message(0, "world@tip", (1e-3, 0, 0)))
+    gained = rig.gained(before)
+    assert gained == {"refused_total": 2, "refused_integrator": 2}
+    assert rig.get("gyroscopic") == {"gyroscopic": True}
+    rig.publish("poke", wrench_message(0, "world@tip;impulse", (1e-5, 0, 0)))
+    rig.wait_event("poke")
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"mass": -1.0}, "mass"),
+        ({"mass": "heavy"}, "mass"),
+        ({"mass": NAN}, "mass"),
+        ({"mass": 1e308}, "mass"),
+        ({"density": 0.0}, "density"),
+        ({"scale": [1.0, 2.0]}, "scale"),
+        ({"scale": [0.0, 1.0, 1.0]}, "scale"),
+        ({"scale": [1e10]}, "scale"),
+        ({"scale": [NAN, 1.0, 1.0]}, "scale"),
+        ({"gravity": [0.0, 0.0]}, "gravity"),
+        ({"gravity": [0.0, 0.0, INF]}, "gravity"),
+        ({"gravity": "[0, 0, down]"}, "gravity"),
+        ({"integrator": "magic"}, "integrator"),
+        ({"inertia_model": "round"}, "inertia_model"),
+        ({"mesh": "no_such_body"}, "no_such_body"),
+        ({"mesh": ""}, "mesh"),
+        ({"explicit_inertia.tensor": [1.0] * 5}, "explicit_inertia.tensor"),
+        ({"inertia_model": "explicit", "explicit_inertia.tensor": [1.0, 0, 0, 1.0, 0, 3.0]}, "tensor"),
+        ({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 0.0]}, "orientation"),
+        ({"step": 0.0}, "step"),
+        ({"publish_rate": 0.0}, "publish_rate"),
+        ({"real_time_factor": -1.0}, "real_time_factor"),
+        ({"ballast.nut": [-1e9, 0.0, 0.0, 0.0]}, "mass"),
+        ({"ballast.nut": [1.0, 0.0, 0.0]}, "ballast.nut"),
+        ({"ballast.Nut": [1.0, 0.0, 0.0, 0.0]}, "ballast.Nut"),
+        ({"gyroscopic": 1}, "gyroscopic"),
+        ({"masss": 1.0}, "did you mean mass"),
+        ({"world_frame": "map"}, "world_frame"),
+        ({"contacts.tip": [0.0, 0.0, 0.0]}, "contacts.tip"),
+        ({"rerun_port": 9999}, "rerun_port"),
+        ({"use_sim_time": True}, "use_sim_time"),
+        ({"string.attached": True, "ghost.integrator": "free_body"}, "ghost.integrator"),
+    ],
+    ids=str,
+)
+def test_a_refused_parameter_says_why_and_leaves_the_old_value_in_force(rig, values, named):
+    known = [name for name in values if name in rig.names()]
+    before = rig.get(*known)
+    ((accepted, reason),) = rig.set_named(values, atomically=True)
+    assert not accepted
+    assert named in reason
+    assert "\n" not in reason
+    assert rig.get(*known) == before
+
+
+def test_several_set_atomically_are_judged_together_and_refused_together(rig):
+    before = rig.get("mass", "step", "linear_damping")
+    ((accepted, reason),) = rig.set(mass=2.0, step=0.002, linear_damping=-1.0, atomically=True)
+    assert not accepted
+    assert "linear_damping" in reason
+    assert rig.get(*before) == before
+    # One by one, each is judged by itself.
+    results = rig.set(mass=2.0, step=0.002, linear_damping=-1.0)
+    assert [accepted for accepted, _ in results] == [True, True, False]
+    assert rig.get(*before) == {"mass": 2.0, "step": 0.002, "linear_damping": before["linear_damping"]}
+    # Together they are fine, alone neither would be.
+    assert rig.set(mesh="", inertia_model="explicit", atomically=True)[0][0]
+    assert not rig.set(inertia_model="solid")[0][0]
+    assert rig.set(mesh="t_handle", inertia_model="solid", atomically=True)[0][0]
+
+
+# Fuzz: every message is made so that it has to be refused, or can do no harm.
+
+
+def random_number(numbers: random.Random) -> float:
+    return numbers.choice(
+        (
+            0.0,
+            -0.0,
+            NAN,
+            INF,
+            -INF,
+            1e308,
+            -1e308,
+            5e-324,
+            1e-310,
+            numbers.uniform(-1, 1),
+            10.0 ** numbers.uniform(-300, 300),
+        )
+    )
+
+
+def random_vector(numbers: random.Random) -> list[float]:
+    return [random_number(numbers) for _ in range(3)]
+
+
+def random_frame(numbers: random.Random) -> str:
+    pieces = (
+        "world",
+        "body",
+        "normal",
+        "@",
+        "com",
+        "origin",
+        "vertex/",
+        "point/",
+        "ray/",
+        ";",
+        "duration=",
+        "impulse",
+        "tip",
+        "/mesh",
+    )
+    pieces = (*pieces, ",", "/", "0", "1e308", "-1", "nan", "1e-3", " ", "é", "\x7f", "rigid_body", "99999999999")
+    kind = numbers.randrange(6)
+    if kind == 0:
+        return numbers.choice(FRAMES)
+    if kind == 1:
+        return "".join(numbers.choice(pieces) for _ in range(numbers.randrange(1, 12)))
+    if kind == 2:
+        return "".join(chr(numbers.randrange(1, 0xD7FF)) for _ in range(numbers.randrange(40)))
+    if kind == 3:
+        return numbers.choice("ab/@;") * 10_000
+    if kind == 4:
+        return ""
+    triple = ",".join(repr(random_number(numbers)) for _ in range(3))
+    return f"{numbers.choice(('world', 'body', 'normal'))}@point/{triple}"
+
+
+def random_stamp(numbers: random.Random) -> tuple[int, int]:
+    sec = numbers.choice(
+        (0, 0, 1, -1, -(2**31), 2**31 - 1, 3600, 10_000, 1_700_000_000, numbers.randrange(-(2**31), 2**31))
+    )
+    return sec, numbers.choice((0, 999_999_999, 1_000_000_000, 2**32 - 1))
+
+
+def header(numbers: random.Random) -> bytes:
+    frame = random_frame(numbers).encode()
+    if numbers.random() < 0.05:
+        frame = bytes(numbers.randrange(1, 256) for _ in range(12))
+    frame += b"\0"
+    return struct.pack(f"<iII{len(frame)}s", *random_stamp(numbers), len(frame), frame)
+
+
+def random_message(numbers: random.Random, topic: str) -> bytes:
+    """A serialized message of the topic's type: extreme values, odd frames and stamps, or bytes that are none at all."""
+    if numbers.random() < 0.1:
+        return cdr._HEADER + bytes(numbers.randrange(256) for _ in range(numbers.randrange(0, 100)))
+    if topic == "schedule":
+        texts = (
+            "{t: 0",
+            "t: {t: {t: 0}}",
+            "[]",
+            "{t: .inf, set: {mass: 1}}",
+            "&a [*a]",
+            "? ",
+            "{t: 1, set: {mass: .nan}}",
+            "\x00x",
+            "- - - -",
+            "{t: 0, set: {gyroscopic: !!bool x}}",
+            "{t: !!timestamp abc}",
+            "{t: 0, set: {gravity: !!set {1, 2, 3}}}",
+        )
+        text = numbers.choice(
+            (*texts, random_frame(numbers), "{" * 2000, "t: 0\nset: {scale: [0, 0, 0]}", "{t: -1, service: reset}")
+        )
+        return cdr.string(text)
+    count = {"wrench": 6, "poke": 6, "inertia/set": 10}.get(topic, 3)
+    doubles = [random_number(numbers) for _ in range(count)]
+    # At least one that isn't finite, so that none of them moves the body.
+    doubles[numbers.randrange(count)] = numbers.choice((NAN, INF, -INF))
+    body = header(numbers)
+    body += b"\0" * (-len(body) % 8) + struct.pack(f"<{count}d", *doubles)
+    if numbers.random() < 0.1:
+        body = body[: numbers.randrange(len(body))]
+    return cdr._HEADER + body
+
+
+def random_values(numbers: random.Random, names: list[str]) -> dict:
+    """Parameters that must be refused: wrong type, wrong length, not finite, out of bounds, unknown."""
+    values = {}
+    for name in numbers.sample(names, numbers.randrange(1, 4)):
+        values[name] = numbers.choice(
+            (
+                NAN,
+                INF,
+                -INF,
+                -1e308,
+                "",
+                "nonsense" * 100,
+                [NAN] * 3,
+                [1.0] * 7,
+                [],
+                [True],
+                ["a", "b"],
+                [1e308] * 3,
+                "{}",
+            )
+        )
+    values["no_such_parameter"] = 1.0
+    return values
+
+
+def fuzz(rig, count: int, seed: int) -> dict:
+    """``count`` messages and sets, an equal share of each; what the counters rose by."""
+    numbers = random.Random(seed)
+    kinds = [*COMMANDS, "parameters"]
+    names = [n for n in rig.names() if not n.startswith(("qos", "use_sim", "start_type"))]
+    before = rig.counters()
+    messages: dict[str, list[str]] = {topic: [] for topic in COMMANDS}
+    refused_sets = 0
+    for k in range(count):
+        kind = kinds[k % len(kinds)]
+        if kind == "parameters":
+            ((accepted, reason),) = rig.set_named(random_values(numbers, names), atomically=True)
+            refused_sets += not accepted and bool(reason)
+        else:
+            messages[kind].append(random_message(numbers, kind).hex())
+    sent = 0
+    for topic, payloads in messages.items():
+        for start in range(0, len(payloads), 200):
+            rig.do("publish_bytes", topic=rig.name(topic), messages=payloads[start : start + 200])
+            sent += len(payloads[start : start + 200])
+            rig.sent += len(payloads[start : start + 200])
+            rig.until_received(rig.sent)
+    assert refused_sets == sum(kinds[k % len(kinds)] == "parameters" for k in range(count))
+    gained = rig.gained(before)
+    assert gained["refused_total"] == sum(
+        v for k, v in gained.items() if k.startswith("refused_") and k != "refused_total"
+    )
+    assert gained["refused_total"] == sent
+    return gained
+
+
+def flies_untouched(rig) -> None:
+    report = rig.diagnostics()
+    assert report["state"] == "flying"
+    assert float(report["angular_momentum_drift"]) < 1e-8
+    energy = float(report["kinetic_energy"])
+    assert energy == pytest.approx(Simulation(make_scenario(rig.scene).setup).kinetic_energy, rel=1e-8)
+    assert not rig.heard("applied")
+    # And it still obeys.
+    rig.publish("poke", wrench_message(0, "world@tip", (1e-3, 0, 0)))
+    rig.wait_event("poke")
+    assert np.isfinite(list(rig.heard("pose", last=1)[0]["pose"]["position"].values())).all()
+
+
+def test_three_hundred_malformed_messages_and_parameter_sets_leave_the_node_flying(rig):
+    fuzz(rig, 300, 1)
+    flies_untouched(rig)
+
+
+@pytest.mark.stress
+def test_ten_thousand_malformed_messages_and_parameter_sets_leave_the_node_flying(rig):
+    gained = fuzz(rig, 10_000, 2)
+    assert {"refused_frame", "refused_nonfinite", "refused_schedule"} <= gained.keys()
+    flies_untouched(rig)

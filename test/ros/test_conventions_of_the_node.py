@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: MIT
+"""What ROS users expect of any node: names, types, QoS, descriptors, namespaces, several at once."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import yaml
+from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
+from conftest import held_domain
+from ros_process import running_node
+
+from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
+
+PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs", "Imu": "sensor_msgs"}
+KEYS = (
+    *(
+        "sim_time_ns",
+        "publish_rate",
+        "overruns",
+        "real_time_lost_s",
+        "wrench_received",
+        "poke_received",
+        "string_received",
+    ),
+    *(
+        "inertia_received",
+        "commands_received",
+        "refused_total",
+        "refused_frame",
+        "refused_nonfinite",
+        "refused_magnitude",
+    ),
+    *(
+        "refused_stamp",
+        "refused_ray_miss",
+        "refused_tensor",
+        "refused_integrator",
+        "refused_schedule",
+        "late",
+        "wall_stamp",
+    ),
+    *(
+        "sequence_gaps",
+        "queue_full",
+        "kinetic_energy",
+        "potential_energy",
+        "angular_momentum_norm",
+        "angular_momentum_drift",
+    ),
+    *("integrator", "state", "recording"),
+)
+
+
+def test_all_topics_have_their_private_names_and_standard_types(rig):
+    topics = dict(rig.do("topics"))
+    for name, kind in TYPES.items():
+        package = PACKAGES.get(kind, "geometry_msgs")
+        assert topics[f"/rigid_body/{name}"] == [f"{package}/msg/{kind}"]
+    services = dict(rig.do("services"))
+    for name in ("reset", "step", "clear_wrench", "string/release"):
+        assert services[f"/rigid_body/{name}"] == ["std_srvs/srv/Trigger"]
+    assert services["/rigid_body/pause"] == ["std_srvs/srv/SetBool"]
+
+
+def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
+    for name in TYPES:
+        side = "sub" if name in COMMANDS else "pub"
+        (own,) = [e for e in rig.do("endpoints", topic=rig.name(name)) if e[0] == side and e[1] == "/rigid_body"]
+        assert own[2:] == ["RELIABLE", "TRANSIENT_LOCAL" if name in LATCHED else "VOLATILE"]
+
+
+def test_every_parameter_has_a_descriptor_with_description_bounds_and_read_only_mark(rig):
+    names = list(PARAMETERS)
+    answer = rig.do(
+        "call", service=rig.name("describe_parameters"), type="DescribeParameters", request={"names": names}
+    )
+    for descriptor in answer["descriptors"]:
+        declared = PARAMETERS[descriptor["name"]]
+        assert declared.description in descriptor["description"]
+        assert descriptor["read_only"] == (declared.changes == READ_ONLY)
+        if declared.type == "double" and declared.upper < float("inf"):
+            (bounds,) = descriptor["floating_point_range"]
+            assert (bounds["from_value"], bounds["to_value"]) == (declared.lower, declared.upper)
+
+
+def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal(rig):
+    report = rig.diagnostics()
+    assert report["name"] == "/rigid_body: simulation"
+    assert set(KEYS) <= report.keys()
+    kinds = ("wrench", "poke", "string", "inertia", "schedule")
+    assert int(report["commands_received"]) == sum(int(report[f"{kind}_received"]) for kind in kinds) == rig.sent
+    before = rig.heard_count("/diagnostics")
+    rig.publish("poke", wrench_message(0, "nowhere", (1.0, 0, 0)))
+    rig.until_received(rig.sent)
+    rig.until(lambda: rig.heard_count("/diagnostics") >= before + 3, "reports")
+    reports = rig.all_diagnostics(last=rig.heard_count("/diagnostics") - before)
+    counts = [int(r["refused_total"]) for r in reports]
+    told = [k for k in range(1, len(counts)) if counts[k] > counts[k - 1]] or [0]
+    assert reports[told[0]]["level"] == 1
+    # The counter stays, the warning goes unless the machine itself was late.
+    assert counts == sorted(counts)
+    for earlier, later in zip(reports[told[0] :], reports[told[0] + 1 :], strict=False):
+        if all(earlier[k] == later[k] for k in ("overruns", "real_time_lost_s", "refused_total")):
+            assert later["level"] == 0
+
+
+def dumped(rig, folder) -> Path:
+    """As ros2 param dump writes it: all parameters of the list and get services, dots as levels, under the node's name."""
+    tree: dict = {}
+    for name, value in rig.get(*rig.names()).items():
+        node = tree
+        *levels, last = name.split(".")
+        for level in levels:
+            node = node.setdefault(level, {})
+        node[last] = value
+    path = folder / "dump.yaml"
+    path.write_text(yaml.dump({"/rigid_body": {"ros__parameters": tree}}, default_flow_style=False))
+    return path
+
+
+def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, tmp_path):
+    changes = {"mass": 1.5, "ballast.nut": [0.1, 0.0, 0.0, 0.07], "gravity": [0.0, 0.0, -1.0], "string.stiffness": 7.0}
+    rig.set_named(changes, atomically=True)
+
+    def told() -> str:
+        """The scene, once it has the changes."""
+        text = rig.heard("scene", last=1)[0]["data"]
+        return text if changes.items() <= read_scene_text(text).values.items() else ""
+
+    scene = rig.until(told, "the scene")
+    dump = dumped(rig, tmp_path)
+    # Read without ROS it is that scene too.
+    first = make_scenario(read_scene_text(scene).values)
+    again = make_scenario({n: v for n, v in read_scene_file(dump).values.items() if not is_ros_parameter(n)})
+    assert first.values == again.values == make_scenario({**rig.scene, **first.values}).values
+    with held_domain() as domain:
+        environment = {**rig.environment, "ROS_DOMAIN_ID": str(domain)}
+        second = NodeProcess(environment, tmp_path / "second.log", {}, "--params-file", str(dump))
+        client = RosClient(environment)
+        try:
+            client.listen("scene")
+            heard = client.until(lambda: client.heard("scene"), "the second node's scene")
+            assert heard[-1]["data"] == scene
+        finally:
+            client.close()
+            assert second.stop() == 0
+
+
+def test_a_loaded_file_acts_at_once_in_whatever_order_it_names_its_parameters(rig):
+    """What ros2 param load sends: one set_parameters request with all of a file, a node's own dump in this case."""
+    own = rig.get(*rig.names())
+    own["gravity"] = [0.0, 0.0, -1.0]
+    assert {tuple(result) for result in rig.set_named(own)} == {(True, "")}
+    (event,) = rig.wait_event("set")
+    assert event["content"]["gravity"] == [0.0, 0.0, -1.0]
+    assert rig.set_named({"mesh": "", "inertia_model": "explicit"}) == [[True, ""]] * 2
+    # Alone the first can't be; with one that is no parameter at all they can't be set at once either.
+    results = rig.set_named({"inertia_model": "solid", "masss": 1.0, "mesh": "t_handle", "viewer": "web"})
+    assert [accepted for accepted, _ in results] == [True, False, True, False]
+    assert "did you mean mass" in results[1][1]
+    assert "viewer" in results[3][1]
+    assert rig.get("inertia_model", "mesh") == {"inertia_model": "solid", "mesh": "t_handle"}
+
+
+def test_what_ros_itself_declares_is_refused_together_with_ours_or_not_at_all(rig):
+    before = rig.get("linear_damping", "use_sim_time")
+    for name, value in (("use_sim_time", 3), ("start_type_description_service", False), ("qos_overrides.none", 1)):
+        ((accepted, reason),) = rig.set_named({"linear_damping": 0.5, name: value}, atomically=True)
+        assert not accepted
+        assert name in reason
+    assert rig.get(*before) == before
+
+
+def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_environment, tmp_path):
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        plain = NodeProcess(environment, tmp_path / "plain.log", {"mesh": "t_handle"})
+        other = NodeProcess(
+            environment,
+            tmp_path / "other.log",
+            {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3},
+            *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
+        )
+        one, two = RosClient(environment), RosClient(environment, "/lab/tool")
+        try:
+            for client in (one, two):
+                client.listen("pose", "odom", "events", "inertia")
+                client.watch_diagnostics()
+            two.do("advertise", topic="/lab/hit", type="WrenchStamped")
+            one.advertise("poke")
+            # The names of its own frames, beside the words for them.
+            for frame in ("tool@com", "map@com", "map", "tool", "world", "body@origin"):
+                two.publish("/lab/hit", wrench_message(0, f"{frame};impulse", (1.0, 0.0, 0.0)))
+            two.until(lambda: len(two.events()) == 6, "the pokes")
+            reports = two.diagnostics(), one.diagnostics()
+            assert [(r["poke_received"], r["refused_total"]) for r in reports] == [("6", "0"), ("0", "0")]
+            assert [r["name"] for r in reports] == ["/lab/tool: simulation", "/rigid_body: simulation"]
+            assert one.events() == []
+            odometry = two.heard("odom", last=1)[0]
+            assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
+            assert two.heard("inertia")[0]["header"]["frame_id"] == "tool/mesh"
+            # What a user overrides is of that topic alone.
+            depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
+            assert list(two.get(*depths).values()) == [3, 10]
+            assert one.heard("inertia")[0]["inertia"]["m"] != two.heard("inertia")[0]["inertia"]["m"]
+            two.trigger("reset")
+            two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")
+            assert one.events() == []
+        finally:
+            one.close()
+            two.close()
+            assert (plain.stop(), other.stop()) == (0, 0)
+
+
+def test_a_second_node_of_the_same_name_is_warned_of_by_both(ros_environment, tmp_path):
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        nodes = [NodeProcess(environment, tmp_path / f"{k}.log", {"mesh": "t_handle"}) for k in (1, 2)]
+        said = "another node publishes /rigid_body/pose"
+        try:
+            with RosClient(environment) as client:
+                client.until(lambda: all(node.log.read_text().count(said) == 1 for node in nodes), "a warning of each")
+        finally:
+            assert [node.stop() for node in nodes] == [0, 0]
+
+
+def test_what_the_command_line_gives_is_for_all_bodies_and_comes_after_their_files(ros_environment, tmp_path):
+    arguments = ("--bodies", "hammer", "book", "--ros-args", "-p", "publish_rate:=40.0")
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        with running_node(*arguments, environment=environment, log=tmp_path / "bodies"):
+            for node in ("/hammer", "/book"):
+                with RosClient(environment, node) as client:
+                    assert client.get("publish_rate", "mesh") == {"publish_rate": 40.0, "mesh": node.strip("/")}
+
+
+TWO_IN_ONE = """
+import rclpy
+from rigid_proto_ros.ros.node import RigidBodyNode
+from rigid_proto_ros.ros.parameter_server import given_parameters
+from rigid_proto_ros.ros.physics_thread import PhysicsThread
+from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.motion.frames import parse_frame
+import time
+
+rclpy.init()
+nodes = [RigidBodyNode(node_name=n, parameter_overrides=given_parameters(v)) for n, v in (
+    ("one", {"mesh": "t_handle", "contacts.tip": [0.0, 0.0, 0.07]}), ("two", {"mesh": "hammer"}))]
+thread = PhysicsThread([node.flight for node in nodes])
+for node in nodes:
+    node.thread = thread
+thread.start()
+frame = "world@tip;impulse"
+command = WrenchCommand(False, parse_frame(frame, {"tip"}), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, frame, b"")
+nodes[0].call(lambda: nodes[0].flight.simulation.submit(command))
+while nodes[0].flight.simulation.events.count == 0 or nodes[1].flight.simulation.time_ns == 0:
+    time.sleep(0.01)
+thread.stop()
+print(nodes[0].flight.simulation.events.count, nodes[1].flight.simulation.events.count)
+print(nodes[0].flight.simulation.state.linear_velocity[0] > 0, nodes[1].flight.simulation.state.linear_velocity.any())
+print([n.get_fully_qualified_name() for n in nodes])
+"""
+
+
+def test_two_nodes_in_one_process_have_nothing_in_common(ros_environment):
+    done = subprocess.run(
+        [sys.executable, "-c", TWO_IN_ONE], env=ros_environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.stdout.splitlines()[-3:] == ["1 0", "True False", "['/one', '/two']"], done.stderr
+
+
+def test_depth_and_reliability_of_each_topic_are_parameters_like_others(rig):
+    depths = {"wrench.subscription": 5000, "schedule.subscription": 5000, "pose.publisher": 10, "odom.publisher": 10}
+    depths |= {"inertia.publisher": 1, "scene.publisher": 1}
+    for topic, depth in depths.items():
+        own = f"qos_overrides./rigid_body/{topic}"
+        assert list(rig.get(f"{own}.depth", f"{own}.reliability").values()) == [depth, "reliable"]

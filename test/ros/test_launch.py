@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""The launch file: its arguments are described and used; where launch is installed, the description is built."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+import rigid_proto_ros
+from rigid_proto_ros.ros.poke_client import main as poke_client
+from rigid_proto_ros.scene.parameters import PARAMETERS
+
+SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
+FILE = SOURCE / "launch" / "rigid_body.launch.py"
+pytestmark = pytest.mark.skipif(not FILE.is_file(), reason="not run from a source tree")
+
+# From ROS; the launch folder of this repository can't be taken for it, because it has no launch_ros beside it.
+LAUNCH_INSTALLED = importlib.util.find_spec("launch_ros") is not None
+
+
+@pytest.fixture(scope="module")
+def tree() -> ast.Module:
+    return ast.parse(FILE.read_text("utf-8"))
+
+
+def declared(tree: ast.Module) -> dict[str, tuple[str, str]]:
+    """Default and description by argument."""
+    (table,) = (node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "ARGUMENTS")
+    return {name: (default, description) for name, default, description in ast.literal_eval(table)}
+
+
+def test_defines_what_ros2_launch_calls(tree: ast.Module) -> None:
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert not functions["generate_launch_description"].args.args
+
+
+def test_imports_nothing_but_launch_and_this_package(tree: ast.Module) -> None:
+    modules = {
+        name.split(".")[0]
+        for node in ast.walk(tree)
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+    assert modules == {"launch", "launch_ros", "rigid_proto_ros"}
+
+
+def test_every_argument_is_described_and_used(tree: ast.Module) -> None:
+    arguments = declared(tree)
+    used = {
+        node.value
+        for function in tree.body
+        if isinstance(function, ast.FunctionDef)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
+    for name, (default, description) in arguments.items():
+        assert isinstance(default, str)
+        assert len(description) > 10
+        assert name in used, f"{name} is declared and not used"
+
+
+def test_arguments_that_become_parameters_are_parameters_with_accepted_defaults(tree: ast.Module) -> None:
+    arguments = declared(tree)
+    for name in ("mesh", "viewer", "record"):
+        PARAMETERS[name].convert(arguments[name][0])
+
+
+def test_package_declares_launch() -> None:
+    assert "<exec_depend>launch_ros</exec_depend>" in (SOURCE / "package.xml").read_text("utf-8")
+
+
+def test_client_accepts_the_options_that_the_launch_file_gives_it(tree: ast.Module, capsys) -> None:
+    text = FILE.read_text("utf-8")
+    for option in ("--node", "--timeout", "--reset"):
+        assert f'"{option}"' in text
+    script = SOURCE / "msg_examples" / "flip_and_poke.yaml"
+    assert poke_client([str(script), "--node", "/a/b", "--timeout", "60", "--reset", "--dry-run"]) == 0
+    assert "poke" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not LAUNCH_INSTALLED, reason="launch_ros comes with a ROS installation, not with the wheels")
+@pytest.mark.parametrize("values", [{}, {"script": "flip_and_poke", "name": "nut", "namespace": "lab"}])
+def test_description_gives_the_node_and_where_asked_the_client(values: dict) -> None:
+    from launch import LaunchContext
+
+    spec = importlib.util.spec_from_file_location("rigid_body_launch", FILE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    description = module.generate_launch_description()
+    context = LaunchContext()
+    context.launch_configurations.update({name: default for name, default, _ in module.ARGUMENTS})
+    context.launch_configurations.update(values)
+    actions = module.nodes(context)
+    assert len(description.entities) == len(module.ARGUMENTS) + 1
+    assert len(actions) == (2 if values else 1)

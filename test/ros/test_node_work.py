@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""What a scene doesn't need isn't done: counted, not timed."""
+
+from __future__ import annotations
+
+import functools
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ros_process import from_source
+
+WORK = Path(__file__).parents[1] / "node_work.py"
+
+
+@pytest.fixture(scope="module")
+def counted(ros_environment):
+    @functools.cache
+    def run(scenario: str) -> dict:
+        done = subprocess.run(
+            [sys.executable, str(WORK), scenario],
+            env=from_source(ros_environment),
+            capture_output=True,
+            text=True,
+            timeout=180,
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout.splitlines()[-1])
+
+    return run
+
+
+def test_without_subscribers_nothing_is_published_and_the_body_still_flies(counted):
+    work = counted("alone")
+    assert set(work["publications"].values()) == {0}
+    assert work["simulated_ns"] > 0.8e9
+    # A free body crosses the time between two looks in one exact step: none is taken per publication period of 2 ms.
+    assert work["steps"] <= 1
+    assert work["message_objects"] == {}
+
+
+def test_neither_rerun_nor_trimesh_is_imported_for_a_bundled_mesh_without_a_viewer(counted):
+    assert counted("alone")["imported"] == []
+
+
+def test_a_body_at_rest_takes_no_step(counted):
+    work = counted("at_rest")
+    assert work["steps"] == 0
+    assert work["simulated_ns"] > 0.8e9
+    assert set(work["publications"].values()) == {0}
+
+
+def test_the_steady_state_makes_no_message_objects(counted):
+    work = counted("listened_to")
+    published = work["publications"]
+    # Odometry is subscribed too, the IMU is not.
+    for topic in ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom"):
+        # One a period of 2 ms; the ends of the counted time cut one off.
+        assert published[topic] == pytest.approx(work["simulated_ns"] / 2e6, abs=2), published
+    assert published["/rigid_body/imu"] == 0
+    assert work["wrenches"] >= 30
+    assert work["message_objects"] == {}
+
+
+def test_a_robot_description_is_made_for_subscribers_alone_and_the_first_that_one_gets_is_the_present_one(counted):
+    work = counted("described")
+    assert work["masses"] == [[2.0, 3.0], [11.0, 12.0], [101.0, 102.0]]
+    assert work["calls"] == [1, 2, 3, 4, 5, 6]
+
+
+@pytest.mark.stress
+def test_a_page_that_came_and_went_leaves_as_many_publish_calls_as_before(ros_environment):
+    run = [sys.executable, str(WORK.with_name("page_work.py"))]
+    done = subprocess.run(run, env=from_source(ros_environment), capture_output=True, text=True, timeout=180)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+
+    def calls_a_period(when: str) -> dict[str, float]:
+        """By topic; a publication period is 2 ms of simulated time."""
+        return {t: n / (found[when]["simulated_ns"] / 2e6) for t, n in found[when]["publications"].items()}
+
+    before, during, after = (calls_a_period(when) for when in ("before", "open", "after"))
+    # The ends of the counted time cut a call or two off.
+    assert before == {"/rigid_body/pose": pytest.approx(1.0, abs=0.02)}
+    assert after == {"/rigid_body/pose": pytest.approx(1.0, abs=0.02)}
+    assert during["/rigid_body/twist"] == pytest.approx(1.0, abs=0.02)
+    assert "/diagnostics" in during

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: MIT
+"""poke_client: every entry of a script, sent by the real client to a real node, and what it says of what went wrong."""
+
+import subprocess
+import threading
+
+import numpy as np
+import pytest
+from command_rig import stamp_ns
+from ros_process import READY_S, command, from_source, run
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.rotation import rotate
+from rigid_proto_ros.ros.poke_client import main as poke_client
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.script import parse_script
+
+SECOND = 10**9
+EVERY_ENTRY = """
+- {t: 0.1, at: tip, push: 0.05}
+- {t: 0.2, at: {vertex: 7}, force: [0.02, 0.0, 0.0], duration: 0.3}
+- {t: 0.3, at: left, force: [0.0, 0.0, 0.02], torque: [0.0, 1.0e-5, 0.0], axes: body}
+- {t: 0.4, at: {point: [0.0, 0.0, 0.07]}, impulse: [0.001, 0.0, 0.0], angular_impulse: [0.0, 0.0, 1.0e-6]}
+- {t: 0.5, at: {ray: {origin: [0.0, 0.0, 1.0], direction: [0.0, 0.0, -1.0]}}, force: [0.0, 0.0, -0.02]}
+- {t: 0.6, at: origin, torque: [0.0, 0.0, 1.0e-4], duration: 0.2}
+- {t: 0.7, angular_impulse: [0.0, 0.0, 1.0e-6]}
+- {t: 0.8, wrench: {at: tip, force: [0.0, 0.01, 0.0], duration: 1.2}}
+- {t: 2.1, wrench: {at: left, push: 0.01}}
+- {t: 2.5, string: {attach: tip, target: [0.0, 0.0, 0.1]}}
+- {t: 2.7, string: {target: [0.0, 0.05, 0.1]}}
+- {t: 2.8, string: release}
+- {t: 2.9, at: {point: [0.0, 0.0, 0.07]}, impulse: [0.0, 0.0001, 0.0]}
+- {t: 2.9, set: {density: 9000.0, gravity: [0.0, 0.0, -0.1]}}
+- {t: 2.9, at: com, impulse: [0.0, 0.0001, 0.0]}
+- {t: 3.0, service: clear_wrench}
+- {t: 3.1, at: com, impulse: [0.0001, 0.0, 0.0], repeat: 5, every: 0.1, jitter: 0.05, seed: 7}
+"""
+SAID = """
+    0.100000 s  poke           normal@tip  force [0.05, 0.0, 0.0]  torque [0.0, 0.0, 0.0]
+    0.200000 s  poke           world@vertex/7;duration=0.3  force [0.02, 0.0, 0.0]  torque [0.0, 0.0, 0.0]
+    0.300000 s  poke           body@left  force [0.0, 0.0, 0.02]  torque [0.0, 1e-05, 0.0]
+    0.400000 s  poke           world@point/0.0,0.0,0.07;impulse  force [0.001, 0.0, 0.0]  torque [0.0, 0.0, 1e-06]
+    0.500000 s  poke           world@ray/0.0,0.0,1.0/0.0,0.0,-1.0  force [0.0, 0.0, -0.02]  torque [0.0, 0.0, 0.0]
+    0.600000 s  poke           world@origin;duration=0.2  force [0.0, 0.0, 0.0]  torque [0.0, 0.0, 0.0001]
+    0.700000 s  poke           world@com;impulse  force [0.0, 0.0, 0.0]  torque [0.0, 0.0, 1e-06]
+    0.800000 s  wrench         world@tip  force [0.0, 0.01, 0.0]  torque [0.0, 0.0, 0.0]
+    1.550000 s  wrench         world@tip  force [0.0, 0.01, 0.0]  torque [0.0, 0.0, 0.0]
+    2.000000 s  wrench         world@com  force [0.0, 0.0, 0.0]  torque [0.0, 0.0, 0.0]
+    2.100000 s  wrench         normal@left  force [0.01, 0.0, 0.0]  torque [0.0, 0.0, 0.0]
+    2.500000 s  string_attach  body/mesh  tip
+    2.500000 s  string_target  world  [0.0, 0.0, 0.1]
+    2.700000 s  string_target  world  [0.0, 0.05, 0.1]
+    2.800000 s  string_release
+    2.900000 s  poke           world@point/0.0,0.0,0.07;impulse  force [0.0, 0.0001, 0.0]  torque [0.0, 0.0, 0.0]
+    2.900000 s  set            {'density': 9000.0, 'gravity': [0.0, 0.0, -0.1]}
+    2.900000 s  poke           world@com;impulse  force [0.0, 0.0001, 0.0]  torque [0.0, 0.0, 0.0]
+    3.000000 s  clear_wrench
+"""
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "script.yaml"
+    path.write_text(EVERY_ENTRY)
+    return path
+
+
+def test_a_dry_run_prints_every_message_that_would_go_out_and_needs_no_node(script, capsys):
+    assert poke_client([str(script), "--dry-run"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:-5] == SAID.strip("\n").splitlines()
+    assert all(
+        line.endswith("poke           world@com;impulse  force [0.0001, 0.0, 0.0]  torque [0.0, 0.0, 0.0]")
+        for line in lines[-5:]
+    )
+
+
+def times(text: str) -> list[int]:
+    return [c.t_ns for c in parse_script(text)]
+
+
+def test_repeats_come_every_so_often_and_jitter_is_the_same_for_the_same_seed_within_its_bounds():
+    assert times("[{t: 1, impulse: [1, 0, 0], repeat: 3, every: 0.25}]") == [SECOND, 5 * SECOND // 4, 3 * SECOND // 2]
+    jittered = "[{t: 1, impulse: [1, 0, 0], repeat: 200, every: 1.0, jitter: 0.05, seed: %s}]"
+    first = times(jittered % 7)
+    assert first == times(jittered % 7) != times(jittered % 8)
+    shifts = np.array(first) - SECOND * np.arange(1, 201)
+    assert np.abs(shifts).max() <= SECOND // 20
+    # Uniform: both ends are reached, and 200 of them hardly ever share a nanosecond.
+    assert shifts.min() < -0.04 * SECOND and shifts.max() > 0.04 * SECOND and len(set(shifts)) > 190
+    # The whole script again, each round with a jitter of its own; never before 0.
+    whole = times("{script: [{t: 0, impulse: [1, 0, 0]}], repeat: 50, every: 0.1, jitter: 0.02, seed: 1}")
+    assert len(whole) == 50 and min(whole) >= 0
+    assert len({t % (SECOND // 10) for t in whole}) > 40
+    for wrong in ("repeat: 2", "repeat: 1.5, every: 1", "jitter: -1", "repeat: 0", "every: x"):
+        with pytest.raises(InputError):
+            times(f"[{{t: 1, impulse: [1, 0, 0], {wrong}}}]")
+
+
+def client(rig, *arguments, timeout: float = READY_S):
+    """The real poke_client, run to its end."""
+    return run("poke_client", *arguments, "--timeout", 120, environment=rig.environment, timeout=timeout)
+
+
+def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
+    """Held wrenches are repeated as the node's own timeout asks, 0.4 s here."""
+    rig.set(real_time_factor=4.0, wrench_timeout=0.4)
+    before = rig.counters()
+    # Nothing that was flown before may pass for the flight after the reset.
+    rig.start_over(paused=True)
+    done = client(rig, script, "--reset")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "0 late, 0 refused" in done.stdout
+    sent = parse_script(EVERY_ENTRY, wrench_timeout=0.4)
+    rig.sent += len(sent)
+    rig.state_at(4 * SECOND)
+    flown = make_scenario({**rig.scene, "wrench_timeout": 0.4})
+    offline = OfflineRun(flown, sent)
+    twists = {stamp_ns(m): m["twist"] for m in rig.heard("twist")}
+    checked = 0
+    for message in rig.heard("pose"):
+        time_ns = stamp_ns(message)
+        if not offline.simulation.time_ns < time_ns <= 4 * SECOND or time_ns not in twists:
+            continue
+        assert offline.advance(time_ns)
+        row = offline.simulation.state.row.tolist()
+        pose, twist = message["pose"], twists[time_ns]
+        assert [*pose["position"].values(), *pose["orientation"].values()] == row[:7], time_ns
+        assert [*twist["linear"].values(), *twist["angular"].values()] == [*row[7:10], *rotate(*row[3:7], *row[10:13])]
+        checked += 1
+    assert checked > 300
+    assert not offline.simulation.refused
+    gained = rig.gained(before, "commands_received")
+    assert gained == {"commands_received": len(sent)}
+
+
+@pytest.mark.parametrize(
+    ("values", "later_s"), [({"real_time_factor": 0.0}, 61), ({"real_time_factor": 8.0, "schedule_horizon": 5.0}, 12)]
+)
+def test_with_reset_all_within_the_horizon_is_there_before_time_goes_on_and_the_rest_waits(
+    rig, tmp_path, values, later_s
+):
+    path = tmp_path / "long.yaml"
+    path.write_text("".join(f"- {{t: {t}, impulse: [1.0e-6, 0, 0]}}\n" for t in (0, later_s)))
+    rig.set_named(values)
+    done = client(rig, path, "--reset")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "0 late, 0 refused" in done.stdout
+    rig.sent += 2
+
+
+def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_commands_come_from_the_line(rig, tmp_path):
+    rig.set(real_time_factor=4.0)
+    (tmp_path / "two.yaml").write_text("- {t: 0.1, impulse: [1.0e-6, 0, 0]}\n- {t: 0.35, impulse: [1.0e-6, 0, 0]}\n")
+    # While time stands still, so that none comes late; and at once: each is a process with a start-up of its own.
+    rig.start_over(paused=True)
+    start_ns = rig.now_ns()
+    arguments = (
+        (tmp_path / "two.yaml", "--lead", 1),
+        ("poke", "--at", "tip", "--push", 5, "--lead", 1),
+        ("wrench", "--force", 1, 0, 0, "--for", 2, "--lead", 1),
+    )
+    children = [
+        subprocess.Popen(
+            command("poke_client", *a, "--timeout", 120),
+            env=from_source(rig.environment),
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for a in arguments
+    ]
+    said = [child.communicate(timeout=READY_S)[0] for child in children]
+    assert [child.returncode for child in children] == [0, 0, 0], said
+    rig.sent += 2 + 1 + 4
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    pokes, wrenches = rig.wait_event("poke", 3), rig.wait_event("wrench", 4)
+    first, second = (e["time_ns"] for e in pokes if "impulse" in e["content"]["frame_id"])
+    assert (first - start_ns, second - first) == (SECOND * 11 // 10, SECOND // 4)
+    (push,) = (e["content"] for e in pokes if "impulse" not in e["content"]["frame_id"])
+    assert (push["frame_id"], push["force"]) == ("normal@tip", [5.0, 0.0, 0.0])
+    # Held for 2 s: repeated every half timeout, ended by a zero one.
+    start = wrenches[0]["time_ns"]
+    assert [e["time_ns"] - start for e in wrenches] == [0, SECOND * 3 // 4, SECOND * 3 // 2, 2 * SECOND]
+    assert [e["content"]["force"] for e in wrenches] == [[1.0, 0.0, 0.0]] * 3 + [[0.0, 0.0, 0.0]]
+
+
+def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, tmp_path):
+    (tmp_path / "late.yaml").write_text("- {t: 0.0, impulse: [1.0e-6, 0, 0]}\n")
+    # A ray that misses is refused when its time has come, long after all are sent.
+    (tmp_path / "refused.yaml").write_text(
+        "- {t: 0.0, at: nowhere, force: [1, 0, 0]}\n"
+        "- {t: 4.0, at: {ray: {origin: [5, 5, 5], direction: [0, 0, 1]}}, force: [1, 0, 0]}\n"
+    )
+    rig.set(real_time_factor=4.0)
+    late = client(rig, tmp_path / "late.yaml", "--lead", 0)
+    rig.sent += 1
+    assert late.returncode == 1
+    assert "1 late, 0 refused" in late.stdout
+    refused = client(rig, tmp_path / "refused.yaml", "--reset")
+    rig.sent += 2
+    assert refused.returncode == 1
+    assert "0 late, 2 refused (1 frame, 1 ray_miss)" in refused.stdout
+    # The node's own sentences.
+    assert "nowhere" in refused.stdout and "5.0,5.0,5.0" in refused.stdout
+
+
+class SlowNode:
+    """Stands in for a node that is slow to confirm: not before 500 wait for it, or all of ``count`` have come."""
+
+    def __init__(self, environment: dict, count: int) -> None:
+        import rclpy
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+        from geometry_msgs.msg import PointStamped, WrenchStamped
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.signals import SignalHandlerOptions
+        from std_msgs.msg import String
+        from std_srvs.srv import SetBool, Trigger
+
+        self.context = rclpy.Context()
+        rclpy.init(
+            args=[],
+            context=self.context,
+            domain_id=int(environment["ROS_DOMAIN_ID"]),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        node = rclpy.create_node("slow", context=self.context)
+        self.received = self.confirmed = self.most_ahead = 0
+        self.calls: list[str] = []
+
+        def on_poke(message) -> None:
+            self.received += 1
+            self.most_ahead = max(self.most_ahead, self.received - self.confirmed)
+
+        def answered(name):
+            def answer(request, response):
+                self.calls.append(name + str(getattr(request, "data", "")))
+                response.success = True
+                return response
+
+            return answer
+
+        for message_type, topic in ((WrenchStamped, "wrench"), (WrenchStamped, "poke"), (String, "schedule")):
+            node.create_subscription(message_type, f"~/{topic}", on_poke, 5000)
+        for topic in ("target", "attach"):
+            node.create_subscription(PointStamped, f"~/string/{topic}", on_poke, 5000)
+        node.create_service(Trigger, "~/reset", answered("reset"))
+        node.create_service(SetBool, "~/pause", answered("pause"))
+        diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+
+        def report() -> None:
+            if self.received - self.confirmed >= 500 or self.received == count:
+                self.confirmed = self.received
+            values = {"commands_received": self.confirmed, "late": 0, "refused_total": 0, "sim_time_ns": 0}
+            status = DiagnosticStatus(name="/slow: simulation")
+            status.values = [KeyValue(key=k, value=str(v)) for k, v in values.items()]
+            diagnostics.publish(DiagnosticArray(status=[status]))
+
+        node.create_timer(0.25, report)
+        self.node = node
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(node)
+        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread.start()
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.thread.join(5.0)
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(ros_environment, tmp_path):
+    path = tmp_path / "many.yaml"
+    path.write_text("- {t: 1.0, impulse: [1.0e-6, 0, 0], repeat: 1600, every: 0.001}\n")
+    slow = SlowNode(ros_environment, 1600)
+    try:
+        done = run("poke_client", path, "--node", "slow", "--reset", environment=ros_environment)
+        assert done.returncode == 0, done.stdout + done.stderr
+        # Its time doesn't move: the client says so, and waits no longer for the last command to act.
+        assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in done.stdout
+        assert slow.most_ahead == 500
+        assert slow.received == 1600
+        assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]
+    finally:
+        slow.close()

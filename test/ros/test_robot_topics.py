@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""What robot people expect beside pose and twist: an IMU at a contact, a robot description with the mesh, /tf."""
+
+import itertools
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from command_rig import stamp_ns, wrench_message
+from scipy.spatial.transform import Rotation
+
+from rigid_proto_ros.mesh.reading import load_mesh
+from rigid_proto_ros.scene.scenario import make_scenario
+
+SECOND = 10**9
+
+
+def numbers(vector: dict) -> np.ndarray:
+    return np.array([vector[k] for k in ("x", "y", "z")])
+
+
+def felt(body, arm, attitude, rate, force_world) -> np.ndarray:
+    """Specific force, body axes, at ``arm`` (m from the COM) of a body that falls under a force at its COM.
+
+    Gravity accelerates body and reference alike, so it isn't felt. rate: angular velocity, body axes.
+    """
+    turning = np.linalg.solve(body.inertia, -np.cross(rate, body.inertia @ rate))
+    at_com = Rotation.from_quat(attitude).inv().apply(force_world) / body.mass
+    return at_com + np.cross(turning, arm) + np.cross(rate, np.cross(rate, arm))
+
+
+def test_the_imu_feels_the_exact_specific_force_at_its_contact_and_turns_at_the_body_rate(rig):
+    force = np.array([0.0, 0.02, 0.01])
+    rig.set(imu_contact="left", gravity=[0.0, 0.0, -9.81], scale=[1.5, 0.8, 2.0], wrench_timeout=0.0)
+    rig.listen("imu")
+    rig.start_over(paused=True)
+    rig.forget("imu")
+    rig.publish("wrench", wrench_message(SECOND // 2, "world@com", force))
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    rig.state_at(SECOND * 7 // 10)
+    body = make_scenario({**rig.scene, "scale": [1.5, 0.8, 2.0]}).setup.body
+    arm = body.point(rig.scene["contacts.left"])
+    odometry = {stamp_ns(m): m["twist"]["twist"] for m in rig.heard("odom")}
+    measured = {stamp_ns(m): m for m in rig.heard("imu")}
+    moments = [ns for ns in measured if 0 < ns <= SECOND * 7 // 10 and ns in odometry]
+    assert sum(ns <= SECOND // 2 for ns in moments) > 10
+    assert sum(ns > SECOND // 2 for ns in moments) > 5
+    for ns in moments:
+        message = measured[ns]
+        assert message["header"]["frame_id"] == "rigid_body"
+        rate, attitude = numbers(message["angular_velocity"]), list(message["orientation"].values())
+        assert message["angular_velocity"] == odometry[ns]["angular"]
+        expected = felt(body, arm, attitude, rate, force if ns > SECOND // 2 else np.zeros(3))
+        assert np.linalg.norm(expected) > 1.0
+        # Measured 2e-15.
+        assert numbers(message["linear_acceleration"]) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    # At the centre of mass a body in free fall feels nothing but the force.
+    rig.set(imu_contact="")
+    rig.trigger("clear_wrench")
+    now = int(rig.diagnostics()["sim_time_ns"])
+    rig.until(lambda: stamp_ns(rig.heard("imu", last=1)[0]) > now + SECOND // 10, "the COM's")
+    assert np.abs(numbers(rig.heard("imu", last=1)[0]["linear_acceleration"])).max() == 0.0
+
+
+def test_the_robot_description_is_latched_draws_the_mesh_about_the_com_and_follows_changes(rig):
+    rig.do("listen", topic=rig.name("robot_description"), type="String", latched=True)
+    first = rig.until(lambda: rig.heard("robot_description"), "the description")[-1]["data"]
+    rig.set(scale=[2.0, 1.0, 0.5], mass=3.0)
+    text = rig.until(
+        lambda: (heard := rig.heard("robot_description", last=1)[0]["data"]) != first and heard, "the new description"
+    )
+    scenario = make_scenario({**rig.scene, "scale": [2.0, 1.0, 0.5], "mass": 3.0})
+    robot = ElementTree.fromstring(text)
+    (link,) = robot.findall("link")
+    assert robot.get("name") == link.get("name") == "rigid_body"
+    body = scenario.setup.body
+    assert float(link.find("inertial/mass").get("value")) == body.mass
+    inertia = {name: float(value) for name, value in link.find("inertial/inertia").attrib.items()}
+    for (i, a), (j, b) in itertools.combinations_with_replacement(enumerate("xyz"), 2):
+        assert inertia[f"i{a}{b}"] == body.inertia[i, j]
+    # The link's origin is the COM, the mesh's vertices are the file's own.
+    mesh = link.find("visual/geometry/mesh")
+    path = Path(mesh.get("filename").removeprefix("file://"))
+    scale = np.array([float(x) for x in mesh.get("scale").split()])
+    origin = np.array([float(x) for x in link.find("visual/origin").get("xyz").split()])
+    drawn = load_mesh(str(path)).vertices * scale + origin
+    placed = np.array([body.point(v) for v in scenario.setup.surface.vertices])
+    assert drawn == pytest.approx(placed, abs=1e-15)
+
+
+def test_the_transform_is_the_pose(monkeypatch):
+    """tf2_msgs isn't in the wheels: its one message stands in, and a node that only creates publishers."""
+    from rigid_proto_ros.motion.state import State
+    from rigid_proto_ros.ros.state_publisher import StatePublisher
+    from rigid_proto_ros.scene.parameters import defaults
+
+    published = []
+
+    def publisher(message_type, topic, *_, **__):
+        sent = published.append if topic == "/tf" else lambda message: None
+        return SimpleNamespace(publish=sent, get_subscription_count=lambda: 1)
+
+    messages = SimpleNamespace(TFMessage=lambda transforms: SimpleNamespace(transforms=transforms))
+    monkeypatch.setitem(sys.modules, "tf2_msgs", SimpleNamespace(msg=messages))
+    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", messages)
+    node = SimpleNamespace(create_publisher=publisher)
+    states = StatePublisher(node, "world", "body", lambda: np.zeros(3))
+    states.configure({**defaults(), "publish_tf": True})
+    state = State(3 * SECOND + 7, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
+    states.pack_all(state)
+    assert not published
+    assert states.look_for_subscribers()
+    states.publish(state)
+    states.configure({**defaults(), "publish_tf": False})
+    states.look_for_subscribers()
+    states.publish(state)
+    (transform,) = published[0].transforms
+    assert len(published) == 1
+    assert (transform.header.stamp.sec, transform.header.stamp.nanosec) == (3, 7)
+    assert (transform.header.frame_id, transform.child_frame_id) == ("world", "body")
+    t, r = transform.transform.translation, transform.transform.rotation
+    assert [t.x, t.y, t.z, r.x, r.y, r.z, r.w] == state.row[:7].tolist()

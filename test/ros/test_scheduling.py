@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""What a scheduled change has to load or compile is done before it is taken, beside the thread that carries the body."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from rigid_proto_ros.messages import cdr
+from rigid_proto_ros.ros import command_intake, scheduling
+from rigid_proto_ros.ros.flight import Flight
+from rigid_proto_ros.scene import scenario
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.observer import Observer
+
+MS = 1_000_000
+
+
+class Subscription:
+    """One whose queue is filled here."""
+
+    def __init__(self) -> None:
+        self.queue: deque[bytes] = deque()
+        self.handle = self
+        self.qos_profile = SimpleNamespace(depth=5000)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_) -> None:
+        pass
+
+    def take_message(self, message_type, raw: bool):
+        return (self.queue.popleft(), {}) if self.queue else None
+
+
+class NoGaps:
+    def __init__(self, subscription) -> None:
+        pass
+
+    def before(self, number) -> int:
+        return 0
+
+    def emptied(self) -> bool:
+        return False
+
+
+class Rig:
+    """A flight with its intake, and no ROS graph."""
+
+    def __init__(self, monkeypatch) -> None:
+        monkeypatch.setattr(command_intake, "SequenceGaps", NoGaps)
+        self.topics: dict[str, Subscription] = {}
+        self.published: list[int] = []
+        self.flight = Flight(
+            make_scenario({"mesh": "t_handle", "publish_rate": 1000.0, "real_time_factor": 0.0}),
+            Observer(),
+            lambda state: self.published.append(state.time_ns),
+            lambda wall_ns, whole: self.intake.take(
+                self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up, True
+            ),
+            print,
+        )
+        self.intake = command_intake.CommandIntake(self, ("world", "rigid_body"), self.change, None)
+        self.flight.start()
+
+    def get_logger(self):
+        return None
+
+    def create_subscription(self, message_type, topic, *_, **__) -> Subscription:
+        return self.topics.setdefault(topic.removeprefix("~/"), Subscription())
+
+    def change(self, changes: dict, at_hand):
+        self.flight.change(self.flight.scenario.with_changes(changes, at_hand=at_hand))
+        return self.flight.scenario.setup
+
+    def schedule(self, text: str) -> None:
+        self.topics["schedule"].queue.append(cdr.string(text))
+
+    def tick_until(self, condition) -> None:
+        for _ in range(1_000_000):
+            if condition():
+                return
+            self.flight.tick()
+        raise AssertionError("it never came")
+
+
+def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_the_body(monkeypatch) -> None:
+    rig = Rig(monkeypatch)
+    may_load, loaded_by = threading.Event(), []
+    load = scenario.mesh_body
+
+    def slow(*arguments, **named):
+        loaded_by.append(threading.current_thread().name)
+        may_load.wait()
+        return load(*arguments, **named)
+
+    monkeypatch.setattr(scenario, "mesh_body", slow)
+    rig.schedule('{"t": 3000, "set": {"mesh": "book"}}')
+    rig.tick_until(lambda: loaded_by)
+    before = len(rig.published)
+    # The mesh isn't there, and the body flies on; what comes by other ways is taken meanwhile.
+    rig.topics["poke"].queue.append(cdr.wrench_stamped(0, "world;impulse", (1e-3, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    rig.tick_until(lambda: len(rig.published) >= before + 200 and rig.intake.received["poke"])
+    assert rig.intake.received["schedule"] == 0
+    may_load.set()
+    rig.tick_until(lambda: rig.intake.received["schedule"] == 1)
+    assert not rig.flight.simulation.refused
+    rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
+    rig.tick_until(lambda: rig.flight.scenario.values["mesh"] == "book")
+    assert loaded_by == ["schedule"] * 2
+
+
+def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_body(monkeypatch) -> None:
+    rig = Rig(monkeypatch)
+    may_compile, compiled_by = threading.Event(), []
+
+    def slow(setup) -> None:
+        compiled_by.append((threading.current_thread().name, setup.integrator.name))
+        may_compile.wait()
+
+    monkeypatch.setattr(scheduling, "warm_up", slow)
+    rig.schedule('{"t": 0, "set": {"integrator": "rk4"}}')
+    rig.schedule('{"t": 0, "set": {"gravity": [0, 0, -1]}}')
+    rig.tick_until(lambda: compiled_by)
+    before = len(rig.published)
+    rig.tick_until(lambda: len(rig.published) >= before + 200)
+    assert rig.flight.scenario.values["integrator"] == "auto"
+    may_compile.set()
+    # What was scheduled after it is taken after it.
+    rig.tick_until(lambda: rig.intake.received["schedule"] == 2)
+    rig.tick_until(lambda: rig.flight.scenario.values["gravity"] == [0.0, 0.0, -1.0])
+    assert rig.flight.scenario.values["integrator"] == "rk4"
+    assert compiled_by == [("schedule", "rk4")]

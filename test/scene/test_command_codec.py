@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""Commands in their four forms: each way there and back gives the same command."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.messages.session_messages import read_text
+from rigid_proto_ros.motion.frames import Frame
+from rigid_proto_ros.scene.command_codec import (
+    MARKS,
+    ScriptCommand,
+    command_of_event,
+    core_command,
+    entry_of,
+    flow,
+    in_words,
+    of_event,
+    of_message,
+    outgoing,
+)
+from rigid_proto_ros.scene.script import expand_schedule, expand_script, read_schedule
+from rigid_proto_ros.simulation.commands import TieString, WrenchCommand
+
+CONTACTS = frozenset({"tip", "left_end"})
+NODE = ("map", "top")
+numbers = st.floats(-1e6, 1e6)
+triples = st.tuples(numbers, numbers, numbers)
+times = st.integers(0, 10**13)
+points = st.one_of(
+    st.sampled_from([("com",), ("origin",), ("contact", "tip"), ("contact", "left_end")]),
+    st.tuples(st.just("vertex"), st.integers(0, 10**9)),
+    st.tuples(st.just("point"), triples),
+    st.tuples(st.just("ray"), triples, triples.filter(any)),
+)
+options = st.one_of(st.just({}), st.just({"impulse": True}), st.floats(1e-9, 1e9).map(lambda s: {"duration_s": s}))
+values = st.one_of(numbers, st.booleans(), st.integers(-(10**9), 10**9), st.sampled_from(["rk4", "on", "1e3", ""]))
+changes = st.dictionaries(
+    st.sampled_from(["mass", "gravity", "string.target", "integrator", "ballast.nut"]),
+    st.one_of(values, st.lists(numbers, min_size=1, max_size=4)),
+    min_size=1,
+)
+
+
+@st.composite
+def loads(draw) -> ScriptCommand:
+    """A wrench or a poke in its frame's own words."""
+    held, axes, point = draw(st.booleans()), draw(st.sampled_from(["world", "body", "normal"])), draw(points)
+    if axes == "normal" and point == ("com",):
+        point = ("origin",)
+    force, torque = draw(triples), draw(triples)
+    if axes == "normal":
+        force, torque = (force[0], 0.0, 0.0), (0.0, 0.0, 0.0)
+    frame = Frame(axes, point, **({} if held else draw(options)))
+    return ScriptCommand(draw(times), "wrench" if held else "poke", frame.text, force, torque)
+
+
+others = st.one_of(
+    st.builds(lambda t, p: ScriptCommand(t, "string_target", "world", point=p), times, triples),
+    st.builds(lambda t, p: ScriptCommand(t, "string_attach", "body/mesh", point=p), times, triples),
+    st.builds(lambda t, c: ScriptCommand(t, "set", changes=c), times, changes),
+    st.builds(lambda t, k: ScriptCommand(t, k), times, st.sampled_from(["string_release", "clear_wrench"])),
+)
+inertias = st.builds(
+    lambda t, f, n: ScriptCommand(t, "inertia", f, inertia=tuple(n)),
+    times,
+    st.sampled_from(["", "body", "body/mesh"]),
+    st.lists(numbers, min_size=10, max_size=10),
+)
+knots = st.builds(
+    lambda t, f, p: ScriptCommand(t, "string_attach", f, point=p),
+    times,
+    st.sampled_from(["", "body", "world"]),
+    triples,
+)
+commands = st.one_of(loads(), others, inertias, knots)
+
+
+def can_be_an_entry(command: ScriptCommand) -> bool:
+    try:
+        entry_of(command)
+    except InputError:
+        return False
+    return True
+
+
+def nothing(content: dict) -> None:
+    raise AssertionError("it has not acted")
+
+
+@given(commands)
+def test_a_command_comes_back_from_its_line_in_the_log(command: ScriptCommand) -> None:
+    core = core_command(command, command.t_ns, CONTACTS, nothing, inertia=nothing)
+    content = json.loads(json.dumps(core.content))
+    assert of_event(command.t_ns, core.kind, content) == command
+    again = command_of_event(core.kind, content, CONTACTS, ("world", "body"), nothing, nothing)
+    assert (again.kind, again.rank, again.content) == (core.kind, core.rank, core.content)
+
+
+@given(commands)
+def test_a_command_comes_back_from_the_message_on_its_topic(command: ScriptCommand) -> None:
+    data = command.message(command.t_ns)
+    if command.topic == "schedule":
+        assert expand_schedule(read_schedule(read_text(data, "schedule")), 1.5) == [command]
+    else:
+        assert of_message(command.topic, data) == command
+
+
+@given(st.one_of(loads(), others).filter(can_be_an_entry))
+def test_a_command_comes_back_from_its_entry_in_a_script(command: ScriptCommand) -> None:
+    entry = {"t": command.t_ns / 1e9, **entry_of(command)}
+    for text in (flow(entry), flow(entry, quoted=True), yaml.safe_dump(entry)):
+        assert expand_script([yaml.safe_load(text)]) == [command]
+    assert json.loads(flow(entry, quoted=True)) == entry
+
+
+@given(st.lists(commands, max_size=8))
+def test_a_script_is_sent_as_it_is_listed_and_each_instant_in_one_message_as_far_as_entries_say_it(listed) -> None:
+    script = sorted(listed, key=lambda command: command.t_ns)
+    sent = list(outgoing(script))
+    assert [command for message in sent for command in message.commands] == script
+    for message in sent:
+        if len(message.commands) > 1:
+            again = expand_schedule(read_schedule(read_text(message.data, "schedule")), 1.5)
+            assert again == list(message.commands)
+
+
+@given(commands)
+def test_the_names_of_a_nodes_frames_become_words_that_every_node_reads(command: ScriptCommand) -> None:
+    def named(text: str) -> str:
+        place, *rest = text.split(";")
+        axes, *point = place.split("@")
+        named = {"world": "map", "body": "top", "body/mesh": "top/mesh"}.get(axes, axes)
+        return ";".join(["@".join([named, *point]), *rest])
+
+    theirs = ScriptCommand(**{**command.__dict__, "frame_id": named(command.frame_id)})
+    words = in_words(theirs, CONTACTS, NODE)
+    there = core_command(words, 0, CONTACTS, nothing, inertia=nothing)
+    here = core_command(theirs, 0, CONTACTS, nothing, NODE, nothing)
+    if isinstance(here, WrenchCommand):
+        assert there.frame == here.frame
+    elif isinstance(here, TieString):
+        assert there.axes == here.axes
+    elif command.kind == "inertia":
+        assert there.content["relative"] == here.content["relative"]
+    assert all(name not in words.frame_id for name in NODE)
+
+
+def test_a_poke_in_the_frame_of_the_nodes_own_name_is_read_as_the_node_reads_it() -> None:
+    content = {"stamp_ns": 0, "frame_id": "rigid_body@tip", "force": [1, 0, 0], "torque": [0, 0, 0]}
+    command = command_of_event("poke", content, CONTACTS, ("world", "rigid_body"))
+    assert command.frame == Frame("body", ("contact", "tip"))
+
+
+def test_what_moves_nothing_has_no_command_and_what_is_damaged_is_named() -> None:
+    for mark in MARKS:
+        assert command_of_event(mark, {}, CONTACTS, NODE, nothing, nothing) is None
+    for kind, content in (
+        ("poke", {"frame_id": "", "force": [1, 2], "torque": [0, 0, 0]}),
+        ("wrench", {"frame_id": 5, "force": [1, 2, 3], "torque": [0, 0, 0]}),
+        ("string_target", {"frame_id": "world"}),
+        ("inertia", {"frame_id": "", "mass": 1.0, "com": [0, 0, 0], "tensor": [1]}),
+        ("jump", {}),
+    ):
+        with pytest.raises(InputError):
+            command_of_event(kind, content, CONTACTS, NODE, nothing, nothing)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""The ghost gets all the commands that the body gets, or isn't there yet."""
+
+from __future__ import annotations
+
+import pytest
+from flights import SECOND
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.scene.ghost import ghost_of
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.observer import BodySnapshot, Observer
+from rigid_proto_ros.simulation.simulation import Simulation
+
+MOVING = {
+    "initial.linear_velocity": [1.0, 0.0, 0.0],
+    "initial.angular_velocity": [0.1, 5.0, 0.2],
+    "real_time_factor": 0.0,
+}
+
+
+class Watcher(Observer):
+    """Notes when ghosts begin, and where body and ghost are."""
+
+    def __init__(self) -> None:
+        self.began: list[int] = []
+        self.body: dict[int, list[float]] = {}
+        self.ghost: dict[int, list[float]] = {}
+        self.refusals: list[tuple[str, str]] = []
+
+    def refused(self, time_ns: int, reason: str, message: str) -> None:
+        self.refusals.append((reason, message))
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        self.began.append(time_ns)
+
+    def state(self, time_ns: int, row) -> None:
+        self.body[time_ns] = row.tolist()
+
+    def ghost_state(self, time_ns: int, row) -> None:
+        self.ghost[time_ns] = row.tolist()
+
+
+def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():
+    with pytest.raises(InputError, match=r"ghost\.integrator"):
+        make_scenario({"string.attached": True, "ghost.integrator": "free_body"})
+    scenario = make_scenario({"string.attached": True})
+    with pytest.raises(InputError, match=r"ghost\.integrator"):
+        scenario.with_changes({"ghost.integrator": "free_body"})
+
+
+def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset():
+    watcher = Watcher()
+    scenario = make_scenario({"ghost.integrator": "free_body"})
+    simulation = Simulation(scenario.setup, watcher)
+    ghost = ghost_of(scenario, simulation, watcher)
+    push = WrenchCommand(False, parse_frame("world@com", frozenset()), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0, "", b"")
+
+    def fly() -> None:
+        simulation.submit(push)
+        simulation.submit(push, simulation.time_ns + 1_000_000)
+        end_ns = simulation.time_ns + SECOND // 10
+        simulation.advance(end_ns)
+        ghost.advance(end_ns)
+
+    fly()
+    fly()
+    ((reason, text),) = watcher.refusals
+    assert reason == "ghost" and "the ghost goes on without" in text and "free_body" in text
+    assert not simulation.refused  # the body itself carries it
+    simulation.reset()
+    ghost.reset(scenario)
+    fly()
+    assert len(watcher.refusals) == 2
+
+
+def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
+    pytest.importorskip("rclpy")
+    from rigid_proto_ros.ros.flight import Flight
+
+    watcher = Watcher()
+    flight = Flight(
+        make_scenario(MOVING), watcher, lambda s: None, lambda wall_ns, whole: False, print, is_viewed=lambda: True
+    )
+    flight.start()
+    while flight.simulation.time_ns < SECOND:
+        flight.tick()
+    flight.change(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
+    while flight.simulation.time_ns < 2 * SECOND:
+        flight.tick()
+    assert not watcher.began and not watcher.ghost
+    flight.reset()
+    watcher.body.clear()
+    while flight.simulation.time_ns < SECOND:
+        flight.tick()
+    assert watcher.began == [0]
+    assert watcher.ghost.keys() == watcher.body.keys()
+    # No force acts, so the COMs stay together; the tensors part the attitudes.
+    last = max(watcher.body)
+    assert watcher.ghost[last][:3] == watcher.body[last][:3] and watcher.ghost[last][3:7] != watcher.body[last][3:7]

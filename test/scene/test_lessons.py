@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+"""What each bundled scene says that one will see, as physical assertions on the very motion that it gives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from lesson_flights import Flight, Z, degrees_between, fly
+
+from rigid_proto_ros.base.bundled import scene_names, scene_path
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.script import read_script
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_scene_says_what_it_teaches_and_how_to_fly_it(name: str) -> None:
+    comment = [line for line in scene_path(name).read_text("utf-8").splitlines() if line.startswith("#")]
+    text = " ".join(line.lstrip("# ") for line in comment)
+    assert text.count(". ") >= 2
+    assert f"rigid_proto simulate config/{name}.yaml" in text
+
+
+def test_t_handle_turns_over_every_two_to_three_seconds_while_momentum_and_energy_stay() -> None:
+    flight = fly("t_handle", 10.0)
+    flips = flight.flips(axis=2)
+    assert len(flips) == 4
+    assert np.all((np.diff(flips) > 2.0) & (np.diff(flips) < 3.0))
+    assert flight.momentum_about(axis=2).min() < -0.999
+    assert degrees_between(flight.momentum, flight.momentum[0]).max() < 1e-5  # measured 1.5e-6
+    assert np.ptp(flight.energy) < 1e-9 * flight.energy[0]
+    assert degrees_between(flight.spin, flight.spin[0]).max() > 15.0
+
+
+def test_t_handle_flips_faster_after_a_sideways_poke_at_its_tip() -> None:
+    flips = fly("t_handle", 12.0, script="flip_and_poke").flips(axis=2)
+    after = flips[(flips > 4.2) & (flips < 8.0)]
+    assert len(after) >= 4
+    assert np.allclose(np.diff(after), 0.9, atol=0.05)
+
+
+def test_rubber_band_lifts_the_t_handle_and_lets_it_go() -> None:
+    flight = fly("t_handle", 8.0, script="pull_on_string")
+    assert np.abs(flight.position[flight.at(1.0)]).max() == 0.0
+    assert flight.position[flight.at(4.0), 2] > 0.05
+    assert flight.position[flight.at(7.0), 0] > 0.05
+    assert flight.simulation.string is None
+    assert np.array_equal(flight.velocity[flight.at(7.0)], flight.velocity[-1])
+
+
+def test_ballast_at_the_tip_makes_the_stem_the_smallest_moment_and_ends_the_flips() -> None:
+    bare, loaded = fly("ballast_stops_flip", 15.0), fly("ballast_stops_flip", 15.0, ballast__tip=[0.03, 0.0, 0.0, 0.07])
+    x, y, z = bare.body.inertia.diagonal()
+    assert y < z < x
+    x, y, z = loaded.body.inertia.diagonal()
+    assert z < y < x
+    assert len(bare.flips(axis=2)) == 5
+    assert len(loaded.flips(axis=2)) == 0
+    assert loaded.momentum_about(axis=2).min() > 0.999
+
+
+def test_ballast_moves_the_flip_to_the_crossbar() -> None:
+    about_the_crossbar = {"initial__angular_velocity": [0.05, 12.0, 0.1]}
+    assert len(fly("ballast_stops_flip", 10.0, **about_the_crossbar).flips(axis=1)) == 0
+    loaded = fly("ballast_stops_flip", 10.0, ballast__tip=[0.03, 0.0, 0.0, 0.07], **about_the_crossbar)
+    assert len(loaded.flips(axis=1)) >= 3
+
+
+def test_ballast_in_flight_stops_the_flips_and_taking_it_off_brings_them_back() -> None:
+    flips = fly("ballast_stops_flip", 30.0, script="ballast_in_flight").flips(axis=2)
+    assert np.count_nonzero(flips < 6.0) == 2
+    assert np.count_nonzero((flips > 6.0) & (flips < 20.0)) == 0
+    assert np.count_nonzero(flips > 20.0) >= 3
+
+
+def test_thrown_hammer_keeps_to_newtons_parabola_whatever_its_spin() -> None:
+    for spin in ([0.5, 12.0, 0.5], [3.0, -5.0, 20.0]):
+        flight = fly("thrown_hammer", 1.1, interval_s=0.001, initial__angular_velocity=spin)
+        t = flight.time[:, None]
+        parabola = [0.0, 0.0, 1.5] + t * [1.5, 0.0, 5.0] + 0.5 * t**2 * [0.0, 0.0, -9.81]
+        assert np.abs(flight.position - parabola).max() < 1e-14  # measured 4e-16
+    back = 2.0 * 5.0 / 9.81
+    assert math.isclose(back, 1.02, abs_tol=1e-3)
+    # The grip's own path is no parabola: it leaves the COM's by up to its distance.
+    grip = flight.position + flight.rotation @ flight.body.point((0.0, 0.0, 0.0))
+    away = np.linalg.norm(grip - parabola - (grip - parabola)[0], axis=1)
+    assert away.max() > 0.2
+
+
+def test_true_tensor_wobbles_and_turns_over_where_the_box_spins_as_on_an_axle() -> None:
+    true, box = fly("true_or_box_tensor", 10.0), fly("true_or_box_tensor", 10.0, inertia_model="bounding_box")
+    assert 30.0 < degrees_between(true.spin, Z).max() < 37.0  # measured 36.5
+    assert degrees_between(true.rotation[:, :, 2], Z).max() > 150.0
+    assert degrees_between(box.spin, Z).max() == 0.0
+    assert box.body.mass == true.body.mass
+    assert np.array_equal(box.body.center_of_mass, true.body.center_of_mass)
+    box = fly("true_or_box_tensor", 0.01, inertia_model="bounding_box", inertia_model_com="model")
+    apart = np.linalg.norm(box.body.center_of_mass - true.body.center_of_mass)
+    assert apart == pytest.approx(0.0244, abs=1e-4)
+    error = np.abs(box.body.principal_moments / true.body.principal_moments - 1.0)
+    assert error.min() == pytest.approx(0.129, abs=1e-3)
+    assert error.max() == pytest.approx(0.378, abs=1e-3)
+
+
+def test_dropped_term_keeps_energy_and_the_size_of_l_but_not_its_direction() -> None:
+    wrong, right = fly("dropped_term", 10.0), fly("dropped_term", 10.0, gyroscopic=True)
+    size = np.linalg.norm(wrong.momentum, axis=1)
+    assert np.ptp(size) < 1e-12 * size[0]  # measured 5e-16
+    assert np.ptp(wrong.energy) < 1e-12 * wrong.energy[0]
+    assert degrees_between(wrong.momentum, wrong.momentum[0]).max() == pytest.approx(39.6, abs=0.1)
+    assert degrees_between(wrong.spin, wrong.spin[0]).max() < 1e-3
+    assert degrees_between(right.momentum, right.momentum[0]).max() < 1e-5
+    assert degrees_between(right.spin, right.spin[0]).max() > 40.0
+
+
+def test_t_handle_without_the_gyroscopic_term_never_flips() -> None:
+    assert len(fly("t_handle", 10.0, gyroscopic=False).flips(axis=2)) == 0
+
+
+@pytest.mark.parametrize("attach", ["corner", "spine"])
+def test_plumb_line_comes_to_rest_through_the_centre_of_mass(attach: str) -> None:
+    point = {"corner": [0.074, 0.105, 0.0138], "spine": [-0.08, 0.0, 0.0]}[attach]
+    flight = fly("plumb_line", 40.0, interval_s=0.05, string__attach=point)
+    body = flight.body
+    knot_to_com = flight.rotation @ -body.point(point)
+    tilt = degrees_between(knot_to_com, -Z)
+    assert tilt[0] > 80.0
+    assert tilt[-1] < 0.01  # measured 0.001
+    # The knot hangs below the nail, lower than the rest length by the weight over the stiffness.
+    knot = flight.position[-1] - knot_to_com[-1]
+    assert np.abs(knot - [0.0, 0.0, -0.4 - body.mass * 9.81 / 2000.0]).max() < 1e-4
+
+
+def test_book_on_a_string_swings_in_the_two_rhythms_of_a_double_pendulum() -> None:
+    """Nudged while it hangs by its spine: the normal modes of string and book in one plane, small angles."""
+    half = math.sqrt(0.5)
+    spine = [-0.08, 0.0, 0.0]
+    body = fly("plumb_line", 0.0).body
+    d = float(np.linalg.norm(body.point(spine)))
+    length = 0.4 + body.mass * 9.81 / 2000.0
+    hanging = {
+        "initial__orientation_xyzw": [0.0, half, 0.0, half],  # the mesh's x axis down
+        "initial__position": [0.0, 0.0, -length - d],
+        "initial__linear_velocity": [0.02, 0.0, 0.0],
+        "string__attach": spine,
+    }
+    undamped = {"linear_damping": 0.0, "angular_damping": 0.0, "string__damping_ratio": 0.0}
+    x = fly("plumb_line", 60.0, **hanging, **undamped).position[:, 0]
+    m, moment = body.mass, body.inertia[1, 1]
+    M = np.array([[m * length**2, m * length * d], [m * length * d, moment + m * d * d]])
+    K = np.diag([m * 9.81 * length, m * 9.81 * d])
+    modes = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K))) / (2.0 * np.pi)
+    frequency = np.fft.rfftfreq(len(x), 0.01)
+    amplitude = np.abs(np.fft.rfft(np.hanning(len(x)) * (x - x.mean())))
+    for low, high in ((0.3, 1.2), (1.2, 5.0)):
+        band = (frequency > low) & (frequency < high)
+        strongest = frequency[band][np.argmax(amplitude[band])]
+        assert np.abs(modes - strongest).min() < 0.02  # one bin of the spectrum
+        assert amplitude[band].max() > 20.0 * np.median(amplitude[band])
+
+
+def test_top_on_a_string_walks_at_the_rate_of_its_weight_over_its_momentum() -> None:
+    def walk(spin: float) -> tuple[Flight, float]:
+        flight = fly("top_on_string", 10.0, interval_s=0.005, initial__angular_velocity=[0.0, -spin, 0.0])
+        stem = flight.rotation[:, :, 2]
+        azimuth = np.unwrap(np.arctan2(stem[:, 1], stem[:, 0]))
+        return flight, abs(azimuth[-1] - azimuth[0]) / 10.0
+
+    flight, rate = walk(600.0)
+    body = flight.body
+    arm = np.linalg.norm(body.point((0.0, 0.0, 0.075)))
+    assert rate == pytest.approx(1.6, abs=0.05)
+    assert rate == pytest.approx(body.mass * 9.81 * arm / (body.principal_moments[2] * 600.0), rel=0.01)
+    assert np.abs(np.degrees(np.arcsin(flight.rotation[:, 2, 2]))).max() < 3.0  # it doesn't fall: measured 2.2°
+    assert walk(300.0)[1] == pytest.approx(2.0 * rate, rel=0.05)
+
+
+def test_top_without_spin_falls() -> None:
+    flight = fly("top_on_string", 2.0, initial__angular_velocity=[0.0, 0.0, 0.0])
+    assert np.degrees(np.arcsin(flight.rotation[:, 2, 2])).max() > 80.0
+
+
+def test_push_at_the_rim_moves_the_centre_of_mass_alike_and_costs_four_times_the_energy() -> None:
+    flight = fly("com_or_rim", 6.0, script="com_or_rim")
+    after_com, stopped, after_rim = (flight.at(t) for t in (2.0, 4.0, 6.0))
+    assert flight.velocity[after_com, 2] == pytest.approx(0.1 / flight.body.mass, rel=1e-13)
+    assert flight.velocity[after_com, 2] == pytest.approx(0.27, abs=0.005)
+    assert np.abs(flight.velocity[stopped]).max() < 1e-16
+    assert flight.velocity[after_rim, 2] == pytest.approx(flight.velocity[after_com, 2], rel=1e-13)
+    assert np.abs(flight.spin[after_com]).max() == 0.0
+    assert np.linalg.norm(flight.spin[after_rim]) == pytest.approx(2.26, abs=0.01)
+    assert flight.energy[after_rim] / flight.energy[after_com] == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize("axis, steady", [(0, False), (1, True), (2, True)])
+def test_book_spins_steadily_about_two_axes_and_not_about_its_width(axis: int, steady: bool) -> None:
+    spin = [0.05, 0.05, 0.05]
+    spin[axis] = 8.0
+    flight = fly("book", 10.0, initial__angular_velocity=spin)
+    assert (len(flight.flips(axis)) == 0) == steady
+
+
+@pytest.mark.parametrize("axis, steady", [(0, True), (1, False), (2, True)])
+def test_tennis_racket_twists_only_when_it_turns_over_across_its_face(axis: int, steady: bool) -> None:
+    spin = [0.03, 0.03, 0.03]
+    spin[axis] = 6.0
+    flight = fly("tennis_racket", 10.0, initial__angular_velocity=spin)
+    assert (len(flight.flips(axis)) == 0) == steady
+    moments = flight.body.principal_moments
+    assert moments[2] / moments[1] == pytest.approx(1.09, abs=0.005)
+    assert moments[0] / moments[1] == pytest.approx(0.1, abs=0.01)
+
+
+def test_l_bracket_wobbles_at_once_and_without_the_gyroscopic_term_not_at_all() -> None:
+    assert degrees_between(fly("l_bracket", 2.0).spin, Z).max() > 5.0
+    calm = fly("l_bracket", 10.0, gyroscopic=False)
+    assert degrees_between(calm.spin, Z).max() < 1e-3
+    assert degrees_between(calm.momentum, calm.momentum[0]).max() > 5.0
+
+
+def test_hammer_has_its_centre_of_mass_far_from_its_boxs_centre() -> None:
+    true, box = fly("hammer", 0.01), fly("hammer", 0.01, inertia_model="bounding_box")
+    diagonal = np.linalg.norm(true.simulation.setup.surface.extent)
+    apart = np.linalg.norm(true.body.center_of_mass - box.body.center_of_mass)
+    assert apart / diagonal == pytest.approx(0.23, abs=0.005)
+
+
+def test_hollow_box_has_more_inertia_for_its_mass_than_the_full_box() -> None:
+    hollow, full = fly("hollow_box", 0.01), fly("hollow_box", 0.01, inertia_model="bounding_box")
+    assert hollow.body.mass == full.body.mass
+    assert np.all(hollow.body.principal_moments > full.body.principal_moments)
+
+
+def test_spinning_top_gives_way_at_right_angles_to_the_push_and_less_the_faster_it_spins(tmp_path) -> None:
+    script = tmp_path / "push.yaml"
+    script.write_text("- {t: 0.1, at: stem, impulse: [0.001, 0.0, 0.0]}\n")
+    yielded = []
+    for spin in (30.0, 60.0):
+        scenario = read_scene("spinning_top", {"initial.angular_velocity": [0.0, 0.0, spin]})
+        run = OfflineRun(scenario, read_script(script))
+        stems = []
+        for k in range(1000):
+            run.advance(nanoseconds(0.1 + 0.001 * k))
+            stems.append(run.simulation.state.rotation[:, 2])
+        lean = np.array(stems)
+        # The new direction of L, about which the axis nods: leaning along the push by J d / L sideways.
+        mean = lean.mean(axis=0)
+        assert abs(mean[1]) > 5.0 * abs(mean[0])
+        yielded.append(np.linalg.norm(mean[:2]))
+    assert yielded[1] < 0.6 * yielded[0]
+
+
+def test_teapot_answers_with_one_acceleration_and_three_spins(tmp_path) -> None:
+    velocities, spins = [], []
+    for at in ("spout", "handle", "knob"):
+        script = tmp_path / f"{at}.yaml"
+        script.write_text(f"- {{t: 0.0, at: {at}, impulse: [0.0, 0.1, 0.0]}}\n")
+        run = OfflineRun(read_scene("teapot"), read_script(script))
+        run.advance(nanoseconds(1.0))
+        velocities.append(run.simulation.state.linear_velocity)
+        spins.append(run.simulation.state.angular_velocity)
+    assert np.ptp(velocities, axis=0).max() == 0.0
+    assert min(np.linalg.norm(spins[i] - spins[j]) for i, j in ((0, 1), (0, 2), (1, 2))) > 1.0

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""Entries of lists and scripts act in the order in which they are listed, before all single messages of their instant."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from pathlib import Path
+
+import pytest
+from flights import SECOND
+
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene.command_codec import core_command, in_words, of_event
+from rigid_proto_ros.scene.ghost import Ghost
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.script import expand_script
+from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.session.runs import decode_event
+from rigid_proto_ros.simulation.commands import Change, Command
+from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SCENE = {"mesh": "t_handle", "density": 7850.0, "integrator": "rk4", "initial.angular_velocity": [0.5, -2.0, 3.0]}
+BEFORE_LISTS = Path(__file__).parents[1] / "recorded" / "before_lists.mcap"
+"""With rk4, whose rounding is no matter of the version."""
+DONE = [
+    {"at": {"vertex": 3}, "impulse": [0.0, 0.0, 0.001]},
+    {"set": {"density": 9000.0}},
+    {"string": {"target": [0.1, 0.0, 0.2]}},
+    {"string": {"attach": [0.0, 0.0, 0.07]}},
+    {"at": {"vertex": 7}, "impulse": [0.0, 0.002, 0.0]},
+    {"wrench": {"at": "com", "torque": [0.0, 1e-5, 0.0]}},
+    {"service": "clear_wrench"},
+    {"string": "release"},
+    {"wrench": {"at": "com", "force": [0.0, 0.0, 1e-2]}},
+]
+
+
+class Lines(Observer):
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def event(self, time_ns: int, line: str) -> None:
+        self.lines.append(line)
+
+    def kinds(self) -> list[str]:
+        return [decode_event(line, 1)[1] for line in self.lines]
+
+
+def commands(entries: list[dict], simulation: Simulation) -> list[Command]:
+    scenario = make_scenario(SCENE)
+
+    def change(changes: dict):
+        return scenario.with_changes(changes).setup
+
+    return [
+        core_command(command, SECOND, (), change)
+        for command in expand_script([{"t": 1.0, **entry} for entry in entries])
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_script_acts_in_its_own_order_and_not_by_kind_or_bytes(seed: int) -> None:
+    entries = random.Random(seed).sample(DONE, len(DONE))
+    lines = Lines()
+    OfflineRun(make_scenario(SCENE), expand_script([{"t": 1.0, **entry} for entry in entries]), lines).advance(
+        2 * SECOND
+    )
+    assert lines.kinds() == [command.kind for command in expand_script([{"t": 0.0, **entry} for entry in entries])]
+
+
+def test_lists_act_first_by_their_bytes_then_single_messages_by_kind_whatever_arrives_first() -> None:
+    found = set()
+    for order in itertools.permutations(range(3)):
+        lines = Lines()
+        simulation = Simulation(make_scenario(SCENE).setup, lines)
+        own = commands(DONE, simulation)
+        parts = [
+            [(own[0], (b"b", 0)), (own[1], (b"b", 1))],
+            [(own[4], (b"a", 0)), (own[6], (b"a", 1)), (own[2], (b"a", 2))],
+            [(own[8], None), (own[3], None), (own[1], None)],
+        ]
+        for k in order:
+            for command, listed in parts[k]:
+                simulation.submit(command, SECOND, listed)
+        found.add(simulation.advance(2 * SECOND).sha256())
+        assert lines.kinds() == [
+            "poke",
+            "clear_wrench",
+            "string_target",
+            "poke",
+            "set",
+            "set",
+            "string_attach",
+            "wrench",
+        ]
+    assert len(found) == 1
+
+
+def test_a_ghost_takes_a_change_at_its_place_among_the_entries_of_its_list() -> None:
+    scenario = make_scenario({**SCENE, "ghost.integrator": "rk4"})
+    run = OfflineRun(scenario, expand_script([{"t": 1.0, **entry} for entry in DONE]), Observer())
+    assert isinstance(run._ghost, Ghost)
+    run.advance(2 * SECOND)
+    # The same tensor and integrator: the same motion, if all acts in the same order.
+    assert run._ghost.simulation.state.sha256() == run.simulation.state.sha256()
+
+
+def test_loads_are_summed_in_the_order_in_which_they_began_to_act() -> None:
+    script = [
+        {"t": 0.1, "at": {"vertex": 3}, "force": [0.1, 0.2, 0.3], "duration": 5.0},
+        {"t": 0.2, "wrench": {"at": {"vertex": 5}, "force": [0.7, -0.1, 0.05]}},
+        {"t": 0.3, "at": {"vertex": 9}, "force": [-0.3, 0.11, 0.01], "duration": 5.0},
+    ]
+    run = OfflineRun(make_scenario({**SCENE, "wrench_timeout": 0.0}), expand_script(script))
+    run.advance(SECOND)
+    kinds = [acting.load.force for acting in run.simulation.acting]
+    assert kinds == [(0.1, 0.2, 0.3), (0.7, -0.1, 0.05), (-0.3, 0.11, 0.01)]
+
+
+def test_a_session_recorded_before_lists_is_verified_to_the_bit(capsys) -> None:
+    (session,) = read_runs(BEFORE_LISTS)
+    at_one_instant = [kind for t, kind, _ in (decode_event(line, 1) for line in session.lines) if t == SECOND // 10]
+    assert at_one_instant == ["set", "poke", "poke", "poke"]
+    assert main(["replay", str(BEFORE_LISTS), "--verify"]) == 0
+    assert "every command and state is reproduced bit for bit" in capsys.readouterr().out
+
+
+def test_recorded_frames_go_to_a_node_of_any_name() -> None:
+    content = {"stamp_ns": 0, "frame_id": "spinning_top@tip;impulse", "force": [1, 0, 0], "torque": [0, 0, 0]}
+    knot = {"stamp_ns": 0, "frame_id": "spinning_top/mesh", "axes": "mesh", "point": [0, 0, 1]}
+    frames = ("world", "spinning_top")
+    assert in_words(of_event(0, "poke", content), {"tip"}, frames).frame_id == "body@tip;impulse"
+    assert in_words(of_event(0, "string_attach", knot), {"tip"}, frames).frame_id == "body/mesh"
+
+
+def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_reads() -> None:
+    pytest.importorskip("rclpy")
+    from rigid_proto_ros.ros.replay_publisher import session_commands
+
+    lines = Lines()
+    run = Simulation(make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).setup, lines)
+    poke = {"at": "tip", "axes": "body", "impulse": [1e-4, 0.0, 0.0]}
+    (command,) = expand_script([{"t": 0.5, **poke}])
+    named = type(command)(**{**command.__dict__, "frame_id": "spinning_top@tip;impulse"})
+    run.submit(core_command(named, 0, {"tip"}, Change, ("world", "spinning_top")), SECOND // 2)
+    run.advance(SECOND)
+    scene = make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).text
+    events = [(SECOND // 2, line) for line in lines.lines]
+    assert session_commands(RecordedSession(scene=scene, events=events, node_name="lab/spinning_top")) == [command]

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""A scene file is typed as rcl types it: one file through both readers."""
+
+import os
+
+import pytest
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scalar
+
+SCALARS = (
+    *(
+        "1",
+        "-1",
+        "+1",
+        "0",
+        "007",
+        "010",
+        "0x10",
+        "-0x1F",
+        "1.",
+        "1.0",
+        ".5",
+        "-.5",
+        "+2.5",
+        "1e3",
+        "1e-3",
+        "1.5E+2",
+        "1e400",
+    ),
+    *("true", "True", "TRUE", "yes", "no", "y", "N", "on", "Off", "false", "tRUE", "ja"),
+    *(".inf", "-.inf", ".nan", ".NaN", "inf", "nan", "abc", "1abc", "1_000", "0b1", "0o7", "1:30", "2020-01-01", "09"),
+    *('"1"', "'true'", '"a b"', "1e", "e5", "--1", "9223372036854775807", "-9223372036854775808"),
+    *("[1, 2]", "[1.0, 2.0]", "[a, b]", "[true, false]", '["1", "2"]'),
+)
+
+
+@pytest.fixture(scope="module")
+def rcl_values(ros_environment, tmp_path_factory):
+    """Every sample as rcl reads it, by number, from one parameter file."""
+    rclpy = pytest.importorskip("rclpy")
+    path = tmp_path_factory.mktemp("scene") / "scene.yaml"
+    lines = "".join(f"    p{k}: {text}\n" for k, text in enumerate(SCALARS))
+    path.write_text(f"typed:\n  ros__parameters:\n{lines}")
+    before = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    context = rclpy.Context()
+    try:
+        rclpy.init(args=[], context=context, domain_id=int(ros_environment["ROS_DOMAIN_ID"]))
+        node = rclpy.create_node(
+            "typed",
+            context=context,
+            cli_args=["--ros-args", "--params-file", str(path)],
+            automatically_declare_parameters_from_overrides=True,
+        )
+        values = {k: node.get_parameter(f"p{k}").value for k in range(len(SCALARS))}
+        node.destroy_node()
+    finally:
+        context.try_shutdown()
+        if before is None:
+            del os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]
+        else:
+            os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = before
+    return path, {k: list(v) if not isinstance(v, (str, bool, int, float)) else v for k, v in values.items()}
+
+
+@pytest.mark.parametrize("number", range(len(SCALARS)), ids=SCALARS)
+def test_a_value_has_the_type_and_value_that_rcl_gives_it(rcl_values, number):
+    path, theirs = rcl_values
+    ours = read_scene_file(path, "typed").values[f"p{number}"]
+    assert (type(ours), repr(ours)) == (type(theirs[number]), repr(theirs[number]))
+
+
+def test_later_sections_win_and_names_are_flattened():
+    text = """
+/**: {ros__parameters: {mass: 1.0, initial: {position: [1.0, 2.0, 3.0]}}}
+rigid_body: {ros__parameters: {mass: 2.0}}
+other: {ros__parameters: {mass: 9.0}}
+/**/rigid_body: {ros__parameters: {contacts.tip: [0.0, 0.0, 1.0]}}
+/rigid_body: {ros__parameters: {mass: 3.0}}
+"""
+    scene = read_scene_text(text)
+    assert scene.values == {"mass": 3.0, "initial.position": [1.0, 2.0, 3.0], "contacts.tip": [0.0, 0.0, 1.0]}
+    assert scene.wildcard == {"initial.position"}
+
+
+def test_a_mixed_list_is_refused_with_file_line_and_remedy(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text("rigid_body:\n  ros__parameters:\n    mass: 1.0\n    gravity: [0, 0, -9.81]\n")
+    with pytest.raises(InputError, match=r"scene.yaml, line 4.*\[0.0, 0.0, -9.81\]"):
+        read_scene_file(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("\n[a]: {ros__parameters: {}}", "line 2: got '[a]'; accepted: a name"),
+        ("? {a: b}\n: {ros__parameters: {}}", "line 1: got 'map'; accepted: a name"),
+        ("rigid_body: {? [a] : {mass: 1.0}}", "line 1: got '[a]'; accepted: a name"),
+        ("rigid_body: {ros__parameters: {? [a] : 1.0}}", "line 1: got '[a]'; accepted: a name"),
+        ("rigid_body:\n  ros__parameters: {mass: &a [*a]}", "line 2: got 'the alias *a'"),
+        ("rigid_body:\n  ros__parameters: &a\n    b: *a", "line 3: got 'the alias *a'"),
+        ("a: &a {ros__parameters: {}}\nrigid_body: *a", "line 2: got 'the alias *a'"),
+    ],
+)
+def test_names_that_are_none_and_aliases_are_refused_with_their_line(text, words):
+    with pytest.raises(InputError) as refused:
+        read_scene_text(text)
+    assert words in str(refused.value)
+
+
+def test_a_huge_whole_number_is_a_double():
+    assert scalar("9223372036854775808") == 9.223372036854775808e18

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: MIT
+"""Bags of a real node's topics, in every layout that ros2 bag record has: read, shown, verified to the bit."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mcap")
+pytest.importorskip("rclpy")
+
+from bag_recorder import BagRecorder, Logged, write_bag, write_bag_file
+from command_rig import RosClient, wrench_message
+from flights import SECOND
+from mcap.writer import CompressionType
+from ros_process import running_node
+
+from rigid_proto_ros.base.bundled import body_path
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.messages import cdr
+from rigid_proto_ros.messages.session_messages import read_text
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.check import verify
+
+
+@pytest.fixture(scope="module")
+def flown(ros_environment, tmp_path_factory) -> list[Logged]:
+    """Two runs of a node, poked, pulled and changed in both; the reset between them takes changed parameters along."""
+    folder = tmp_path_factory.mktemp("flown")
+    shutil.copy(body_path("l_bracket"), folder / "bracket.obj")
+    recorder = BagRecorder(ros_environment)
+    arguments = ["-p", f"mesh:={folder / 'bracket.obj'}", "-p", "initial.angular_velocity:=[0.3, 2.0, 0.1]"]
+    arguments += ["-p", "contacts.tip:=[0.01, 0.0, 0.0]", "-p", "start_paused:=true"]
+    with (
+        RosClient(ros_environment) as client,
+        running_node("--ros-args", *arguments, environment=ros_environment, log=folder / "node"),
+    ):
+        client.meet()
+        # Recorders find the node late; nothing has moved by then.
+        client.until(lambda: any(m.topic.endswith("twist") for m in recorder.messages), "states")
+        client.pause(False)
+        _fly(client)
+        client.reset()
+        _fly(client)
+    messages = recorder.close()
+    (folder / "bracket.obj").unlink()
+    return messages
+
+
+def _fly(client: RosClient) -> None:
+    client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
+    client.publish("wrench", wrench_message(0, "body", torque=(0.0, 0.0, 1e-4)))
+    client.fly_until(SECOND // 2)
+    client.set(gravity=[0.0, 0.0, -0.5], density=2000.0)
+    client.pause(True)
+    client.trigger("step")
+    client.publish("poke", wrench_message(0, "world@point/0.0,0.0,0.0;duration=0.1", (0.01, 0.0, 0.0)))
+    client.pause(False)
+    client.fly_until(SECOND)
+    client.set(string__target=[0.0, 0.0, 0.2], string__attached=True)
+    client.fly_until(SECOND * 3 // 2)
+    client.set(string__attached=False, density=1000.0, gravity=[0.0, 0.0, 0.0])
+    client.trigger("clear_wrench")
+    client.fly_until(SECOND * 7 // 4)
+
+
+@pytest.fixture
+def mesh_beside(tmp_path) -> None:
+    """The file that the node flew, where a bag's reader looks for it."""
+    shutil.copy(body_path("l_bracket"), tmp_path / "bracket.obj")
+
+
+LAYOUTS = {
+    "bare": lambda to, m: write_bag_file(to.with_suffix(".mcap"), m),
+    "folder": lambda to, m: write_bag(to, m),
+    "split": lambda to, m: write_bag(to, m, files=3, chunk_size=20_000),
+    "zstd chunks": lambda to, m: write_bag(to, m, compression=CompressionType.ZSTD),
+    "lz4 chunks": lambda to, m: write_bag(to, m, compression=CompressionType.LZ4),
+    "no chunks": lambda to, m: write_bag(to, m, chunked=False),
+    "compressed messages": lambda to, m: write_bag(to, m, compression_mode="MESSAGE"),
+    "bare, compressed messages": lambda to, m: write_bag_file(to.with_suffix(".mcap"), m, compress_messages=True),
+    "compressed files": lambda to, m: write_bag(to, m, compression_mode="FILE", files=2),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_a_bag_in_every_layout_is_verified_to_the_bit(flown, mesh_beside, tmp_path, layout):
+    LAYOUTS[layout](tmp_path / "bag", flown)
+    path = tmp_path / "bag" if (tmp_path / "bag").is_dir() else tmp_path / "bag.mcap"
+    runs = read_runs(path)
+    assert len(runs) == 2
+    for run in runs:
+        assert len(run.events) >= 9
+        assert len(run.published["pose"]) > 150 and len(run.published["odom"]) > 150
+        assert verify(run) is None
+    assert main(["replay", str(path), "--verify"]) == 0
+
+
+def test_states_of_the_two_runs_are_told_apart_by_their_stamps(flown, tmp_path):
+    LAYOUTS["bare"](tmp_path / "bag", flown)
+    for run in read_runs(tmp_path / "bag.mcap"):
+        for rows in run.published.values():
+            assert (np.diff(rows.times) >= 0).all()
+            assert rows.times[-1] >= SECOND * 7 // 4
+            assert rows.times[0] < SECOND // 4
+
+
+def test_the_second_run_begins_with_the_scene_in_force_at_its_reset(flown, tmp_path):
+    LAYOUTS["bare"](tmp_path / "bag", flown)
+    first, second = read_runs(tmp_path / "bag.mcap")
+    assert "gravity: [0.0, 0.0, 0.0]" in first.scene
+    # What the first run left: density set, mass 0, string loose with a new target.
+    assert "string.target: [0.0, 0.0, 0.2]" in second.scene
+    assert "string.target: [0.0, 0.0, 0.2]" not in first.scene
+
+
+def test_a_mesh_that_is_nowhere_is_named_with_its_hash(flown, tmp_path, monkeypatch):
+    monkeypatch.setattr("rigid_proto_ros.session.mesh.bundled_names", tuple)
+    LAYOUTS["bare"](tmp_path / "bag", flown)
+    (run, _) = read_runs(tmp_path / "bag.mcap")
+    with pytest.raises(InputError, match=f"bracket.obj.*{run.mesh_sha256}"):
+        verify(run)
+
+
+def test_a_mesh_of_the_same_bytes_among_the_bundled_ones_will_do(flown, tmp_path):
+    LAYOUTS["bare"](tmp_path / "bag", flown)
+    assert verify(read_runs(tmp_path / "bag.mcap")[0]) is None
+
+
+def _without(messages: list[Logged], *names: str) -> list[Logged]:
+    return [m for m in messages if m.topic.rpartition("/")[2] not in names]
+
+
+def _command(capsys, *arguments) -> tuple[int, str, str]:
+    status = main(["replay", *map(str, arguments)])
+    said = capsys.readouterr()
+    return status, said.out, said.err
+
+
+def test_a_bag_that_begins_later_is_shown_and_not_verified(flown, mesh_beside, tmp_path, capsys):
+    events = [m for m in flown if m.topic.endswith("events")]
+    first_run = events[: next(k for k, m in enumerate(events) if "reset" in read_text(m.data, ""))]
+    begin, end = first_run[3].log_time, first_run[-1].log_time
+    late = [m for m in flown if begin < m.log_time < end or (m.topic.endswith("scene") and m.log_time < begin)]
+    LAYOUTS["bare"](tmp_path / "bag", late)
+    bag = tmp_path / "bag.mcap"
+    status, out, err = _command(capsys, bag)
+    assert status == 0 and "states" in out
+    status, _, err = _command(capsys, bag, "--verify")
+    assert status == 2
+    assert len(err.splitlines()) == 1 and "begins at" in err
+
+
+def test_from_a_reset_on_a_bag_that_began_later_is_verified(flown, mesh_beside, tmp_path, capsys):
+    begin = [m for m in flown if m.topic.endswith("events")][4].log_time
+    late = [m for m in flown if m.log_time > begin or m.topic.endswith("scene")]
+    LAYOUTS["bare"](tmp_path / "bag", late)
+    status, out, _ = _command(capsys, tmp_path / "bag.mcap", "--verify")
+    assert status == 0
+    assert "run 1: began before the recording did" in out
+
+
+@pytest.mark.parametrize("missing", [("events",), ("scene",), ("events", "scene"), ("pose", "twist", "odom")])
+def test_a_bag_that_lacks_a_topic_is_shown_with_a_scene_and_verify_names_the_topic(
+    flown, mesh_beside, tmp_path, capsys, missing
+):
+    LAYOUTS["folder"](tmp_path / "bag", _without(flown, *missing))
+    bag, scene = tmp_path / "bag", tmp_path / "scene.yaml"
+    status, _, err = _command(capsys, bag, "--verify")
+    assert status == 2
+    assert len(err.splitlines()) == 1
+    assert all(f"/rigid_body/{name}" in err for name in missing[:1])
+    if "pose" in missing:
+        return
+    scene.write_text(f"rigid_body:\n  ros__parameters:\n    mesh: {tmp_path / 'bracket.obj'}\n")
+    shown = tmp_path / "shown.mcap"
+    assert _command(capsys, bag, "--scene", scene, "--record", shown)[0] == 0
+    recorded = read_runs(bag)
+    again = read_runs(shown)
+    assert sum(len(run.times) for run in again) == sum(len(run.times) for run in recorded)
+    assert np.array_equal(again[0].published["pose"].rows[-1], recorded[0].published["pose"].rows[-1])
+
+
+def test_without_a_scene_drawing_asks_for_one(flown, tmp_path, capsys):
+    LAYOUTS["bare"](tmp_path / "bag", _without(flown, "scene"))
+    status, _, err = _command(capsys, tmp_path / "bag.mcap", "--record", tmp_path / "x.mcap")
+    assert status == 2 and "--scene FILE" in err and len(err.splitlines()) == 1
+
+
+def test_a_bag_whose_recorder_was_killed_has_no_metadata_and_no_end(flown, mesh_beside, tmp_path):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    write_bag_file(folder / "bag_0.mcap", flown, finish=False)
+    data = (folder / "bag_0.mcap").read_bytes()
+    # rosbag2's chunks are large and not compressed: what lies before a cut inside one counts too.
+    (folder / "bag_0.mcap").write_bytes(data[: len(data) * 3 // 4])
+    runs = read_runs(folder)
+    assert not runs[-1].complete
+    assert sum(len(run.times) for run in runs) > 200
+    for run in runs:
+        assert verify(run) is None
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_changed_event_in_a_bag_is_named(flown, mesh_beside, tmp_path, seed, capsys):
+    rng = random.Random(seed)
+    at = [k for k, m in enumerate(flown) if m.topic.endswith("events")]
+    number = rng.randrange(len(at))
+    event = json.loads(read_text(flown[at[number]].data, ""))
+    event["time_ns"] += rng.choice((-1, 1)) if event["time_ns"] else 1
+    changed = list(flown)
+    changed[at[number]] = replace(flown[at[number]], data=cdr.string(json.dumps(event)))
+    LAYOUTS["bare"](tmp_path / "bag", changed)
+    status, _, err = _command(capsys, tmp_path / "bag.mcap", "--verify")
+    resets = [k for k, i in enumerate(at) if '"kind": "reset"' in read_text(flown[i].data, "")]
+    within = number - max((k for k in resets if k <= number), default=0)
+    assert status == 1, err
+    assert f"command {within + 1} " in err and len(err.splitlines()) == 1
+
+
+def test_a_changed_state_is_named(flown, mesh_beside, tmp_path, capsys):
+    at = [k for k, m in enumerate(flown) if m.topic.endswith("/twist")][100]
+    data = bytearray(flown[at].data)
+    data[-8] ^= 1
+    changed = [*flown[:at], replace(flown[at], data=bytes(data)), *flown[at + 1 :]]
+    LAYOUTS["bare"](tmp_path / "bag", changed)
+    status, _, err = _command(capsys, tmp_path / "bag.mcap", "--verify")
+    assert status == 1 and "twist differs" in err
+
+
+def test_what_is_no_bag_is_refused_in_one_line(flown, tmp_path, capsys):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    sqlite = LAYOUTS["folder"](tmp_path / "sqlite", flown)
+    metadata = Path(sqlite) / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("storage_identifier: mcap", "storage_identifier: sqlite3"))
+    other = tmp_path / "other.mcap"
+    write_bag_file(other, [Logged("/chatter", "std_msgs/msg/String", 1, cdr.string("hello"))])
+    garbled = tmp_path / "garbled.mcap"
+    bad = [replace(m, data=b"\x00\x01") if m.topic.endswith("pose") else m for m in flown]
+    write_bag_file(garbled, bad)
+    for path, word in ((empty, "ros2 bag record"), (sqlite, "sqlite3"), (other, "/chatter"), (garbled, "pose")):
+        status, _, err = _command(capsys, path)
+        assert status == 2 and word in err and len(err.splitlines()) == 1, err
+
+
+def test_of_two_bodies_in_a_bag_one_is_to_be_chosen(flown, mesh_beside, tmp_path, capsys):
+    both = [*flown, *(replace(m, topic=m.topic.replace("/rigid_body/", "/other/")) for m in flown)]
+    LAYOUTS["bare"](tmp_path / "bag", both)
+    bag = tmp_path / "bag.mcap"
+    status, _, err = _command(capsys, bag)
+    assert status == 2 and "/other" in err and "--node" in err
+    assert _command(capsys, bag, "--node", "/other", "--verify")[0] == 0

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""A session outlives its recorder: a node killed while it records, a file cut anywhere; and --repair makes it whole."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from conftest import ENDINGS, needs_rerun
+
+pytest.importorskip("mcap")
+
+from mcap.reader import make_reader
+
+from rigid_proto_ros.base.bundled import example_path, scene_path
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.script import read_script
+from rigid_proto_ros.session.check import verify
+from rigid_proto_ros.session.mcap_file import RECORD_HEAD
+from rigid_proto_ros.session.mcap_observer import McapObserver
+
+SECOND = 10**9
+MAGIC_BYTES = 8
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("crash") / "whole.mcap"
+    recorder = McapObserver(path, simulated_log=True)
+    assert OfflineRun(read_scene("t_handle"), read_script(example_path("flip_and_poke")), recorder).advance(5 * SECOND)
+    recorder.close()
+    return path
+
+
+def records(data: bytes) -> list[tuple[int, int]]:
+    """Offset and opcode of each record of the file."""
+    at, found = MAGIC_BYTES, []
+    while at + RECORD_HEAD.size <= len(data) - MAGIC_BYTES:
+        opcode, length = RECORD_HEAD.unpack_from(data, at)
+        found.append((at, opcode))
+        at += RECORD_HEAD.size + length
+    return found
+
+
+def last_state_before(data: bytes, offset: int) -> int:
+    """End of the simulated time in the chunks that lie whole before an offset."""
+    end_ns = -1
+    for at, opcode in records(data):
+        _, length = RECORD_HEAD.unpack_from(data, at)
+        if opcode == 0x06 and at + RECORD_HEAD.size + length <= offset:
+            end_ns = int.from_bytes(data[at + 17 : at + 25], "little")
+    return end_ns
+
+
+def offsets(data: bytes) -> list[int]:
+    """At random, and at, just before and just behind every border, within heads, and in the index and footer."""
+    found = random.Random(3).sample(range(MAGIC_BYTES, len(data)), 60)
+    found += [at + d for at, _ in records(data) for d in (-1, 0, 1, RECORD_HEAD.size, RECORD_HEAD.size + 3)]
+    return sorted({offset for offset in found if offset <= len(data)} | {len(data) - d for d in (1, 7, 8, 9, 20, 37)})
+
+
+def test_a_file_cut_anywhere_shows_all_but_what_the_cut_fell_into(recording, tmp_path):
+    data = recording.read_bytes()
+    (whole,) = read_runs(recording)
+    cut = tmp_path / "cut.mcap"
+    empty = 0
+    for offset in offsets(data):
+        cut.write_bytes(data[:offset])
+        try:
+            (session,) = read_runs(cut)
+        except InputError as error:
+            # Before the first topic is declared there is nothing to open.
+            assert last_state_before(data, offset) == -1
+            assert "\n" not in str(error)
+            empty += 1
+            continue
+        assert session.complete == (offset == len(data))
+        n = len(session.times)
+        assert session.rows.tobytes() == whole.rows[:n].tobytes()
+        assert session.lines == whole.lines[: len(session.lines)]
+        # A chunk ends at its last message, an event perhaps; states are 10 ms apart.
+        assert session.end_ns > last_state_before(data, offset) - 20_000_000
+    assert empty < 30
+
+
+def test_what_a_cut_left_is_verified(recording, tmp_path):
+    data = recording.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    for offset in random.Random(4).sample(range(len(data) // 2, len(data)), 4):
+        cut.write_bytes(data[:offset])
+        assert verify(read_runs(cut)[0]) is None
+
+
+def test_repair_makes_a_file_that_the_stock_reader_opens(recording, tmp_path, capsys):
+    data = recording.read_bytes()
+    cut, repaired = tmp_path / "cut.mcap", tmp_path / "repaired.mcap"
+    for offset in random.Random(5).sample(range(len(data) // 4, len(data)), 8):
+        cut.write_bytes(data[:offset])
+        assert main(["replay", str(cut), "--repair", str(repaired)]) == 0
+        assert "truncated" in capsys.readouterr().out
+        (before,), (after,) = read_runs(cut), read_runs(repaired)
+        assert after.complete and after.lines == before.lines
+        assert after.rows.tobytes() == before.rows.tobytes()
+        assert after.attachments == before.attachments
+        with open(repaired, "rb") as stream:
+            summary = make_reader(stream, validate_crcs=True).get_summary()
+            counts = {summary.channels[k].topic: n for k, n in summary.statistics.channel_message_counts.items()}
+        assert counts.get("/rigid_body/pose", 0) == len(before.times)
+
+
+def test_repair_is_refused_where_it_would_harm(recording, tmp_path, capsys):
+    for target in (recording, tmp_path / "other.rrd", recording / "x.mcap"):
+        before = recording.read_bytes()
+        assert main(["replay", str(recording), "--repair", str(target)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+        assert recording.read_bytes() == before
+
+
+def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
+    data = recording.read_bytes()
+    chunks = [at for at, opcode in records(data) if opcode == 0x06]
+    for offset in (chunks[2] + 60, chunks[3] + 30, chunks[4] + 200):
+        damaged = bytearray(data)
+        damaged[offset : offset + 16] = bytes(255 - b for b in damaged[offset : offset + 16])
+        (tmp_path / "damaged.mcap").write_bytes(damaged)
+        assert main(["replay", str(tmp_path / "damaged.mcap")]) == 2
+        error = capsys.readouterr().err
+        assert len(error.splitlines()) == 1 and "damaged.mcap" in error
+
+
+def test_random_bytes_never_end_in_a_traceback(recording, tmp_path, capsys):
+    data, rng = recording.read_bytes(), random.Random(6)
+    path = tmp_path / "fuzzed.mcap"
+    for _ in range(40):
+        fuzzed = bytearray(data[: rng.randrange(len(data))])
+        for _ in range(rng.randrange(1, 4)):
+            fuzzed[rng.randrange(len(fuzzed))] = rng.randrange(256)
+        path.write_bytes(fuzzed)
+        assert main(["replay", str(path), "--verify"]) in (0, 1, 2)
+        assert "Traceback" not in capsys.readouterr().err
+
+
+# A node killed
+
+
+def kill_while_recording(environment: dict[str, str], folder: Path, ending: str, after_s: float) -> None:
+    from command_rig import RosClient, stamp_ns, wrench_message
+    from ros_process import RosProcess
+
+    pytest.importorskip("rclpy")
+    path = folder / f"session{ending}"
+    arguments = ["--params-file", scene_path("t_handle"), "-p", f"record:={path}", "-p", "publish_rate:=200"]
+    node = RosProcess("rigid_body_node", "--ros-args", *arguments, environment=environment, log=folder / "node")
+    try:
+        with RosClient(environment) as client:
+            node.wait_for("is simulating")
+            client.meet()
+            client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
+            end = time.monotonic() + after_s
+            client.until(lambda: client.heard_count("pose") and time.monotonic() > end, "states")
+            node.process.kill()
+            node.process.wait()
+            last = max(stamp_ns(message) for topic in ("pose", "twist") for message in client.heard(topic, last=1))
+    finally:
+        node.process.kill()
+        node.process.wait()
+    (session,) = read_runs(path)
+    assert not session.complete
+    assert last - session.end_ns <= SECOND
+    assert verify(session) is None
+    repaired = folder / f"repaired{ending}"
+    assert main(["replay", str(path), "--repair", str(repaired)]) == 0
+    (again,) = read_runs(repaired)
+    assert again.complete and again.rows.tobytes() == session.rows.tobytes() and again.lines == session.lines
+    if ending == ".rrd":
+        from rigid_proto_ros.rerun_view.viewers import viewer_program
+
+        subprocess.run([viewer_program(), "rrd", "verify", str(repaired)], capture_output=True, check=True)
+
+
+@pytest.mark.parametrize(
+    "seed, ending",
+    [(0, ".mcap"), *(pytest.param(seed, ".rrd", marks=needs_rerun) for seed in (0, 1))],
+)
+def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment, tmp_path, ending, seed):
+    kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.3, 3.0))
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_node_killed_as_soon_as_it_flies_leaves_a_recording_with_its_scene(ros_environment, tmp_path, ending):
+    kill_while_recording(ros_environment, tmp_path, ending, 0.0)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("seed", range(1, 21))
+def test_a_node_killed_at_more_random_moments(ros_environment, tmp_path, ending, seed):
+    kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.0, 6.0))

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: MIT
+"""Sessions as .mcap: what is in them equals the simulation, stock readers decode them, and nothing stops the flight."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mcap_ros2")
+
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from rigid_proto_ros.base.bundled import body_path, example_path, scene_path
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.messages.session_messages import twist_row
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.script import read_script
+from rigid_proto_ros.session.check import verify
+from rigid_proto_ros.session.mcap_observer import McapObserver
+from rigid_proto_ros.simulation.observer import Observer, Observers
+
+SECOND = 10**9
+
+
+class Kept(Observer):
+    """States and event lines as the simulation told them."""
+
+    def __init__(self) -> None:
+        self.states: dict[int, list[float]] = {}
+        self.lines: list[str] = []
+
+    def state(self, time_ns, row) -> None:
+        self.states[time_ns] = row.tolist()
+
+    def event(self, time_ns, line) -> None:
+        self.lines.append(line)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """A recorded run with pokes and changes in flight, and what the simulation told."""
+    path = tmp_path_factory.mktemp("flown") / "session.mcap"
+    kept, recorder = Kept(), McapObserver(path, simulated_log=True)
+    scenario = read_scene("t_handle")
+    run = OfflineRun(scenario, read_script(example_path("heavier_in_flight"), 1.5), Observers(recorder, kept))
+    assert run.advance(6 * SECOND)
+    recorder.close()
+    return path, kept
+
+
+def decoded(path) -> dict[str, list]:
+    """(log time, decoded message) by topic, through the stock reader."""
+    with open(path, "rb") as stream:
+        found: dict[str, list] = {}
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        for _, channel, message, content in reader.iter_decoded_messages():
+            found.setdefault(channel.topic, []).append((message.log_time, content))
+    return found
+
+
+def stamp(header) -> int:
+    return header.stamp.sec * SECOND + header.stamp.nanosec
+
+
+def test_the_stock_reader_decodes_every_state_to_the_bit(flown):
+    path, kept = flown
+    messages = decoded(path)
+    poses, twists = messages["/rigid_body/pose"], messages["/rigid_body/twist"]
+    assert [stamp(m.header) for _, m in poses] == [stamp(m.header) for _, m in twists] == list(kept.states)
+    for (_, pose), (_, twist), row in zip(poses, twists, kept.states.values(), strict=True):
+        p, q, v, w = pose.pose.position, pose.pose.orientation, twist.twist.linear, twist.twist.angular
+        assert [p.x, p.y, p.z, q.x, q.y, q.z, q.w] == row[:7]
+        assert [v.x, v.y, v.z, w.x, w.y, w.z] == twist_row(row)
+        assert pose.header.frame_id == twist.header.frame_id == "world"
+
+
+def test_events_scene_applied_and_inertia_are_there(flown):
+    path, kept = flown
+    messages = decoded(path)
+    assert [m.data for _, m in messages["/rigid_body/events"]] == kept.lines
+    scenes = [m.data for _, m in messages["/rigid_body/scene"]]
+    sets = [line for line in kept.lines if json.loads(line)["kind"] == "set"]
+    assert len(sets) > 0 and len(scenes) == 1 + len(sets)
+    assert scenes[0] == read_scene("t_handle").text
+    masses = [m.inertia.m for _, m in messages["/rigid_body/inertia"]]
+    assert len(masses) == 1 + len(sets) and len(set(masses)) == len(masses)
+    applied = messages["/rigid_body/applied"]
+    pokes = [json.loads(line) for line in kept.lines if json.loads(line)["kind"] in ("poke", "wrench")]
+    assert [stamp(m.header) for _, m in applied] == [event["time_ns"] for event in pokes]
+    force = applied[0][1].wrench.force
+    assert [force.x, force.y, force.z] == pokes[0]["content"]["force"]
+
+
+def test_log_times_are_simulated_in_a_run_without_a_clock(flown):
+    path, kept = flown
+    assert [log for log, _ in decoded(path)["/rigid_body/pose"]] == list(kept.states)
+
+
+def test_the_summary_counts_what_is_there_and_the_mesh_file_is_inside(flown):
+    path, kept = flown
+    with open(path, "rb") as stream:
+        reader = make_reader(stream)
+        summary = reader.get_summary()
+        (attachment,) = reader.iter_attachments()
+        assert reader.get_header().profile == "ros2"
+        assert {"cpu", "python", "numpy"} <= next(iter(reader.iter_metadata())).metadata.keys()
+    counts = {summary.channels[k].topic: n for k, n in summary.statistics.channel_message_counts.items()}
+    assert counts["/rigid_body/pose"] == counts["/rigid_body/twist"] == len(kept.states)
+    assert counts["/rigid_body/events"] == len(kept.lines)
+    assert all("offered_qos_profiles" in c.metadata for c in summary.channels.values())
+    # A cut costs a chunk: none holds more than half a second.
+    assert all(c.message_end_time - c.message_start_time <= SECOND // 2 for c in summary.chunk_indexes)
+    assert hashlib.sha256(attachment.data).digest() == hashlib.sha256(body_path("t_handle").read_bytes()).digest()
+
+
+def test_a_session_is_read_back_and_verified(flown):
+    path, kept = flown
+    (session,) = read_runs(path)
+    assert session.complete
+    assert session.lines == kept.lines
+    assert session.times.tolist() == list(kept.states)
+    rows = np.array(list(kept.states.values()))
+    assert session.rows[:, :10].tobytes() == rows[:, :10].tobytes()
+    assert np.abs(session.rows[:, 10:] - rows[:, 10:]).max() < 1e-13  # measured 7e-15: there and back through the world
+    assert verify(session) is None
+
+
+def test_the_mesh_comes_from_inside_where_its_file_is_gone(tmp_path):
+    mesh = tmp_path / "mine.obj"
+    # Not a bundled one's bytes.
+    mesh.write_text("# mine\n" + body_path("book").read_text())
+    session = tmp_path / "session.mcap"
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(
+        f"rigid_body:\n  ros__parameters:\n    mesh: {mesh}\n    initial.angular_velocity: [1.0, 2.0, 3.0]\n"
+    )
+    assert main(["simulate", str(scene), "--duration", "0.5", "--bag", str(session)]) == 0
+    mesh.unlink()
+    assert main(["replay", str(session), "--verify"]) == 0
+
+
+def test_a_mesh_changed_in_flight_is_inside_too(tmp_path):
+    for name in ("book", "hammer"):
+        (tmp_path / f"{name}.obj").write_text("# mine\n" + body_path(name).read_text())
+    script = tmp_path / "script.yaml"
+    script.write_text(
+        f"- {{t: 0.2, set: {{mesh: {tmp_path / 'hammer.obj'}}}}}\n- {{t: 0.3, at: com, impulse: [1, 0, 0]}}\n"
+    )
+    session = tmp_path / "session.mcap"
+    arguments = ["--set", f"mesh={tmp_path / 'book.obj'}", "--script", str(script), "--duration", "0.5"]
+    assert main(["simulate", str(scene_path("book")), *arguments, "--bag", str(session)]) == 0
+    for name in ("book", "hammer"):
+        (tmp_path / f"{name}.obj").unlink()
+    assert main(["replay", str(session), "--verify"]) == 0
+
+
+def test_without_rerun_a_session_is_recorded_and_verified(tmp_path):
+    code = (
+        "import sys; sys.modules['rerun'] = None\n"
+        "from rigid_proto_ros.cli.main import main\n"
+        "status = main(['simulate', 'book', '--duration', '0.2', '--bag', sys.argv[1]])\n"
+        "sys.exit(status or main(['replay', sys.argv[1], '--verify']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "s.mcap")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "verified" in done.stdout
+
+
+def test_bag_and_record_together_hold_the_same_run(tmp_path):
+    pytest.importorskip("rerun")
+    rrd, bag = tmp_path / "s.rrd", tmp_path / "s.mcap"
+    script = str(example_path("flip_and_poke"))
+    arguments = ["simulate", "t_handle", "--script", script, "--duration", "2"]
+    assert main([*arguments, "--record", str(rrd), "--bag", str(bag)]) == 0
+    (one,), (other,) = read_runs(rrd), read_runs(bag)
+    assert one.lines == other.lines
+    assert one.times.tolist() == other.times.tolist()
+    assert one.scene == other.scene
+    # And one becomes the other.
+    again = tmp_path / "again.mcap"
+    assert main(["replay", str(rrd), "--record", str(again)]) == 0
+    (third,) = read_runs(again)
+    assert third.published["twist"].rows.tobytes() == other.published["twist"].rows.tobytes()
+    back = tmp_path / "back.rrd"
+    assert main(["replay", str(bag), "--record", str(back)]) == 0
+    (fourth,) = read_runs(back)
+    assert fourth.rows.tobytes() == one.rows.tobytes()
+
+
+def test_a_path_that_cannot_be_written_is_refused(tmp_path, capsys):
+    full = tmp_path / "full.mcap"
+    full.symlink_to("/dev/full")
+    for path in (full, full / "s.mcap"):
+        with pytest.raises(InputError, match="record"):
+            McapObserver(path)
+    assert main(["simulate", "book", "--duration", "0.1", "--bag", str(tmp_path / "s.bag")]) == 2
+    assert ".mcap" in capsys.readouterr().err
+
+
+def _written(path: Path) -> list:
+    try:
+        return read_runs(path)
+    except InputError:
+        return []
+
+
+def _fly_with_trouble(observer: McapObserver, trouble) -> None:
+    run = OfflineRun(read_scene("book"), [], observer)
+    run.advance(SECOND)
+    path, deadline = Path(observer.recording), time.monotonic() + 180.0
+    # The first to be written are the schemas, which are no states yet.
+    while not any(len(session.times) for session in _written(path)):
+        assert time.monotonic() < deadline, "nothing is written"
+        time.sleep(0.05)
+    trouble()
+    assert run.advance(4 * SECOND)
+    observer.close()
+
+
+def test_a_lost_folder_stops_the_recording_and_not_the_flight(tmp_path):
+    folder, said = tmp_path / "folder", []
+    folder.mkdir()
+    observer = McapObserver(folder / "s.mcap", on_error=said.append)
+    _fly_with_trouble(observer, lambda: shutil.rmtree(folder))
+    assert len(said) == 1 and observer.error == said[0]
+    assert "s.mcap" in said[0] and "recording stopped" in said[0]
+    assert observer.recording == ""
+
+
+def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_readable(tmp_path, monkeypatch):
+    said: list[str] = []
+    path = tmp_path / "s.mcap"
+    observer = McapObserver(path, on_error=said.append, simulated_log=True)
+
+    def fill_up() -> None:
+        def write(self, data):
+            # As a disk does: a part of it, then no more.
+            self._stream.write(data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        monkeypatch.setattr("rigid_proto_ros.session.mcap_file.McapFile._write", write)
+
+    _fly_with_trouble(observer, fill_up)
+    assert said == [f"recording stopped: {path}: No space left on device"]
+    (session,) = read_runs(path)
+    assert not session.complete
+    assert 0 < session.end_ns <= SECOND
+    assert verify(session) is None

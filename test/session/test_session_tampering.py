@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: MIT
+"""A recording is evidence: any single change of it is found and named, and what can't be decoded is refused."""
+
+from __future__ import annotations
+
+import json
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mcap")
+
+from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.script import read_script
+from rigid_proto_ros.session.check import broken_link, verify
+from rigid_proto_ros.session.mcap_observer import McapObserver
+from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.simulation.event_log import EventLog
+
+SECOND = 10**9
+
+SCRIPT = """
+- {t: 0.1, at: tip, force: [0.0, 0.01, 0.0], duration: 0.3}
+- {t: 0.2, at: {vertex: 3}, impulse: [0.0, 0.0, 0.002]}
+- {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-5, 0.0], axes: body, duration: 0.5}}
+- {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5]}}
+- {t: 0.6, string: {attach: tip, target: [0.1, 0.0, 0.2]}}
+- {t: 0.9, string: release}
+- {t: 1.0, service: clear_wrench}
+- {t: 1.1, set: {publish_clock: true}}
+"""
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory) -> RecordedSession:
+    """A run with every kind of command in it, some without effect on the motion."""
+    folder = tmp_path_factory.mktemp("flown")
+    (folder / "script.yaml").write_text(SCRIPT)
+    recorder = McapObserver(folder / "s.mcap", simulated_log=True)
+    assert OfflineRun(read_scene("t_handle"), read_script(folder / "script.yaml"), recorder).advance(2 * SECOND)
+    recorder.close()
+    (read,) = read_runs(folder / "s.mcap")
+    assert {json.loads(line)["kind"] for line in read.lines} == {
+        *("poke", "wrench", "set", "string_attach", "string_target", "string_release", "clear_wrench")
+    }
+    assert verify(read) is None
+    return read
+
+
+def leaves(value, path=()) -> list[tuple]:
+    """Paths of all fields of an event."""
+    if isinstance(value, dict):
+        return [leaf for key, inner in value.items() for leaf in leaves(inner, (*path, key))]
+    if isinstance(value, list):
+        return [leaf for k, inner in enumerate(value) for leaf in leaves(inner, (*path, k))]
+    return [path]
+
+
+def changed_value(value, rng: random.Random):
+    """Another value of the same type, as little or as much different as it may be."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return value + rng.choice((-1, 1, 1_000_003)) if value else 1
+    if isinstance(value, float):
+        return rng.choice((float(np.nextafter(value, 10.0)), value + 1.0, -value if value else 1e-300))
+    at = rng.randrange(len(value)) if value else 0
+    return value[:at] + ("0" if value[at : at + 1] != "0" else "1") + value[at + 1 :]
+
+
+def with_line(session: RecordedSession, number: int, line: str) -> RecordedSession:
+    events = list(session.events)
+    events[number] = (events[number][0], line)
+    return replace(session, events=events)
+
+
+def check_random_change(session: RecordedSession, seed: int) -> None:
+    rng = random.Random(seed)
+    number = rng.randrange(len(session.events))
+    event = json.loads(session.lines[number])
+    path = rng.choice(leaves(event))
+    holder = event
+    for key in path[:-1]:
+        holder = holder[key]
+    holder[path[-1]] = changed_value(holder[path[-1]], rng)
+    difference = verify(with_line(session, number, json.dumps(event)))
+    assert difference is not None, path
+    assert f"command {number + 1} " in str(difference), (path, difference)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_random_change_of_an_event_is_found_and_named(session, seed):
+    check_random_change(session, seed)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("seed", range(10, 110))
+def test_a_hundred_more_random_changes(session, seed):
+    check_random_change(session, seed)
+
+
+def test_a_change_without_effect_on_the_motion_is_found(session):
+    number = next(k for k, line in enumerate(session.lines) if "publish_clock" in line)
+    line = session.lines[number].replace("true", "false")
+    assert f"command {number + 1} " in str(verify(with_line(session, number, line)))
+
+
+def rechained(session: RecordedSession, change) -> RecordedSession:
+    """The session with its event contents changed, and every hash made to fit again."""
+    log, events = EventLog(), []
+    for number, (time_ns, line) in enumerate(session.events):
+        event = json.loads(line)
+        change(number, event)
+        events.append((time_ns, log.append(event["time_ns"], event["kind"], event["content"])))
+    changed = replace(session, events=events)
+    assert broken_link(changed.lines) is None
+    return changed
+
+
+def test_with_hashes_made_to_fit_the_motion_still_tells(session):
+    def stronger(number, event):
+        if number == 0:
+            event["content"]["force"][1] *= 2.0
+
+    difference = verify(rechained(session, stronger))
+    assert "differs" in str(difference)
+    assert difference.time_ns == 110_000_000  # the first state after it began at 0.1 s
+
+
+def test_with_hashes_made_to_fit_a_command_that_cannot_act_is_named(session):
+    def beyond(number, event):
+        if number == 0:
+            event["content"]["force"][1] = 1e30
+
+    assert "command 1 " in str(verify(rechained(session, beyond)))
+
+
+def test_events_added_dropped_or_swapped_are_found(session):
+    lines = session.events
+    for events in (lines[1:], [*lines[:3], *lines[4:]], [lines[1], lines[0], *lines[2:]], [lines[0], *lines]):
+        assert verify(replace(session, events=events)) is not None
+
+
+@pytest.mark.parametrize("topic", ["pose", "twist"])
+def test_one_bit_of_a_state_is_found(session, topic):
+    rng = random.Random(5)
+    for _ in range(5):
+        rows = session.published[topic].rows.copy()
+        k, column = rng.randrange(1, len(rows)), rng.randrange(rows.shape[1])
+        rows.view(np.uint64)[k, column] ^= np.uint64(1)
+        published = {**session.published, topic: replace(session.published[topic], rows=rows)}
+        difference = verify(replace(session, published=published))
+        assert f"{topic} differs" in str(difference)
+        assert difference.time_ns == session.published[topic].times[k]
+
+
+@pytest.mark.parametrize(
+    "line", ["", "{", "[]", "null", '{"time_ns": 1}', '{"time_ns": "1", "kind": "poke", "content": {}}', "[" * 9999]
+)
+def test_an_event_that_cannot_be_decoded_is_refused(session, line):
+    with pytest.raises(InputError, match="event 3"):
+        verify(with_line(session, 2, line))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [{}, {"stamp_ns": 0}, {"stamp_ns": 0, "frame_id": 7, "force": [0, 0, 0], "torque": [0, 0, 0]}],
+)
+def test_a_content_that_is_none_is_refused_when_its_hash_fits(session, content):
+    def emptied(number, event):
+        if number == 1:
+            event["content"] = content
+
+    with pytest.raises(InputError, match="event 2"):
+        verify(rechained(session, emptied))
+
+
+def test_a_kind_that_is_none_is_refused_when_its_hash_fits(session):
+    def renamed(number, event):
+        if number == 1:
+            event["kind"] = "push"
+
+    with pytest.raises(InputError, match="event 2, kind.*push"):
+        verify(rechained(session, renamed))
+
+
+def scripts_that_fit(scene: str) -> dict[str, list]:
+    """The bundled scripts whose points this scene's body has; the messages to paste among the examples are none."""
+    fitting = {"untouched": []}
+    for name in example_names():
+        try:
+            script = read_script(example_path(name))
+            OfflineRun(read_scene(scene, warn=lambda text: None), script)
+        except InputError:
+            continue
+        fitting[name] = script
+    return fitting
+
+
+@pytest.mark.parametrize("scene", scene_names())
+def test_every_bundled_scene_is_verified_with_every_script_that_fits(scene, tmp_path):
+    scripts = scripts_that_fit(scene)
+    assert len(scripts) > 1
+    for name, script in scripts.items():
+        recorder = McapObserver(tmp_path / f"{name}.mcap", simulated_log=True)
+        run = OfflineRun(read_scene(scene, warn=lambda text: None), script, recorder)
+        last_ns = script[-1].t_ns if script else SECOND
+        assert run.advance(min(last_ns, 9 * SECOND) + SECOND)
+        recorder.close()
+        (session,) = read_runs(tmp_path / f"{name}.mcap")
+        assert session.events or not script
+        assert verify(session) is None, name

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""Where rounding limits a motion and not the accuracy asked for, that is said; and only there."""
+
+import numpy as np
+import pytest
+from flights import SECOND, flight, spinning
+from random_scenes import random_turn
+from reference_motion import angle_between, free_motion
+
+from rigid_proto_ros.motion.body import make_body
+
+BOX = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
+
+
+def needle():
+    """Moments 1 to 1.4e8, given as a full tensor."""
+    turn = random_turn(np.random.default_rng(4))
+    inertia = turn @ np.diag([1e-9, 0.14, 0.14]) @ turn.T
+    return make_body(1.0, np.zeros(3), 0.5 * (inertia + inertia.T))
+
+
+@pytest.mark.parametrize(
+    ("body", "spin", "accuracy"),
+    [(BOX, (6e4, 7e4, -3e4), 1e-12), (BOX, (3.0, 4.0, 5.0), 1e-9), (needle(), (1.0, 2.0, 0.5), 1e-9)],
+    ids=["1e5 rad/s", "everyday", "needle"],
+)
+def test_an_exact_step_says_when_rounding_is_more_than_the_accuracy(body, spin, accuracy):
+    simulation = flight(body, integrator="auto", accuracy=accuracy, initial=spinning(spin))
+    row = simulation.advance(SECOND).row
+    exact, _ = free_motion(body.inertia, spin, 1)
+    assert angle_between(row[3:7], exact) <= accuracy or simulation.accuracy_floor
+    assert bool(simulation.accuracy_floor) == (body is not BOX or max(spin) > 1e3)
+
+
+def test_a_position_far_from_the_origin_is_known_to_its_last_place():
+    row = spinning((0, 0, 1))
+    row[0] = 1e9
+    simulation = flight(BOX, integrator="auto", initial=row)
+    simulation.advance(SECOND)
+    assert "position" in simulation.accuracy_floor
+    row[0] = 1.0
+    near = flight(BOX, integrator="auto", initial=row)
+    near.advance(SECOND)
+    assert near.accuracy_floor == ""
+
+
+def test_fixed_steps_promise_no_accuracy_and_report_no_floor():
+    simulation = flight(BOX, integrator="rk4", accuracy=1e-15, initial=spinning((1, 2, 3)))
+    simulation.advance(SECOND // 100)
+    assert simulation.accuracy_floor == ""

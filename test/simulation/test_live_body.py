@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""Mass, tensor, size and mesh changed in flight: what stays continuous, and what the energy is afterwards."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+from flights import SECOND
+
+from rigid_proto_ros.base.errors import CommandRefused, InputError
+from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
+from rigid_proto_ros.simulation.commands import Change, Rank
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SCENE = {
+    "mesh": "t_handle",
+    "density": 7850.0,
+    "integrator": "rk4",
+    "gravity": [0.1, 0.0, -1.0],
+    "initial.position": [0.3, -0.2, 0.5],
+    "initial.orientation_xyzw": [0.2, -0.4, 0.4, 0.8],
+    "initial.linear_velocity": [0.1, 0.2, -0.1],
+    "initial.angular_velocity": [0.5, -2.0, 3.0],
+}
+WHEN = SECOND // 2
+MESH_STAYS = [
+    {"inertia_model": "bounding_box"},
+    {"inertia_model": "points"},
+    {"inertia_model": "shell", "mass": 2.0},
+    {"mass": 0.5},
+    {"density": 100.0},
+    {"ballast.nut": [0.05, 0.0, 0.05, 0.02]},
+    {
+        "inertia_model": "explicit",
+        "explicit_inertia.mass": 3.0,
+        "explicit_inertia.center_of_mass": [0.01, 0.02, -0.03],
+        "explicit_inertia.tensor": [0.02, 0.001, 0.0, 0.03, -0.002, 0.04],
+    },
+]
+
+
+class Flight:
+    """A simulation whose parameters change as a node changes them: each set on top of those in force."""
+
+    def __init__(self, **values) -> None:
+        self.scenario = make_scenario({**SCENE, **values})
+        self.simulation = Simulation(self.scenario.setup)
+
+    def change(self, changes: dict, at_ns: int | None = None) -> None:
+        def apply():
+            self.scenario = self.scenario.with_changes(changes)
+            return self.scenario.setup
+
+        self.simulation.submit(Change(changes, apply), at_ns)
+
+    def around(self, changes: dict) -> tuple:
+        """State and setup just before and right after the changes, at one instant."""
+        self.simulation.advance(WHEN)
+        before = self.simulation.state, self.simulation.setup
+        self.change(changes)
+        self.simulation.advance(WHEN + 1)
+        assert not self.simulation.refused
+        # The segment begins with the state that the change left.
+        return *before, self.simulation._segment.start, self.simulation.setup
+
+
+def mesh_point(state, setup, point) -> tuple[np.ndarray, np.ndarray]:
+    """Where a mesh point (mesh coordinates) is in the world, and its velocity."""
+    arm = state.rotation @ (np.asarray(point) * setup.body.scale - setup.body.center_of_mass)
+    return state.position + arm, state.linear_velocity + np.cross(state.angular_velocity, arm)
+
+
+@pytest.mark.parametrize("changes", MESH_STAYS, ids=lambda c: next(iter(c)) + "=" + str(next(iter(c.values()))))
+def test_another_tensor_or_model_leaves_the_mesh_where_it_is_and_every_material_point_at_its_speed(changes):
+    """Pose of the mesh origin and velocities of three of its points: continuous to 1e-12; attitude and ω to the bit."""
+    before, old, after, new = Flight().around(changes)
+    assert (before.orientation_xyzw == after.orientation_xyzw).all()
+    assert (before.angular_velocity_body == after.angular_velocity_body).all()
+    for point in ((0.0, 0.0, 0.0), (0.07, 0.0, 0.0), (0.0, -0.05, 0.03), (1.0, 2.0, -3.0)):
+        place, speed = mesh_point(before, old, point)
+        place_after, speed_after = mesh_point(after, new, point)
+        assert place_after == pytest.approx(place, rel=1e-12, abs=1e-12)
+        assert speed_after == pytest.approx(speed, rel=1e-12, abs=1e-12)
+    # It's a test only if the body did change.
+    assert new.body.mass != old.body.mass or (new.body.inertia != old.body.inertia).any()
+
+
+def test_where_the_centre_of_mass_moves_within_the_mesh_it_takes_position_and_velocity_along():
+    before, old, after, new = Flight().around({"ballast.nut": [0.05, 0.0, 0.05, 0.02]})
+    shift = before.rotation @ (new.body.center_of_mass - old.body.center_of_mass)
+    assert np.linalg.norm(shift) > 1e-3
+    assert after.position == pytest.approx(before.position + shift, abs=1e-15)
+    velocity = before.linear_velocity + np.cross(before.angular_velocity, shift)
+    assert after.linear_velocity == pytest.approx(velocity, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"scale": [2.0, 2.0, 2.0]}, {"scale": [0.5, 1.0, -3.0]}, {"mesh": "hammer"}, {"scale": [3.0], "mass": 4.0}],
+    ids=str,
+)
+def test_another_size_or_mesh_grows_in_place_pose_and_twist_of_the_centre_of_mass_stay_to_the_bit(changes):
+    before, old, after, new = Flight().around(changes)
+    assert before.row.tobytes() == after.row.tobytes()
+    assert (new.body.inertia != old.body.inertia).any()
+
+
+@pytest.mark.parametrize("changes", [*MESH_STAYS, {"scale": [2.0, 1.0, 0.5]}, {"mesh": "hammer"}], ids=str)
+def test_the_energy_afterwards_is_that_of_the_new_mass_and_tensor(changes):
+    flight = Flight()
+    flight.around(changes)
+    simulation = flight.simulation
+    v, w = simulation.state.linear_velocity, simulation.state.angular_velocity_body
+    m, I = simulation.setup.body.mass, simulation.setup.body.inertia
+    expected = 0.5 * m * (v @ v) + 0.5 * w @ I @ w
+    assert simulation.kinetic_energy == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {},
+        {"scale": [1.5, 0.7, 3.1]},
+        {"scale": [1.1, 1.3, 1.7], "ballast.nut": [0.013, 0.01, 0.05, 0.02]},
+        {"scale": [-0.3, 1.9, 0.77], "inertia_model": "points"},
+        {"mesh": "hammer", "scale": [1.37, 1.61, 1.83], "mass": 0.7},
+    ],
+    ids=str,
+)
+def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
+    """Pose, twist, mass, centre of mass and tensor, all to the bit; the model is explicit and ballast is counted in."""
+    flight = Flight(**scene)
+    flight.simulation.advance(WHEN)
+    before, old = flight.simulation.state, flight.simulation.setup.body
+    I = old.inertia
+    content = {
+        "relative": False,
+        "mass": old.mass,
+        "com": old.center_of_mass.tolist(),
+        "tensor": [I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2]],
+    }
+
+    def apply():
+        flight.scenario = check_inertia(flight.scenario, content)
+        return flight.scenario.setup
+
+    flight.simulation.submit(Change(content, apply, b"", "inertia", Rank.INERTIA))
+    flight.simulation.advance(WHEN + 1)
+    assert not flight.simulation.refused
+    new = flight.simulation.setup.body
+    assert flight.simulation._segment.start.row.tobytes() == before.row.tobytes()
+    assert new.mass == old.mass
+    assert new.center_of_mass.tobytes() == old.center_of_mass.tobytes()
+    assert new.inertia.tobytes() == old.inertia.tobytes()
+    values = flight.scenario.values
+    assert values["inertia_model"] == "explicit"
+    assert all(v[0] == 0.0 for n, v in values.items() if n.startswith("ballast."))
+
+
+def test_any_centre_of_mass_survives_the_way_through_the_message_for_any_scale():
+    """300 random scales and ballasts: echoed to the bit."""
+    random_numbers = random.Random(5)
+    for _ in range(300):
+        scale = [math.copysign(10.0 ** random_numbers.uniform(-3, 3), random_numbers.uniform(-1, 1)) for _ in range(3)]
+        nut = [random_numbers.uniform(0.001, 0.1), *(random_numbers.uniform(-0.1, 0.1) for _ in range(3))]
+        scenario = make_scenario({**SCENE, "scale": scale, "mass": 0.05, "ballast.nut": nut})
+        body = scenario.setup.body
+        I = body.inertia
+        tensor = [I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2]]
+        again = scenario.with_inertia(body.mass, body.center_of_mass, tensor, False).setup.body
+        assert again.center_of_mass.tobytes() == body.center_of_mass.tobytes()
+        assert again.inertia.tobytes() == body.inertia.tobytes()
+
+
+def test_an_inertia_in_the_body_frame_counts_from_the_present_centre_of_mass():
+    scenario = make_scenario({**SCENE, "scale": [2.0, 2.0, 2.0]})
+    new = scenario.with_inertia(2.0, [0.01, 0.0, -0.02], [1.0, 0, 0, 1.5, 0, 2.0], True).setup.body
+    assert new.center_of_mass == pytest.approx(scenario.setup.body.center_of_mass + [0.01, 0.0, -0.02], abs=1e-15)
+    assert new.mass == 2.0
+
+
+@pytest.mark.parametrize(
+    ("mass", "com", "tensor", "reason"),
+    [
+        (0.0, (0, 0, 0), (1, 0, 0, 1, 0, 1), "tensor"),
+        (-1.0, (0, 0, 0), (1, 0, 0, 1, 0, 1), "tensor"),
+        (1.0, (0, 0, 0), (1, 0, 0, 1, 0, 3), "tensor"),
+        (1.0, (0, 0, 0), (1, 0, 0, -1, 0, 1), "tensor"),
+        (1.0, (0, 0, 0), (1, 0, 0, 1, 0, 1e-13), "tensor"),
+        (1.0, (0, 0, 1e200), (1, 0, 0, 1, 0, 1), "tensor"),
+        (1.0, (0, 0, 0), (0, 0, 0, 0, 0, 0), "tensor"),
+        (math.nan, (0, 0, 0), (1, 0, 0, 1, 0, 1), "nonfinite"),
+        (1.0, (0, math.inf, 0), (1, 0, 0, 1, 0, 1), "nonfinite"),
+        (1.0, (0, 0, 0), (1, math.nan, 0, 1, 0, 1), "nonfinite"),
+    ],
+)
+def test_an_impossible_inertia_is_refused_with_its_reason(mass, com, tensor, reason):
+    with pytest.raises(CommandRefused) as refused:
+        check_inertia(make_scenario(SCENE), {"relative": False, "mass": mass, "com": com, "tensor": tensor})
+    assert refused.value.reason == reason
+
+
+def test_density_set_wins_over_mass_and_mass_over_density():
+    scenario = make_scenario(SCENE)
+    heavy = scenario.with_changes({"mass": 3.0})
+    assert heavy.setup.body.mass == 3.0
+    assert heavy.with_changes({"scale": [2.0]}).setup.body.mass == 3.0
+    light = heavy.with_changes({"density": 785.0})
+    assert light.values["mass"] == 0.0
+    assert light.setup.body.mass == pytest.approx(scenario.setup.body.mass / 10, rel=1e-14)
+    assert light.with_changes({"scale": [2.0]}).setup.body.mass == pytest.approx(8 * light.setup.body.mass, rel=1e-14)
+
+
+def test_changes_given_together_are_judged_together():
+    """Each alone would be refused; the two at once are fine, and so is the way back only together."""
+    scenario = make_scenario(SCENE)
+    explicit = {"inertia_model": "explicit", "mesh": ""}
+    bare = scenario.with_changes(explicit)
+    with pytest.raises(InputError):
+        scenario.with_changes({"mesh": ""})
+    with pytest.raises(InputError):
+        bare.with_changes({"inertia_model": "solid"})
+    assert bare.with_changes({"inertia_model": "solid", "mesh": "hammer"}).values["mesh"] == "hammer"
+
+
+def random_change(numbers: random.Random) -> dict:
+    """One change of anything that can change in flight."""
+    nut = [numbers.uniform(0.0, 0.2), *(numbers.uniform(-0.2, 0.2) for _ in range(3))]
+    a, b = sorted(10.0 ** numbers.uniform(-6, 0) for _ in range(2))
+    choices = [
+        {"scale": [numbers.choice((-1, 1)) * 10.0 ** numbers.uniform(-1, 1) for _ in range(3)]},
+        {"mass": 10.0 ** numbers.uniform(-3, 3)},
+        {"density": 10.0 ** numbers.uniform(1, 5)},
+        {"mesh": numbers.choice(("t_handle", "hammer", "book", "tennis_racket"))},
+        {"inertia_model": numbers.choice(("solid", "shell", "points", "bounding_box", "explicit"))},
+        {
+            "inertia_model": "explicit",
+            "explicit_inertia.mass": 10.0 ** numbers.uniform(-3, 3),
+            "explicit_inertia.center_of_mass": [numbers.uniform(-0.2, 0.2) for _ in range(3)],
+            "explicit_inertia.tensor": [a, 0.0, 0.0, b, 0.0, numbers.uniform(b, a + b)],
+        },
+        {"ballast.nut": nut},
+        {"ballast.nut": [0.0, 0.0, 0.0, 0.0]},
+        {"gyroscopic": numbers.random() < 0.7},
+        {"gravity": [numbers.uniform(-10, 10) for _ in range(3)]},
+        {"linear_damping": numbers.uniform(0, 0.01)},
+        {"step": 10.0 ** numbers.uniform(-4, -3)},
+        {"accuracy": 10.0 ** numbers.uniform(-12, -6)},
+        {"integrator": numbers.choice(("rk4", "dop853", "midpoint"))},
+    ]
+    return numbers.choice(choices)
+
+
+def fly_random_changes(count: int, seed: int) -> tuple[int, int]:
+    """Changes applied and refused, a state checked after each."""
+    numbers = random.Random(seed)
+    flight = Flight()
+    known = flight.scenario.values
+    simulation = flight.simulation
+    refused = 0
+    for _ in range(count):
+        changes = {n: v for n, v in random_change(numbers).items() if n in known or n.startswith("ballast.")}
+        if not changes:
+            continue
+        simulation.advance(simulation.time_ns + numbers.randrange(1, 20_000_000))
+        before, old = simulation.state, simulation.setup
+        try:
+            simulation.check_change(flight.scenario.with_changes(changes).setup)
+        except InputError:
+            # Refused before it was submitted, as the node does: nothing changes.
+            refused += 1
+            continue
+        flight.change(changes)
+        after = simulation.advance(simulation.time_ns + 1)
+        new = simulation.setup
+        assert not simulation.failure, changes
+        assert np.isfinite(after.row).all(), changes
+        assert math.isfinite(simulation.kinetic_energy + simulation.potential_energy)
+        start = simulation._segment.start
+        if new.geometry == old.geometry:
+            for point in ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0)):
+                for then, now in zip(mesh_point(before, old, point), mesh_point(start, new, point), strict=True):
+                    assert now == pytest.approx(then, abs=1e-12 * max(1.0, np.abs(then).max())), changes
+        else:
+            assert start.row.tobytes() == before.row.tobytes(), changes
+    return simulation.events.count, refused
+
+
+def test_random_changes_in_flight_leave_it_finite_and_continuous():
+    applied, refused = fly_random_changes(100, 1)
+    assert applied > 60
+    assert not applied + refused > 100
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("seed", range(3))
+def test_a_thousand_random_changes_in_flight_leave_it_finite_and_continuous(seed):
+    applied, refused = fly_random_changes(1000, seed)
+    assert applied > 600

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""The mailbox between the stepping thread and a recorder: everything in order, memory bounded, nobody waits for ever."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_proto_ros.simulation import mailbox
+from rigid_proto_ros.simulation.mailbox import BLOCK_ROWS, BLOCKS_WAITING_MAX, Mailbox
+
+
+def test_rows_and_marks_come_out_in_the_order_in_which_they_went_in():
+    box = Mailbox()
+    for k in range(BLOCK_ROWS + 3):
+        box.put(k, np.full(13, float(k)))
+        if k in (1, BLOCK_ROWS):
+            box.mark(k, "said", k)
+    first, waiting = box.take()
+    second, _ = box.take()
+    assert (first.count, second.count, waiting) == (BLOCK_ROWS, 3, 0)
+    assert [(m.after_rows, m.content) for m in first.marks + second.marks] == [(2, (1,)), (1, (BLOCK_ROWS,))]
+    times = np.concatenate([first.times, second.times[:3]])
+    rows = np.concatenate([first.rows, second.rows[:3]])
+    assert (times == np.arange(BLOCK_ROWS + 3)).all() and (rows[:, 12] == times).all()
+    assert box.take() == (None, 0)
+
+
+def test_the_next_row_is_handed_over_at_once_where_that_was_asked_for():
+    box = Mailbox()
+    box.mark(-1, "began")
+    box.hurry()
+    box.put(0, np.zeros(13))
+    box.put(1, np.zeros(13))
+    first, waiting = box.take()
+    assert ([m.kind for m in first.marks], first.count, waiting) == (["began"], 1, 0)
+    assert box.take()[0].count == 1
+
+
+def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypatch):
+    monkeypatch.setattr(mailbox, "PATIENCE_S", 0.02)
+    given_up = []
+    box = Mailbox(lambda: given_up.append(True))
+    row = np.zeros(13)
+    for k in range(2 * BLOCKS_WAITING_MAX * BLOCK_ROWS + 5):
+        box.put(k, row)
+    assert given_up == [True]
+    taken = []
+    while (block := box.take()[0]) is not None:
+        taken.append(block.times[: block.count].copy())
+    assert (np.concatenate(taken) == np.arange(BLOCKS_WAITING_MAX * BLOCK_ROWS)).all()

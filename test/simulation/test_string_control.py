@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: MIT
+"""The string as commands and parameters tie it, move it, change it and let it go."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from flights import SECOND
+
+from rigid_proto_ros.base.errors import CommandRefused
+from rigid_proto_ros.base.rotation import rotate
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.motion.string import StringSettings, tie
+from rigid_proto_ros.scene.command_codec import string_attach, string_target
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SCENE = {
+    "mesh": "t_handle",
+    "density": 7850.0,
+    "scale": [2.0, 1.0, 1.5],
+    "integrator": "rk4",
+    "initial.position": [0.2, -0.1, 0.3],
+    "initial.orientation_xyzw": [0.2, -0.4, 0.4, 0.8],
+    "initial.angular_velocity": [0.5, -2.0, 3.0],
+    "string.stiffness": 3.0,
+    "string.timeout": 0.4,
+}
+MS = 1_000_000
+
+
+def simulated(**changes) -> tuple[Simulation, object]:
+    scenario = make_scenario({**SCENE, **{n.replace("__", "."): v for n, v in changes.items()}})
+    return Simulation(scenario.setup), scenario
+
+
+def effective_mass(body, arm, direction) -> float:
+    """1/m_eff = 1/m + (r × n)ᵀ I⁻¹ (r × n), by plain linear algebra."""
+    lever = np.cross(arm, direction)
+    return 1.0 / (1.0 / body.mass + lever @ np.linalg.solve(body.inertia, lever))
+
+
+def test_the_first_target_ties_and_is_taken_at_once():
+    simulation, _ = simulated()
+    assert simulation.string is None
+    simulation.submit(MoveString((1.0, 2.0, 3.0)), 100 * MS)
+    simulation.advance(100 * MS)
+    assert simulation.string is None
+    simulation.advance(101 * MS)
+    assert simulation.string.free_end(101 * MS).tolist() == [1.0, 2.0, 3.0]
+    assert simulation.string.hand_velocity(101 * MS).tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("after_ms", "ramp_ms"), [(20, 20), (100, 100), (250, 100)])
+def test_the_free_end_goes_evenly_over_the_time_since_the_last_target_at_most_a_tenth_of_a_second(after_ms, ramp_ms):
+    simulation, _ = simulated()
+    simulation.submit(MoveString((0.0, 0.0, 1.0)), 0)
+    simulation.submit(MoveString((0.3, -0.6, 1.0)), after_ms * MS)
+    for fraction in (0.25, 0.5, 0.75, 1.0, 1.5):
+        time_ns = round((after_ms + fraction * ramp_ms) * MS)
+        simulation.advance(time_ns)
+        done = min(fraction, 1.0)
+        assert simulation.string.free_end(time_ns) == pytest.approx([0.3 * done, -0.6 * done, 1.0], abs=1e-15)
+        speed = 0.0 if fraction >= 1.0 else 1.0 / (ramp_ms * 1e-3)
+        assert simulation.string.hand_velocity(time_ns) == pytest.approx([0.3 * speed, -0.6 * speed, 0.0], abs=1e-12)
+
+
+def test_a_target_in_mid_ramp_starts_from_where_the_free_end_is():
+    simulation, _ = simulated()
+    simulation.submit(MoveString((0.0, 0.0, 0.0)), 0)
+    simulation.submit(MoveString((1.0, 0.0, 0.0)), 200 * MS)
+    simulation.submit(MoveString((0.0, 1.0, 0.0)), 250 * MS)
+    simulation.advance(275 * MS)
+    assert simulation.string.free_end(275 * MS) == pytest.approx([0.25, 0.5, 0.0], abs=1e-15)
+
+
+def test_it_lets_go_the_timeout_after_the_last_target_and_not_before():
+    """To the nanosecond: 0.4 s after the last of three."""
+    simulation, _ = simulated()
+    for start in (0, 100, 350):
+        simulation.submit(MoveString((0.0, 0.0, 1.0), message=bytes([start % 256])), start * MS)
+    simulation.advance(750 * MS)
+    assert simulation.string is not None
+    before = simulation.angular_momentum
+    simulation.advance(750 * MS + 1)
+    assert simulation.string is None
+    simulation.advance(2 * SECOND)
+    # Free from then on.
+    assert np.abs(simulation.angular_momentum - before).max() <= 1e-9 * np.abs(before).max()
+
+
+def test_timeout_zero_never_lets_go_and_an_attached_string_needs_no_target():
+    simulation, _ = simulated(string__timeout=0.0)
+    simulation.submit(MoveString((0.0, 0.0, 1.0)), 0)
+    simulation.advance(10 * SECOND)
+    assert simulation.string is not None
+    simulation, _ = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
+    simulation.advance(10 * SECOND)
+    assert simulation.string is not None
+
+
+@pytest.mark.parametrize("command", [ReleaseString(), None], ids=["released", "detached by parameter"])
+def test_a_released_string_pulls_no_more_and_ties_again_at_the_next_target(command):
+    simulation, scenario = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
+    if command is None:
+        command = Change({}, lambda: scenario.with_changes({"string.attached": False}).setup)
+    simulation.submit(command, 100 * MS)
+    simulation.advance(101 * MS)
+    assert simulation.string is None
+    simulation.submit(MoveString((0.5, 0.0, 0.0)), 200 * MS)
+    simulation.advance(201 * MS)
+    assert simulation.string.free_end(201 * MS).tolist() == [0.5, 0.0, 0.0]
+
+
+def test_a_string_that_a_reset_ties_again_counts_for_the_integrator_though_it_was_let_go():
+    simulation, scenario = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
+    simulation.submit(ReleaseString(), 100 * MS)
+    simulation.advance(SECOND)
+    with pytest.raises(CommandRefused, match="free_body"):
+        simulation.check_change(scenario.with_changes({"integrator": "free_body"}).setup)
+    simulation.check_change(scenario.with_changes({"integrator": "free_body", "string.attached": False}).setup)
+
+
+def test_clear_wrench_leaves_the_string_tied():
+    simulation, _ = simulated(string__attached=True)
+    simulation.submit(ClearWrench())
+    simulation.advance(SECOND)
+    assert simulation.string is not None
+
+
+@pytest.mark.parametrize("frame", ["world", "", "body", "rigid_body", "body/mesh", "rigid_body/mesh"])
+def test_the_knot_is_the_nearest_point_of_the_surface_as_it_is_then(frame):
+    """In world, body (metres from the COM) and mesh coordinates, against trimesh's closest points: 1e-12."""
+    simulation, scenario = simulated(string__timeout=0.0)
+    mesh_point = np.array([0.011, 0.06, 0.09])
+    state = Simulation(scenario.setup).advance(300 * MS)
+    body = scenario.setup.body
+    from_com = mesh_point * np.array(SCENE["scale"]) - body.center_of_mass
+    points = {"mesh": mesh_point, "body": from_com, "world": state.position + state.rotation @ from_com}
+    word = "mesh" if frame.endswith("/mesh") else "body" if "body" in frame else "world"
+    simulation.submit(string_attach(0, frame, points[word].tolist(), "world", "rigid_body"), 300 * MS)
+    simulation.submit(MoveString((0.0, 0.0, 1.0)), 301 * MS)
+    simulation.advance(302 * MS)
+    surface = scenario.setup.surface
+    triangles = surface.vertices[surface.triangles]
+    candidates = trimesh.triangles.closest_point(triangles, np.tile(mesh_point, (len(triangles), 1)))
+    nearest = candidates[np.argmin(np.linalg.norm(candidates - mesh_point, axis=1))]
+    assert simulation.string.attach == pytest.approx(nearest, abs=1e-12)
+    # And it lies elsewhere than it was asked for.
+    assert np.linalg.norm(nearest - mesh_point) > 1e-3
+
+
+def test_without_a_mesh_the_knot_is_where_it_was_asked_for():
+    simulation, _ = simulated(mesh="", inertia_model="explicit", string__timeout=0.0)
+    simulation.submit(TieString("mesh", (1.0, 2.0, 3.0)))
+    simulation.submit(MoveString((0.0, 0.0, 0.0)))
+    simulation.advance(1)
+    assert simulation.string.attach == (1.0, 2.0, 3.0)
+
+
+def test_moving_the_knot_of_a_tied_string_keeps_it_tied_with_stiffness_and_damping_settled_anew():
+    simulation, scenario = simulated(string__frequency=20.0, string__damping_ratio=0.3, string__timeout=0.0)
+    simulation.submit(MoveString((0.0, 0.0, 1.0)), 0)
+    simulation.submit(TieString("mesh", (0.0, 0.05, 0.0)), 100 * MS)
+    state = simulation.advance(100 * MS)
+    first = simulation.string
+    simulation.advance(100 * MS + 1)
+    second = simulation.string
+    assert second.attach != first.attach
+    assert second.free_end(100 * MS).tolist() == first.free_end(100 * MS).tolist()
+    body = scenario.setup.body
+    arm = np.array(second.attach) * SCENE["scale"] - body.center_of_mass
+    away = state.position + state.rotation @ arm - [0.0, 0.0, 1.0]
+    mass = effective_mass(body, arm, state.rotation.T @ away / np.linalg.norm(away))
+    assert second.stiffness == pytest.approx(mass * 400.0, rel=1e-12)
+    assert second.damping == pytest.approx(2 * 0.3 * 20.0 * mass, rel=1e-12)
+
+
+@pytest.mark.parametrize("frequency", [0.0, 25.0])
+def test_stiffness_or_frequency_with_the_damping_ratio_give_k_and_c_from_the_effective_mass_and_hold_them(frequency):
+    changes = {"string__frequency": frequency, "string__damping_ratio": 0.7, "string__attached": True}
+    simulation, scenario = simulated(**changes, string__attach=[0.0, 0.05, 0.0], string__target=[0.3, 0.2, 1.0])
+    body, state = scenario.setup.body, simulation.state
+    arm = np.array([0.0, 0.05, 0.0]) * SCENE["scale"] - body.center_of_mass
+    away = state.position + state.rotation @ arm - [0.3, 0.2, 1.0]
+    mass = effective_mass(body, arm, state.rotation.T @ away / np.linalg.norm(away))
+    k = mass * frequency**2 if frequency else SCENE["string.stiffness"]
+    for time_ns in (0, SECOND):
+        simulation.advance(time_ns)
+        assert simulation.string.stiffness == pytest.approx(k, rel=1e-12)
+        assert simulation.string.damping == pytest.approx(2 * 0.7 * math.sqrt(k * mass), rel=1e-12)
+    # A change of the body takes them anew, for the body as it is then.
+    simulation.submit(Change({}, lambda: scenario.with_changes({"mass": 5.0}).setup))
+    state = simulation.state
+    simulation.advance(SECOND + 1)
+    heavy = simulation.setup.body
+    arm = np.array([0.0, 0.05, 0.0]) * SCENE["scale"] - heavy.center_of_mass
+    away = state.position + state.rotation @ arm - [0.3, 0.2, 1.0]
+    mass = effective_mass(heavy, arm, state.rotation.T @ away / np.linalg.norm(away))
+    k = mass * frequency**2 if frequency else SCENE["string.stiffness"]
+    assert simulation.string.stiffness == pytest.approx(k, rel=1e-12)
+    assert simulation.string.damping == pytest.approx(2 * 0.7 * math.sqrt(k * mass), rel=1e-12)
+
+
+def test_with_a_frequency_a_nut_and_a_satellite_are_pulled_alike():
+    """The same relative motion for bodies of 1e-3 and 1e6 kg of one shape: 1e-9."""
+    ends = []
+    for mass in (1e-3, 1e6):
+        simulation, _ = simulated(
+            mass=mass, string__frequency=12.0, string__attached=True, string__attach=[0.0, 0.05, 0.0]
+        )
+        ends.append(simulation.advance(2 * SECOND).row)
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-9
+
+
+@pytest.mark.parametrize("bilateral", [False, True])
+def test_a_string_pulls_when_stretched_and_pushes_only_when_bilateral(bilateral):
+    """Tension k(l − rest), against the momentum that 1 ms of it gives: 1e-4, for the distance hardly changes."""
+    for distance, stretched in ((0.7, True), (0.3, False)):
+        simulation, scenario = simulated(
+            string__attached=True,
+            string__rest_length=0.5,
+            string__bilateral=bilateral,
+            **{"string__damping_ratio": 0.0, "initial.angular_velocity": [0.0, 0.0, 0.0]},
+            string__target=[0.2, -0.1, 0.3 + distance],
+            string__attach=(make_scenario(SCENE).setup.body.center_of_mass / SCENE["scale"]).tolist(),
+        )
+        simulation.advance(MS)
+        gained = scenario.setup.body.mass * simulation.state.linear_velocity
+        tension = SCENE["string.stiffness"] * (distance - 0.5) if stretched or bilateral else 0.0
+        assert gained == pytest.approx([0.0, 0.0, tension * 1e-3], abs=1e-3 * abs(tension) * 1e-3 + 1e-18)
+
+
+@pytest.mark.parametrize("rest_length", [0.0, 0.5])
+def test_a_knot_at_the_very_place_of_the_free_end_is_no_singularity(rest_length):
+    simulation, _ = simulated(
+        mesh="",
+        inertia_model="explicit",
+        string__attached=True,
+        string__target=[0.2, -0.1, 0.3],
+        string__rest_length=rest_length,
+        string__bilateral=True,
+    )
+    simulation.advance(MS)
+    assert np.isfinite(simulation.state.row).all()
+    assert np.isfinite([simulation.potential_energy, simulation.hand_work, simulation.string_heat]).all()
+    if rest_length == 0.0:
+        assert simulation.state.linear_velocity.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_reset_ties_the_string_as_its_parameters_say():
+    for attached in (False, True):
+        simulation, _ = simulated(string__attached=attached, string__target=[0.0, 0.0, 1.0])
+        simulation.submit(TieString("mesh", (0.0, 0.05, 0.0)))
+        simulation.submit(MoveString((1.0, 1.0, 1.0)))
+        simulation.advance(SECOND // 10)
+        assert simulation.string is not None
+        simulation.reset()
+        assert (simulation.string is not None) == attached
+        if attached:
+            assert simulation.string.free_end(0).tolist() == [0.0, 0.0, 1.0]
+            assert simulation.string.attach == (0.0, 0.0, 0.0)
+        assert simulation.hand_work == 0.0
+
+
+@pytest.mark.parametrize(
+    ("read", "frame", "point", "reason"),
+    [
+        (string_target, "body", (0, 0, 0), "frame"),
+        (string_target, "world@com", (0, 0, 0), "frame"),
+        (string_target, "world", (math.nan, 0, 0), "nonfinite"),
+        (string_target, "world", (0, math.inf, 0), "nonfinite"),
+        (string_target, "world", (1e101, 0, 0), "magnitude"),
+        (string_attach, "nowhere", (0, 0, 0), "frame"),
+        (string_attach, "body/mesh/", (0, 0, 0), "frame"),
+        (string_attach, "body", (0, 0, -math.inf), "nonfinite"),
+        (string_attach, "body/mesh", (0, 0, 1e300), "magnitude"),
+    ],
+)
+def test_odd_string_messages_are_refused_with_their_reason(read, frame, point, reason):
+    with pytest.raises(CommandRefused) as refused:
+        read(0, frame, point)
+    assert refused.value.reason == reason
+
+
+def test_a_target_that_would_pull_beyond_every_measure_is_refused_when_it_takes_effect():
+    simulation, _ = simulated()
+    simulation.submit(MoveString((0.0, 0.0, 1e20)))
+    end = simulation.advance(SECOND)
+    assert simulation.refused == {"magnitude": 1}
+    untouched, _ = simulated()
+    assert (end.row == untouched.advance(SECOND).row).all()
+
+
+def test_a_span_that_is_rounding_alone_gives_the_effective_mass_no_direction():
+    body, arm = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04])), np.array([0.1, 0.15, 0.2])
+    inverse = sum(1.0 / effective_mass(body, arm, n) for n in np.eye(3)) / 3.0
+    rng = np.random.default_rng(4)
+    for far in (0.0, 1.0, 1e3):
+        for _ in range(20):
+            q, target = rng.normal(size=4), far * rng.normal(size=3)
+            q /= np.linalg.norm(q)
+            state = State(0, np.array([*(target - rotate(*q, *arm)), *q, *np.zeros(6)]))
+            string = tie(StringSettings(attached=True), arm, target, body, state, 0)
+            assert string.effective_mass == pytest.approx(1.0 / inverse, rel=1e-12)

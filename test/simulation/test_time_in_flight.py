@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: MIT
+"""Simulated time: pause, step, reset, pace, clocks, and what a command's stamp means."""
+
+import itertools
+import math
+import time
+
+import pytest
+from command_rig import Commanded, NodeProcess, RosClient, point_message, stamp_ns, wrench_message
+from conftest import held_domain
+
+from rigid_proto_ros.scene.scenario import make_scenario, publication_ns
+from rigid_proto_ros.simulation.simulation import Simulation
+
+SECOND = 10**9
+MS = 10**6
+
+
+def position(pose: dict) -> list[float]:
+    return [*pose["pose"]["position"].values(), *pose["pose"]["orientation"].values()]
+
+
+def test_while_paused_states_go_out_with_the_frozen_stamp_and_commands_wait_for_the_resume(rig):
+    rig.pause(True)
+    rig.publish("poke", wrench_message(0, "world@tip;impulse", (1e-3, 0.0, 0.0)))
+    rig.until_received(rig.sent)
+    rig.forget("pose")
+    rig.until(lambda: rig.heard_count("pose") >= 4, "states while paused")
+    frozen = {stamp_ns(m) for m in rig.heard("pose")}
+    assert len(frozen) == 1
+    assert len({tuple(position(m)) for m in rig.heard("pose")}) == 1
+    assert not [event for event in rig.events() if event["kind"] == "poke"]
+    assert rig.diagnostics()["state"] == "paused"
+    assert rig.pause(False)["success"]
+    (poke,) = rig.wait_event("poke")
+    assert poke["time_ns"] == frozen.pop()
+
+
+def test_reports_go_out_once_a_second_and_while_paused_ten_states_to_each(rig):
+    rig.pause(True)
+    began = rig.diagnostics()["stamp_ns"]
+
+    def counted() -> bool:
+        first, states_before = rig.diagnostics()["stamp_ns"], rig.heard_count("pose")
+        then, states = rig.diagnostics()["stamp_ns"], rig.heard_count("pose")
+        return 0.9 < (then - first) / SECOND < 1.1 and 9 <= states - states_before <= 11
+
+    # On a busy machine time is lost, so any second that goes as it should will do; there is never more than there should be.
+    rig.until(counted, "a second with one report and ten states")
+    stamps = [report["stamp_ns"] for report in rig.all_diagnostics(after=began)]
+    assert len(stamps) - 1 <= (stamps[-1] - stamps[0]) / SECOND + 1.0
+
+
+def test_step_goes_on_by_one_publication_period_and_is_refused_while_running(rig):
+    assert not rig.trigger("step")["success"]
+    rig.start_over(paused=True)
+    rig.publish("poke", wrench_message(0, "world@tip;impulse", (1e-3, 0.0, 0.0)))
+    rig.until_received(rig.sent)
+    for k in range(1, 4):
+        answer = rig.trigger("step")
+        assert answer["success"]
+        rig.until(lambda k=k: rig.heard("pose", last=1, stamp=k * 10 * MS), "the next state")
+    assert rig.wait_event("poke")[0]["time_ns"] == 0
+    rig.forget("pose")
+    assert stamp_ns(rig.until(lambda: rig.heard("pose"), "a state")[-1]) == 30 * MS
+    # From an instant between two publications to the next one.
+    rig.set(publish_rate=40.0)
+    rig.trigger("step")
+    rig.until(lambda: rig.heard("pose", last=1, stamp=50 * MS), "the state at 50 ms")
+
+
+@pytest.mark.parametrize("paused", [True, False], ids=["paused", "running"])
+def test_reset_takes_time_and_state_back_drops_what_was_to_come_and_keeps_parameters_and_counters(rig, paused):
+    rig.set(wrench_timeout=0.0, string__timeout=0.0, initial__position=[1.0, 2.0, 3.0], linear_damping=0.5)
+    rig.publish("wrench", wrench_message(0, "world@tip", (1e-3, 0.0, 0.0)))
+    rig.publish("string/target", point_message(0, "", (1.0, 0.0, 0.0)))
+    rig.wait_event("wrench")
+    rig.wait_event("string_target")
+    now = rig.now_ns()
+    rig.publish("poke", wrench_message(now + 1800 * SECOND, "tip", (1e-3, 0.0, 0.0)))
+    before = rig.counters()
+    rig.start_over(paused=paused)
+    rig.until(lambda: rig.heard_count("pose") >= 3, "states")
+    if not paused:
+        rig.until(lambda: rig.now_ns() >= 200 * MS, "time going on")
+        # Nothing pulls, nothing pushes: it flies straight on from where it was put.
+        pose, twist = rig.state_at(200 * MS)
+        assert list(pose["pose"]["position"].values()) == [1.0, 2.0, 3.0]
+        assert list(twist["twist"]["linear"].values()) == [0.0, 0.0, 0.0]
+    else:
+        assert {stamp_ns(m) for m in rig.heard("pose")} == {0}
+        assert position(rig.heard("pose", last=1)[0])[:3] == [1.0, 2.0, 3.0]
+    after = rig.counters()
+    assert {k: v for k, v in after.items() if k.endswith("_received") or k.startswith("refused")} == {
+        k: v for k, v in before.items() if k.endswith("_received") or k.startswith("refused")
+    }
+    assert rig.get("linear_damping", "wrench_timeout") == {"linear_damping": 0.5, "wrench_timeout": 0.0}
+    assert rig.diagnostics()["state"] == ("paused" if paused else "flying")
+
+
+def test_clear_wrench_ends_what_acts_and_leaves_what_is_scheduled(rig):
+    rig.set(wrench_timeout=0.0)
+    rig.start_over(paused=True)
+    rig.publish("wrench", wrench_message(0, "world@com", (1e-2, 0.0, 0.0)))
+    rig.publish("poke", wrench_message(0, "world@com;duration=100", (0.0, 1e-2, 0.0)))
+    rig.publish("poke", wrench_message(800 * MS, "world@com;impulse", (0.0, 0.0, 1e-3)))
+    rig.schedule("{t: 0.4, service: clear_wrench}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    _, first = rig.state_at(400 * MS)
+    _, then = rig.state_at(790 * MS)
+    _, last = rig.state_at(900 * MS)
+    mass = make_scenario(rig.scene).setup.body.mass
+    assert first["twist"]["linear"]["x"] == pytest.approx(1e-2 / mass * 0.4, rel=1e-12)
+    assert first["twist"]["linear"]["y"] == pytest.approx(1e-2 / mass * 0.4, rel=1e-12)
+    assert then["twist"]["linear"] == first["twist"]["linear"]
+    assert last["twist"]["linear"]["z"] == pytest.approx(1e-3 / mass, rel=1e-12)
+
+
+def test_stamps_zero_and_past_mean_now_and_one_of_the_systems_clock_is_told_apart(rig):
+    before = rig.counters()
+    rig.until(lambda: rig.now_ns() > 50 * MS, "some time")
+    wall = time.time_ns()
+    day = 24 * 3600 * SECOND
+    sent_after = rig.now_ns()
+    stamps = {"zero": 0, "past": 1, "before all": -5 * SECOND, "now": wall, "tomorrow": wall + day - 60 * SECOND}
+    for stamp in stamps.values():
+        rig.publish("poke", wrench_message(stamp, "world@com;impulse", (1e-6, 0.0, 0.0)))
+    rig.publish("poke", wrench_message(wall + day + 3600 * SECOND, "world@com;impulse", (1e-6, 0.0, 0.0)))
+    gained = rig.gained(before)
+    assert gained == {"late": 2, "wall_stamp": 2, "refused_total": 1, "refused_stamp": 1}
+    # Told once in the node's life, and counted from then on.
+    assert rig.node_process.log.read_text().count("stamped with the system's clock") == 1
+    pokes = rig.wait_event("poke", 5)
+    assert len(pokes) == 5
+    acted_before = int(rig.diagnostics()["sim_time_ns"])
+    assert all(sent_after <= event["time_ns"] <= acted_before for event in pokes)
+    assert {event["content"]["stamp_ns"] for event in pokes} == set(stamps.values())
+
+
+def test_a_stamp_ahead_acts_at_exactly_that_nanosecond(rig):
+    rig.set(schedule_horizon=2.0)
+    rig.start_over(paused=True)
+    before = rig.counters()
+    rig.publish("poke", wrench_message(123_456_789, "world@com;impulse", (1e-6, 0.0, 0.0)))
+    rig.publish("poke", wrench_message(2 * SECOND, "world@com;impulse", (1e-6, 0.0, 0.0)))
+    rig.publish("poke", wrench_message(2 * SECOND + 1, "world@com;impulse", (1e-6, 0.0, 0.0)))
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    assert [event["time_ns"] for event in rig.wait_event("poke", 2)] == [123_456_789, 2 * SECOND]
+    assert rig.gained(before) == {"refused_total": 1, "refused_stamp": 1}
+
+
+@pytest.mark.parametrize("rate", [3.0, 3.7, 1000.0 / 3.0])
+def test_publication_k_is_at_the_rounded_kth_period(rig, rate):
+    rig.set(publish_rate=rate, real_time_factor=0.0)
+    rig.start_over(paused=False)
+    # The first may be of the time before the start.
+    rig.until(
+        lambda: rig.heard_count("pose") >= 30 and stamp_ns(rig.heard("pose", last=1)[0]) > 20 * SECOND / rate, "time"
+    )
+    stamps = [stamp_ns(m) for m in rig.heard("pose")]
+    assert all(stamp == publication_ns(round(stamp * rate / SECOND), rate) for stamp in stamps)
+    # Time goes as fast as it can: a busy client misses some of them, but not every second one.
+    gaps = sorted(b - a for a, b in itertools.pairwise(sorted(set(stamps))))
+    assert abs(gaps[0] - SECOND / rate) <= 1.0 and abs(gaps[len(gaps) // 2] - SECOND / rate) <= 1.0
+
+
+def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
+    states = []
+
+    def pace() -> float:
+        """Simulated time over wall time, between two reports."""
+        first, then = rig.diagnostics(), rig.diagnostics()
+        return (int(then["sim_time_ns"]) - int(first["sim_time_ns"])) / (then["stamp_ns"] - first["stamp_ns"])
+
+    # On a busy machine time is lost, so any second that goes as it should will do.
+    for factor, slowest, fastest in ((0.25, 0.2, 0.3), (4.0, 3.2, 4.8), (0.0, 10.0, math.inf)):
+        rig.set(real_time_factor=factor)
+        rig.start_over(paused=False)
+        states.append(rig.state_at(200 * MS))
+        rig.until(lambda at_least=slowest, at_most=fastest: at_least < pace() < at_most, f"pace of {factor}")
+    assert states[0] == states[1] == states[2]
+
+
+def test_clock_is_published_on_request_with_the_states_stamps(rig):
+    assert rig.set(publish_clock=True)[0][0]
+    rig.do("listen", topic="/clock", type="Clock", best_effort=True)
+    rig.until(lambda: rig.heard_count("/clock") >= 20, "/clock")
+    clocks = [m["clock"]["sec"] * SECOND + m["clock"]["nanosec"] for m in rig.heard("/clock")]
+    assert clocks == sorted(clocks)
+    assert all(c % (10 * MS) == 0 for c in clocks)
+    assert rig.set(publish_clock=False)[0][0]
+    rig.start_over(paused=False)
+    rig.forget("/clock")
+    rig.until(lambda: rig.now_ns() >= 300 * MS, "time going on")
+    assert rig.heard_count("/clock") == 0
+    # On again, by the one publisher.
+    assert rig.set(publish_clock=True)[0][0]
+    rig.until(lambda: rig.heard_count("/clock") >= 5, "/clock again")
+    assert len([e for e in rig.do("endpoints", topic="/clock") if e[0] == "pub"]) == 1
+
+
+def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_environment, tmp_path):
+    """From where it is when first heard; no time is lost or overrun when it goes in leaps; set back, time goes on."""
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        node = NodeProcess(
+            environment, tmp_path / "node.log", {"use_sim_time": True, "initial.linear_velocity": [1.0, 0.0, 0.0]}
+        )
+        client = RosClient(environment)
+        try:
+            client.listen("pose")
+            client.watch_diagnostics()
+            client.do("advertise", topic="/clock", type="Clock", depth=1)
+
+            clock = {"ns": 0}
+
+            def tick(clock_ns: int) -> bool:
+                """/clock keeps no message for who misses it: each wait says the time again."""
+                clock["ns"] = clock_ns
+                sec, nanosec = divmod(clock_ns, SECOND)
+                client.publish("/clock", {"clock": {"sec": sec, "nanosec": nanosec}})
+                return True
+
+            def report() -> dict:
+                """The second new one; stamps are of /clock here, so they don't tell when it was made."""
+                before = client.heard_count("/diagnostics")
+                client.until(lambda: tick(clock["ns"]) and client.heard_count("/diagnostics") >= before + 2, "a report")
+                return client.all_diagnostics(last=1)[0]
+
+            def reaches(simulated_ns: int) -> None:
+                client.until(
+                    lambda: (
+                        tick(clock["ns"])
+                        and (reports := client.all_diagnostics(last=1))
+                        and int(reports[0]["sim_time_ns"]) == simulated_ns
+                    ),
+                    f"{simulated_ns} ns",
+                )
+
+            start = 5000 * SECOND
+            tick(start)
+            assert report()["sim_time_ns"] == "0"
+            tick(start + 500 * MS)
+            reaches(500 * MS)
+            tick(start + 1234 * MS)
+            reaches(1234 * MS)
+            tick(start + 100 * MS)
+            report()
+            tick(start + 300 * MS)
+            reaches(1434 * MS)
+            last = report()
+            assert (last["overruns"], last["real_time_lost_s"]) == ("0", "0.0")
+            stamps = [stamp_ns(m) for m in client.heard("pose")]
+            assert [s for s in stamps if s] == [k * 10 * MS for k in range(1, 144)]
+        finally:
+            client.close()
+            assert node.stop() == 0
+
+
+def test_asleep_states_still_go_out_and_it_wakes_at_a_command(ros_environment, tmp_path):
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        rig = Commanded(environment, tmp_path, scene={"mesh": "t_handle"})
+        try:
+            report = rig.diagnostics()
+            assert report["state"] == "sleeping"
+            rig.forget("pose")
+            rig.until(lambda: rig.heard_count("pose") >= 10, "states of a sleeper")
+            stamps = [stamp_ns(m) for m in rig.heard("pose")]
+            assert stamps == sorted(set(stamps))
+            rig.publish("poke", wrench_message(0, "world;impulse", (1.0, 0.0, 0.0)))
+            rig.wait_event("poke")
+            assert rig.diagnostics()["state"] == "flying"
+        finally:
+            rig.close()
+
+
+def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_reset(rig):
+    rig.set(integrator="rk4", step=0.1)
+    rig.set(angular_damping=1e6)
+    report = rig.until(lambda: (r := rig.diagnostics())["state"] == "paused" and r, "the stop")
+    assert report["level"] == 1 and "1e+100" in report["message"]
+    pose = rig.heard("pose", last=1)[0]
+    assert all(abs(x) < 1e100 for x in position(pose))
+    rig.set(angular_damping=0.0, step=0.001)
+    rig.start_over(paused=False)
+    rig.until(lambda: rig.now_ns() >= 100 * MS, "time going on")
+    assert rig.diagnostics()["state"] == "flying"
+    offline = Simulation(make_scenario(rig.scene).setup).advance(100 * MS)
+    assert position(rig.state_at(100 * MS)[0]) == offline.row[:7].tolist()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        pytest.param({"integrator": "rk4", "step": 1e-9}, marks=pytest.mark.stress),
+        {"real_time_factor": 0.0, "publish_rate": 1e-4},
+    ],
+    ids=["a step of a nanosecond", "ten million steps to a publication"],
+)
+def test_services_and_commands_are_answered_while_the_motion_takes_all_the_time_there_is(rig, values):
+    rig.set_named(values)
+    before = rig.counters()
+    time_ns = int(rig.diagnostics()["sim_time_ns"])
+    rig.until(lambda: int(rig.diagnostics()["sim_time_ns"]) > time_ns, "time going on")
+    # Time goes on when they are asked, and each is answered; what comes by topic is counted.
+    assert rig.set(linear_damping=0.25)[0] == [True, ""]
+    assert rig.get("linear_damping") == {"linear_damping": 0.25}
+    assert rig.trigger("clear_wrench")["success"]
+    rig.publish("wrench", *[wrench_message(0, "nowhere")] * 20)
+    assert rig.gained(before) == {"refused_total": 20, "refused_frame": 20}
+    assert rig.pause(True)["success"]
+    frozen = rig.diagnostics()["sim_time_ns"]
+    assert rig.diagnostics()["sim_time_ns"] == frozen
+    assert rig.trigger("reset")["success"]
+    assert rig.diagnostics()["sim_time_ns"] == "0"

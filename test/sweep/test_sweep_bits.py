@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Rows of a sweep have the simulation's bits, whoever flies them and whatever is flown beside them."""
+
+import numpy as np
+import pytest
+from sweep_studies import HONEY, POKES, PULLED, STRUCTURE, study
+
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.sweep.chunk import Chunk, run_chunk
+from rigid_proto_ros.sweep.row_flight import fly_row
+from rigid_proto_ros.sweep.variation import variation
+
+
+def same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Equal to the bit, −0 as +0; NaN and None equal themselves."""
+    if a.dtype == object:
+        return a.tolist() == b.tolist()
+    return np.array_equal(a + 0, b + 0, equal_nan=a.dtype.kind == "f")
+
+
+def differing_rows(own, chunk: Chunk) -> list[str]:
+    """Rows whose measures or reasons differ from those of the simulation."""
+    found = []
+    for i, row in enumerate(chunk.columns["row"].tolist()):
+        alone = fly_row(own, variation(own, row))
+        measured = np.array([chunk.columns[name][i] for name in own.measures.columns])
+        if (alone.failure or None) != chunk.columns["failure"][i] or not same(alone.measured, measured):
+            found.append(f"row {row}: {alone.failure or 'other bits'}, not {chunk.columns['failure'][i]}")
+    return found
+
+
+@pytest.mark.parametrize("spec", [POKES, STRUCTURE, PULLED, HONEY], ids=["pokes", "structure", "string", "stiff"])
+def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
+    own = study(spec)
+    chunk = run_chunk(own, 0, own.rows)
+    assert differing_rows(own, chunk) == []
+    failed = sum(reason is not None for reason in chunk.columns["failure"])
+    if spec is PULLED:
+        assert chunk.simulated == own.rows and failed == 0
+    elif spec in (POKES, HONEY):
+        assert chunk.simulated == 0
+    else:
+        # A ballast below zero is a row with its reason, and the others go through the batch.
+        assert 0 < failed == chunk.simulated < own.rows / 2
+        assert any("ballast" in reason for reason in chunk.columns["failure"] if reason)
+        assert "far" in chunk.columns["stopped"].tolist() and None in chunk.columns["stopped"].tolist()
+
+
+@pytest.mark.parametrize("spec", [POKES, STRUCTURE], ids=["pokes", "structure"])
+@pytest.mark.parametrize("sampler", ["random", "latin_hypercube", "sobol"])
+def test_a_row_is_the_same_whatever_chunk_it_is_in(spec, sampler: str) -> None:
+    own = study(spec, sampler=sampler)
+    whole = run_chunk(own, 0, own.rows).columns
+    for first, last in ((0, 1), (5, 12), (own.rows - 3, own.rows)):
+        part = run_chunk(own, first, last).columns
+        assert all(same(part[name], whole[name][first:last]) for name in whole)
+
+
+OFTEN = ("free_body", "rk4", "semi_implicit_euler")
+"""One of each way to step, beside auto; the others are stepped in the same way and flown under stress."""
+
+
+@pytest.mark.parametrize(
+    "integrator", [pytest.param(n, marks=() if n in OFTEN else pytest.mark.stress) for n in sorted(INTEGRATORS)]
+)
+def test_every_integrator_has_its_own_bits_in_a_batch(integrator: str) -> None:
+    # Free flight is all that each of them carries; `taylor` and the rest get what more they can.
+    free = not INTEGRATORS[integrator].carries
+    spec = {
+        "scene": "t_handle",
+        "script": [] if free else [{"t": 0.01, "axes": "body", "torque": [0.001, 0.0, 0.0], "duration": 0.02}],
+        "duration": 0.05,
+        "set": {"integrator": integrator, "gravity": [0.0, 0.0, -9.81]},
+        "samples": 3,
+        "vary": {"initial.angular_velocity": {"direction": 8.0}, "mass": {"uniform": [0.1, 1.0]}},
+    }
+    own = study(spec)
+    chunk = run_chunk(own, 0, own.rows)
+    assert chunk.simulated == 0
+    assert differing_rows(own, chunk) == []
+
+
+def test_loads_that_start_together_act_in_the_order_of_their_messages() -> None:
+    # Two pokes at one point and time: the order of their bytes decides in which they are summed, so it hangs on the force.
+    script = [{"t": 0.1, "at": "tip", "force": [1.0, 0.3, 0.0]}, {"t": 0.1, "at": "tip", "force": [0.1, 0.7, 0.3]}]
+    script += [{"t": 0.1, "at": "tip", "force": [1e-3, 1e3, 0.1]}]
+    vary = {"script.1.force.x": {"uniform": [-1.0, 1.0]}, "mass": {"uniform": [0.1, 1.0]}}
+    own = study({"scene": "t_handle", "script": script, "duration": 0.2, "samples": 12, "vary": vary})
+    assert differing_rows(own, run_chunk(own, 0, own.rows)) == []
+
+
+def test_what_the_batch_refuses_is_the_simulations_to_explain() -> None:
+    spec = {
+        "scene": "t_handle",
+        "duration": 0.01,
+        "set": {"inertia_model": "explicit", "explicit_inertia.tensor": [1, 0, 0, 1, 0, 1]},
+        "vary": {"explicit_inertia.tensor.izz": {"grid": [0.5, 1.0, 2.0, 2.5, 1e-14]}, "initial.orientation_xyzw.w": {"list": [1.0, 0.0, 1.0, 1.0, 1.0][:1]}},
+    }  # fmt: skip
+    own = study(spec)
+    reasons = run_chunk(own, 0, own.rows).columns["failure"].tolist()
+    assert reasons[:3] == [None] * 3
+    assert "A + B >= C" in reasons[3] and "at most 1e12" in reasons[4]

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+"""A bad study is refused before anything runs, in one line that names the field; a good one says what its rows are."""
+
+import math
+from datetime import date
+
+import numpy as np
+import pytest
+from sweep_studies import POKES, STRUCTURE, study
+
+from rigid_proto_ros.base.bundled import body_names, study_names
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.sweep.row_random import normal_quantile, permuted, row_uniforms, seed_words
+from rigid_proto_ros.sweep.study import read_study
+from rigid_proto_ros.sweep.variation import variation
+
+PLAIN = {"scene": "t_handle", "duration": 1.0, "vary": {"mass": {"grid": [1.0, 2.0]}}}
+NUDGE = {"script": [{"t": 0.1, "at": {"vertex": 0}, "impulse": [0.1, 0.0, 0.0]}]}
+TWELVE = {"from": 1, "to": 2, "count": 10**6}
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "words"),
+    [
+        ({"vary": {"mas": {"grid": [1.0]}}}, "vary", "did you mean mass"),
+        ({"varry": {}}, "study", "did you mean vary"),
+        ({"scene": "t_handel"}, "scene", "t_handle"),
+        ({"vary": {"mass": {"grid": []}}}, "vary.mass.grid", "1 to"),
+        ({"vary": {"mass": {"grid": [1.0, math.nan]}}}, "vary.mass.grid, value 2", "finite"),
+        ({"vary": {"mass": {"grid": [1.0, -1.0]}}}, "vary.mass", ">= 0"),
+        ({"vary": {"mass": {"uniform": [2.0, 2.0]}}, "samples": 3}, "vary.mass.uniform", "a < b"),
+        ({"vary": {"mass": {"uniform": [2.0, math.inf]}}, "samples": 3}, "vary.mass.uniform", "finite"),
+        ({"vary": {"mass": {"log_uniform": [0.0, 1.0]}}, "samples": 3}, "vary.mass.log_uniform", "0 < a < b"),
+        ({"vary": {"mass": {"unifrom": [1.0, 2.0]}}}, "vary.mass", "did you mean uniform"),
+        ({"vary": {"mass": {"uniform": [1.0, 2.0]}}}, "samples", "how many"),
+        ({"vary": {"contacts.tip": {"grid": [[0, 0, 1]]}}}, "vary", "fixed for the node"),
+        ({"vary": {"gravity.q": {"grid": [1.0]}}}, "vary", "x, y, z"),
+        ({"vary": {"script.1.force": {"grid": [[0, 0, 1]]}}}, "vary", "a study with a script"),
+        ({"vary": {"mass": {"grid": TWELVE}, "density": {"grid": TWELVE}}}, "samples", "--yes"),
+        ({"vary": {"mass": {"list": [1, 2]}, "density": {"list": [1, 2, 3]}}}, "vary", "in step"),
+        ({"duration": math.nan}, "duration", "finite"),
+        ({"seed": 0.5}, "seed", "whole"),
+        ({"sampler": "halton"}, "sampler", "sobol"),
+        ({"measure": {"max": ["sped"]}}, "measure.max", "did you mean speed"),
+        ({"measure": {"difference": ["attitude"]}}, "reference", "parameters of a reference"),
+        ({"measure": {"samples": None}}, "measure.samples", "at, of"),
+        ({"measure": {"samples": {"at": [2.0], "of": ["speed"]}}}, "measure.samples, at", "to 1"),
+        ({"stop": {"far": {"quantity": "distance", "above": 1, "below": 2}}}, "stop.far", "one of above, below"),
+        ({"watch": 1e6, "measure": {"max": ["spin"]}}, "watch", "samples"),
+        ({"set": {"mass": "heavy"}}, "set.mass", "a finite number"),
+        ({"reference": {"publish_clok": True}}, "parameter", "did you mean publish_clock"),
+        ({"script": [{"t": 0.1, "at": "tipp", "force": [0, 0, 1]}]}, "script, command 1", "tip"),
+        ({"script": [{"t": 0.1, "at": "tip", "froce": [0, 0, 1]}]}, "entry 1", "force"),
+        ({**NUDGE, "vary": {"script.1.at.vertex": {"grid": [0, 0.5]}}}, "vary.script.1.at.vertex", "{vertex: i}"),
+        ({"script": [{"t": 0, "set": {"mass": date(2020, 1, 1)}}], "vary": {"script.1.t": {"grid": [1]}}}, "", "mass"),
+        ({**NUDGE, "vary": {"script.1.at.vertex": {"uniform": [0, 5]}}, "samples": 2}, "vertex", "random_vertex"),
+    ],
+)
+def test_a_bad_study_is_refused_with_its_field(changes, field: str, words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        study(PLAIN, **changes)
+    assert field in refused.value.field
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("lines", ["vary: {mass: {grid: &a [*a]}}", "vary: &a {mass: {grid: [1.0]}}\nset: *a"])
+def test_a_study_file_has_no_aliases(lines: str, tmp_path) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text(f"scene: t_handle\nduration: 1\n{lines}\n")
+    with pytest.raises(InputError, match=r"s.yaml, line 3: got 'an anchor or alias'"):
+        read_study(str(file))
+
+
+def test_names_that_are_numbers_are_names() -> None:
+    conditions = {1: {"quantity": "turned", "above": 1.0}, "half": {"quantity": "turned", "above": 3.0}}
+    assert study(PLAIN, measure={"first": conditions}).measures.columns == ("first.1", "first.half")
+
+
+def test_ten_to_the_twelve_rows_need_a_yes() -> None:
+    from rigid_proto_ros.sweep.study import make_study
+
+    spec = {**PLAIN, "vary": {"mass": {"grid": TWELVE}, "density": {"grid": TWELVE}}}
+    asked = make_study(spec, yes=True)
+    assert asked.rows == 10**12
+    last = variation(asked, asked.rows - 1).values
+    assert (last["mass"], last["density"]) == (2.0, 2.0)
+
+
+def test_grids_make_every_combination_and_lists_go_in_step() -> None:
+    own = study(STRUCTURE)
+    assert own.rows == 3 * 2 * 3 * 2
+    rows = [variation(own, k) for k in range(own.rows)]
+    seen = {(r.values["inertia_model"], r.values["mesh"], r.script[1]["force"][0]) for r in rows}
+    assert len(seen) == 18
+    pairs = {(r.values["mesh"], r.values["integrator"]) for r in rows}
+    assert pairs == {("t_handle", "auto"), ("hammer", "rk4"), ("book", "dop853")}
+
+
+def test_the_seed_of_a_row_is_numpys_own_for_study_and_row() -> None:
+    rows = np.array([0, 1, 7, 2**31, 2**32 - 1, 2**32, 2**40 + 3], np.int64)
+    for seed in (0, 1, 2**32, 2**63 + 11, 2**127 + 5, 2**200 + 1):
+        found = np.empty((len(rows), 5))
+        row_uniforms(seed_words(seed), rows, found)
+        keys = [np.random.SeedSequence(seed, spawn_key=(int(row),)) for row in rows]
+        assert np.array_equal(found, [np.random.default_rng(key).random(5) for key in keys])
+
+
+def test_a_row_draws_from_its_own_seed() -> None:
+    own = study(POKES)
+    u = np.random.default_rng(np.random.SeedSequence(POKES["seed"], spawn_key=(11,))).random(2)
+    values = variation(own, 11).values
+    assert values["mass"] == math.exp(math.log(0.1) + (math.log(1.0) - math.log(0.1)) * u[0])
+    assert values["scale"] == [0.5 + 1.5 * u[1]]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 17, 64, 1000])
+def test_each_stratum_of_a_latin_hypercube_is_taken_once(size: int) -> None:
+    for key in (0, 1, 2**63 + 1):
+        assert sorted(int(permuted(k, size, np.uint64(key))) for k in range(size)) == list(range(size))
+    own = study({**PLAIN, "vary": {"mass": {"uniform": [0, 1]}, "scale": {"uniform": [1, 2]}}, "samples": size, "sampler": "latin_hypercube"})  # fmt: skip
+    mass, scale = own.columns(np.arange(size))
+    assert sorted(np.floor(mass * size)) == sorted(np.floor((scale - 1.0) * size)) == list(range(size))
+
+
+def test_the_normal_quantile_is_good_to_a_part_in_a_quadrillion() -> None:
+    from mpmath import erfinv, mp, sqrt
+
+    mp.dps = 30
+    for u in (1e-300, 1e-17, 1e-9, 0.074, 0.076, 0.3, 0.5001, 0.92, 0.99999, 1.0 - 2.0**-53):
+        exact = sqrt(2) * erfinv(2 * mp.mpf(u) - 1) if u > 1e-9 else None
+        if exact is not None:
+            assert abs(normal_quantile(u) / exact - 1) < 4e-15  # measured 7e-16
+        else:
+            assert abs(0.5 * mp.erfc(-mp.mpf(normal_quantile(u)) / sqrt(2)) / u - 1) < 1e-12  # measured 3e-13 at 1e-300
+
+
+def test_rotations_and_directions_are_of_unit_length_and_even() -> None:
+    vary = {"initial.orientation_xyzw": "random_rotation", "initial.linear_velocity": {"direction": 1.0}}
+    rotation, direction = study({**PLAIN, "vary": vary, "samples": 4000}).columns(np.arange(4000))
+    assert np.abs((rotation**2).sum(axis=1) - 1.0).max() < 1e-15
+    assert np.abs((direction**2).sum(axis=1) - 1.0).max() < 1e-15
+    # Means of 4000: ±5 deviations; second moments are 1/4 and 1/3 of the whole.
+    assert np.abs(rotation.mean(axis=0)).max() < 5 * 0.5 / 63 and np.abs(direction.mean(axis=0)).max() < 5 * 0.58 / 63
+    assert np.abs((rotation**2).mean(axis=0) - 1 / 4).max() < 0.02
+    assert np.abs((direction**2).mean(axis=0) - 1 / 3).max() < 0.025
+
+
+def test_the_bundled_studies_are_good_and_one_takes_every_body() -> None:
+    assert study_names() == ["box_tensor", "flip_map"]
+    for name in study_names():
+        own = read_study(name)
+        variation(own, own.rows - 1).scenario  # noqa: B018
+    box = read_study("box_tensor")
+    assert sorted(box.vary[0].form.values) == body_names()

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: MIT
+"""What the page's picture says of the motion: paths, arrows whose length is a value, ground, labels. No browser is needed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_stand_in import SceneStandIn
+
+pytest.importorskip("viser", reason="viser is not installed: no interactive page")
+
+from rigid_proto_ros.rerun_view.plot_range import plot_range  # noqa: E402
+from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
+from rigid_proto_ros.simulation.simulation import Simulation  # noqa: E402
+from rigid_proto_ros.workbench.keys import KEYS  # noqa: E402
+from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text  # noqa: E402
+from rigid_proto_ros.workbench.poke_mark import PokeMark  # noqa: E402
+from rigid_proto_ros.workbench.soft_shadow import CELLS, sampled, shadow_picture  # noqa: E402
+from rigid_proto_ros.workbench.surroundings import CELL, SECTION, Surroundings  # noqa: E402
+from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point  # noqa: E402
+
+
+def test_every_key_stands_in_the_docs() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "workbench.md").read_text("utf-8")
+    written = {name for cell in re.findall(r"^\| ([^|]+) \| [^|]+ \|$", page, re.MULTILINE) for name in cell.split()}
+    assert {key.shown for key in KEYS} <= written
+
+
+def flown_trails(scene: str, seconds: float, scene_stand_in: SceneStandIn | None = None):
+    """Trails of a flight at 100 states a second, its setup and its states."""
+    setup = read_scene(scene, {}).setup
+    simulation, trails = Simulation(setup), Trails(scene_stand_in or SceneStandIn())
+    rows = []
+    for time_ns in range(0, round(seconds * 1e9) + 1, 10_000_000):
+        row = simulation.advance(time_ns).row.copy()
+        rows.append(row)
+        trails.add(time_ns, row)
+    return trails, setup, np.array(rows)
+
+
+def test_the_com_of_a_thrown_hammer_draws_a_parabola_and_its_far_end_does_not() -> None:
+    trails, setup, rows = flown_trails("thrown_hammer", 1.0)
+    for name in (COM_TRAIL, POINT_TRAIL):
+        trails.switch(name, True)
+    paths = trails.paths(10**9, setup.body, setup.surface)
+    com, point = paths[COM_TRAIL], paths[POINT_TRAIL]
+    assert np.allclose(com, rows[:, 0:3], rtol=0, atol=1e-15)
+    second = np.diff(com, 2, axis=0)
+    assert np.allclose(second, np.array(setup.gravity) * 1e-4, rtol=0, atol=1e-9)  # measured 3e-16
+    # A point fixed to the body keeps its distance from the COM.
+    arm = farthest_point(setup.surface, setup.body) * setup.body.scale - setup.body.center_of_mass
+    assert np.allclose(np.linalg.norm(point - com, axis=1), np.linalg.norm(arm), rtol=1e-12)
+    assert np.ptp(np.diff(point, 2, axis=0), axis=0).max() > 1e-3  # measured 4e-3; 0 on a parabola
+
+
+def test_paths_are_drawn_where_they_are_in_a_picture_that_moves_on_and_end_at_the_moment_shown() -> None:
+    scene = SceneStandIn()
+    trails, setup, rows = flown_trails("thrown_hammer", 0.5, scene)
+    trails.switch(COM_TRAIL, True)
+    line, frame = scene.nodes["/trails/0"], scene.nodes["/trails"]
+    origin, unit = np.array([0.3, -0.2, 0.1]), 0.5
+    trails.draw(0.0, 300_000_000, setup.body, setup.surface, origin, unit)
+    ends = (line.points[-1, 1] + frame.position) * unit + origin
+    assert line.visible and np.allclose(ends, rows[30, 0:3], atol=1e-12)
+    # Soon after, only the frame is moved.
+    sent = line.points
+    assert sent.shape == line.arguments[1].shape  # viser loses the colours of lines whose number changes
+    trails.draw(0.01, 300_000_000, setup.body, setup.surface, origin + 1.0, unit)
+    assert line.points is sent
+    assert np.allclose((line.points[0, 0] + frame.position) * unit + origin + 1.0, rows[0, 0:3], atol=1e-12)
+    trails.forget()
+    trails.draw(1.0, 300_000_000, setup.body, setup.surface, origin, unit)
+    assert not line.visible
+
+
+def test_time_that_went_back_begins_the_paths_anew() -> None:
+    trails, setup, _ = flown_trails("thrown_hammer", 0.5)
+    trails.switch(COM_TRAIL, True)
+    trails.add(0, np.zeros(13))
+    assert trails.paths(10**9, setup.body, setup.surface) == {}
+
+
+def arrow_lengths(values, size_m: float = 0.3, unit_m: float = 0.5):
+    """Of L's arrow [m] and what its label and its scale say, for each |L| in turn."""
+    scene = SceneStandIn()
+    arrows = MotionArrows(scene)
+    for value in values:
+        said = arrows.show(np.zeros(3), np.array([0.0, 0.0, value]), np.ones(3), size_m, unit_m, (True, True))
+        arrow = scene.nodes["/momentum"]
+        yield float(arrow.points[0, 1, 2]) * unit_m, scene.nodes["/momentum_label"].text, said["arrow of L"]
+
+
+def test_an_arrows_length_is_its_value_on_the_scale_that_is_said() -> None:
+    lengths = list(arrow_lengths([0.55, 0.5, 0.4]))
+    assert {scale for *_, scale in lengths} == {lengths[0][2]}
+    for (length, label, scale), value in zip(lengths, (0.55, 0.5, 0.4), strict=True):
+        assert scale == "5 cm = 0.1 kg m²/s"
+        assert length == pytest.approx(value / 0.1 * 0.05, rel=1e-12)
+        assert label == f"L {value} kg m²/s"
+
+
+def test_the_scale_of_an_arrow_goes_in_steps_and_keeps_it_in_sight() -> None:
+    values = np.geomspace(1e-6, 1e6, 2000)
+    found = list(arrow_lengths([*values, *values[::-1]]))
+    assert all(0.5 * 0.3 < length < 1.0 * 0.3 for length, *_ in found)
+    steps = sum(a[2] != b[2] for a, b in zip(found[:-1], found[1:], strict=True))
+    assert steps <= 2 * 6 * 12 + 1  # six in a decade, up and down
+    # A value that trembles about a step doesn't make it change to and fro.
+    edge = next(k for k in range(1, 2000) if found[k][2] != found[k - 1][2])
+    trembling = [
+        found_at[2] for found_at in arrow_lengths([values[edge] * (1.0 + 0.01 * (-1) ** k) for k in range(20)])
+    ]
+    assert len(set(trembling[1:])) == 1
+
+
+def test_a_body_at_rest_has_no_arrows() -> None:
+    scene = SceneStandIn()
+    said = MotionArrows(scene).show(np.zeros(3), np.full(3, 1e-20), np.full(3, 1e-12), 0.3, 0.5, (True, True))
+    assert said == {} and not any(node.visible for node in scene.nodes.values())
+
+
+@pytest.mark.parametrize(
+    "metres, text", [(5e-5, "50 µm"), (0.002, "2 mm"), (0.05, "5 cm"), (0.5, "50 cm"), (20.0, "20 m"), (5e3, "5 km")]
+)
+def test_lengths_are_written_with_the_unit_that_suits_them(metres: float, text: str) -> None:
+    assert length_text(metres) == text
+
+
+@pytest.mark.parametrize(
+    "values", [[0.0, 2e5], [-1.2e7, -1.1e7], [7229.8, 7229.8 + 1e-9], [-12.0, 12.0], [1e-9, 5e-9], [0.0], [3.0, 1e15]]
+)
+def test_the_ticks_of_a_plot_fit_beside_it_whatever_the_values(values) -> None:
+    values = np.array(values)
+    shown = plot_range(values)
+    scaled = values / 10.0**shown.exponent
+    assert shown.low < scaled.min() and scaled.max() < shown.high and shown.exponent % 3 == 0
+    ticks = np.linspace(shown.low, shown.high, 5)
+    assert np.abs(ticks).max() <= 1500.0
+    # Two digits behind the point tell them apart, so "-1,500.25" is the longest.
+    assert np.diff(ticks).min() >= 0.01
+
+
+def test_a_plots_title_says_its_power_of_ten() -> None:
+    assert plot_range(np.array([0.0, 2e5])).title("Energy", "J") == "Energy [10³ J]"
+    assert plot_range(np.array([-3e-10])).title("Energy", "J") == "Energy [10⁻¹² J]"
+    assert plot_range(np.array([10.0])).title("Angle", "°") == "Angle [°]"
+
+
+def test_rounding_of_a_constant_does_not_fill_its_plot() -> None:
+    shown = plot_range(np.array([0.0, 3e-14]), least=1.0)
+    assert shown.exponent == 0 and shown.high - shown.low >= 1.0
+    constant = plot_range(np.array([5.0, 5.0 + 1e-12]))
+    assert constant.high - constant.low > 0.2
+
+
+def test_the_floor_goes_with_a_falling_body_and_the_wall_passes_it_by() -> None:
+    scene = SceneStandIn()
+    surroundings, unit = Surroundings(scene), 0.5
+    lines = {}
+    for height in (0.0, -0.3, -7.0):
+        surroundings.place(np.array([0.0, 0.0, height]), unit, True)
+        assert scene.nodes["/grid/floor"].position[2] < 0.0
+        wall = scene.nodes["/grid/wall"]
+        lines[height] = wall.position[2]
+        # A thick line lies where its height is in the world.
+        for k in range(2):
+            label = scene.nodes[f"/grid/height{k}"]
+            said = float(label.text.split()[2])
+            assert label.position[2] * unit + height == pytest.approx(said, abs=1e-9)
+            assert (label.position[2] - wall.position[2]) % SECTION == pytest.approx(0.0, abs=1e-9) or (
+                label.position[2] - wall.position[2]
+            ) % SECTION == pytest.approx(SECTION, abs=1e-9)
+    assert lines[-0.3] - lines[0.0] == pytest.approx(0.3 / unit)
+    assert scene.nodes["/grid/bar_label"].text == length_text(CELL * unit)
+
+
+def test_without_gravity_the_wall_is_seen_only_by_a_body_that_left_the_floor() -> None:
+    scene = SceneStandIn()
+    surroundings = Surroundings(scene)
+    surroundings.place(np.zeros(3), 1.0, False)
+    assert not scene.nodes["/grid/wall"].visible
+    surroundings.place(np.array([0.0, 0.0, 2.0]), 1.0, False)
+    assert scene.nodes["/grid/wall"].visible
+    surroundings.switch(False)
+    surroundings.place(np.array([0.0, 0.0, 2.0]), 1.0, True)
+    assert not any(node.visible for node in scene.nodes.values())
+
+
+def test_a_shadow_is_dark_below_the_body_and_nowhere_else() -> None:
+    setup = read_scene("t_handle", {}).setup
+    points = sampled(setup.surface.vertices, setup.surface.triangles)
+    low, high = setup.surface.vertices.min(axis=0), setup.surface.vertices.max(axis=0)
+    assert (points >= low - 1e-12).all() and (points <= high + 1e-12).all()
+    places = np.array([[0.25, 0.1]] * 50)
+    alpha = shadow_picture(places)[..., 3]
+    row, column = np.unravel_index(int(alpha.argmax()), alpha.shape)
+    assert (column + 0.5) / CELLS - 0.5 == pytest.approx(0.25, abs=1.0 / CELLS)
+    assert 0.5 - (row + 0.5) / CELLS == pytest.approx(0.1, abs=1.0 / CELLS)
+    assert np.count_nonzero(alpha) <= 25
+
+
+def test_no_label_begins_empty_for_viser_would_never_show_it() -> None:
+    scene = SceneStandIn()
+    for thing in (Surroundings, MotionArrows):
+        thing(scene)
+    PokeMark(scene, (0, 0, 0))
+    labels = [node for node in scene.nodes.values() if node.kind == "add_label"]
+    assert len(labels) >= 5 and all(label.arguments[0] for label in labels)
+
+
+def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_one() -> None:
+    from types import SimpleNamespace
+
+    from rigid_proto_ros.workbench.scene_view import SceneView
+
+    class Scene(SceneStandIn):
+        def __getattr__(self, method: str):
+            return super().__getattr__(method) if method.startswith("add_") else lambda *a, **k: None
+
+        world_axes = SimpleNamespace(visible=True)
+
+    scene = Scene()
+    view = SceneView(SimpleNamespace(scene=scene, initial_camera=SimpleNamespace()))
+    scenario = read_scene("true_or_box_tensor", {})
+    view.set_body(scenario, zoom=True)
+    row, com = np.array([*scenario.setup.initial]), scenario.ghost.body.center_of_mass
+    labels = [scene.nodes[f"/{whose}/name"] for whose in ("body", "ghost")]
+    view.show_ghost(row, com, ("true", "its box"))
+    assert [label.text for label in labels] == ["true", "its box"] and all(label.visible for label in labels)
+    # At one and the same point of the mesh, each from its own COM.
+    apart = (labels[0].position - labels[1].position) * view.unit
+    assert apart == pytest.approx(com - scenario.setup.body.center_of_mass, abs=1e-12)
+    view.show_ghost(None, com, ("true", "its box"))
+    assert not any(label.visible for label in labels)

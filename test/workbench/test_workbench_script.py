@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""What was done by hand becomes a scene and a script that give the same motion again, bit for bit."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+from hand_session import SCENE, HandSession, random_hand_session
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.messages.session_messages import read_text
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.scene.command_codec import ScriptCommand, flow, outgoing
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scene_file import read_scene_text
+from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule
+from rigid_proto_ros.workbench.save_as_script import SavedScript, save_as_script
+
+SECOND = 10**9
+
+
+def flown(saved: SavedScript, until_ns: int) -> State:
+    """The last state of ``simulate SCENE --script SCRIPT``."""
+    run = OfflineRun(make_scenario(read_scene_text(saved.scene).values), parse_script(saved.script))
+    assert run.advance(until_ns)
+    assert not run.simulation.refused
+    return run.simulation.state
+
+
+def assert_flies_again(hand: HandSession) -> SavedScript:
+    saved = save_as_script(hand.session())
+    assert flown(saved, hand.now_ns).sha256() == hand.simulation.state.sha256()
+    return saved
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_hand_session_saved_as_a_script_flies_again_to_the_bit(seed: int) -> None:
+    saved = assert_flies_again(random_hand_session(seed, seconds=4.0))
+    assert saved.notes == []
+    assert saved.commands > 10
+
+
+@pytest.mark.stress
+def test_a_thousand_hand_sessions_fly_again_to_the_bit() -> None:
+    other = []
+    for seed in range(100, 1100):
+        hand = random_hand_session(seed, seconds=5.0)
+        saved = save_as_script(hand.session())
+        if saved.notes or flown(saved, hand.now_ns).sha256() != hand.simulation.state.sha256():
+            other.append(seed)
+    assert other == []
+
+
+def test_what_was_done_before_a_reset_is_no_part_of_it() -> None:
+    hand = HandSession(SCENE)
+    hand.set(mass=0.2)
+    hand.load(False, "world@tip", [0.03, 0.0, 0.0])
+    hand.wait(SECOND)
+    hand.reset()
+    hand.load(False, "world@tip", [0.0, 0.03, 0.0])
+    hand.wait(SECOND)
+    saved = assert_flies_again(hand)
+    assert saved.commands == 1
+    assert read_scene_text(saved.scene).values["mass"] == 0.2
+
+
+def test_release_and_changes_of_one_instant_keep_their_order() -> None:
+    hand = HandSession(SCENE)
+    hand.tie("body/mesh", [0.0, 0.0, 0.07])
+    hand.pull([0.1, 0.0, 0.0])
+    hand.wait(SECOND // 2)
+    hand.pause()
+    hand.set(string__attached=True, string__target=[0.0, 0.1, 0.0])
+    hand.set(string__target=[0.0, 0.2, 0.0])
+    hand.release()
+    hand.clear()
+    hand.set(string__attached=False)
+    hand.set(string__attached=True)
+    hand.set(string__stiffness=2.0)
+    hand.wait(SECOND // 2)
+    assert hand.simulation.string is not None
+    assert assert_flies_again(hand).notes == []
+
+
+def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_order_in_which_it_acted() -> None:
+    hand = HandSession(SCENE)
+    hand.pause()
+    for k in range(200):
+        hand.set(ballast__tip=[0.0001 * k, 0.0, 0.0, 0.07])
+    hand.load(False, "normal@tip;impulse", [1e-4, 0.0, 0.0])
+    hand.wait(SECOND)
+    script = parse_script(assert_flies_again(hand).script)
+    (message,) = outgoing(script)
+    assert message.topic == "schedule"
+    assert expand_schedule(read_schedule(read_text(message.data, "schedule")), 1.5) == script
+    assert [c.changes["ballast.tip"][0] for c in script[:200]] == [0.0001 * k for k in range(200)]
+
+
+def test_a_change_that_only_a_later_scene_allows_flies_again() -> None:
+    tensor = [1.0e-4, 0.0, 0.0, 2.0e-4, 0.0, 2.5e-4]
+    hand = HandSession({"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": tensor})
+    hand.wait(SECOND // 10)
+    hand.set(mesh="t_handle")
+    hand.wait(SECOND // 10)
+    hand.set(inertia_model="solid")
+    hand.load(False, "world@vertex/3", [0.01, 0.0, 0.0])
+    hand.wait(SECOND // 10)
+    assert make_scenario(hand.first.values).body_mesh is None
+    with pytest.raises(InputError):
+        hand.first.with_changes({"inertia_model": "solid"})
+    assert len(yaml.safe_load(assert_flies_again(hand).script)) == 3
+
+
+def test_a_script_is_judged_in_the_scene_that_it_has_made_by_then() -> None:
+    hand = HandSession({**SCENE, "integrator": "free_body"})
+    hand.wait(SECOND // 10)
+    hand.set(integrator="auto")
+    hand.wait(SECOND // 10)
+    hand.load(False, "world@tip", [0.01, 0.0, 0.0])
+    hand.wait(SECOND // 10)
+    assert assert_flies_again(hand).notes == []
+
+
+def test_a_log_with_a_line_missing_is_refused() -> None:
+    hand = random_hand_session(1, seconds=2.0)
+    session = hand.session()
+    del session.events[3]
+    with pytest.raises(InputError):
+        save_as_script(session)
+
+
+def test_nothing_of_the_running_program_is_saved() -> None:
+    hand = HandSession({**SCENE, "record": "out.mcap", "viewer": "none", "start_paused": True})
+    hand.set(record="elsewhere.mcap")
+    hand.wait(SECOND)
+    saved = assert_flies_again(hand)
+    assert "mcap" not in saved.scene + saved.script
+    # The change cut a step of the motion: what stands for it does so too.
+    assert [command.kind for command in parse_script(saved.script)] == ["set"]
+
+
+def test_entries_are_the_commands_of_the_hand() -> None:
+    hand = HandSession(SCENE)
+    hand.wait(SECOND // 3)
+    hand.load(False, "normal@tip", [0.02, 0.0, 0.0])
+    hand.load(True, "body@point/0.01,0.02,0.03", [0.1, 0.2, 0.3], [0.0, 0.0, 1e-7])
+    hand.wait(SECOND // 3)
+    third = 333_333_333
+    assert parse_script(save_as_script(hand.session()).script) == [
+        ScriptCommand(third, "wrench", "body@point/0.01,0.02,0.03", (0.1, 0.2, 0.3), (0.0, 0.0, 1e-7)),
+        ScriptCommand(third, "poke", "normal@tip", (0.02, 0.0, 0.0)),
+    ]
+
+
+@pytest.mark.parametrize(
+    "text", ["tip", "on", "yes", "null", "true", "inf", "nan", "com", "release", "", " a", "1e3", ".inf"]
+)
+def test_text_comes_back_from_yaml_as_text(text: str) -> None:
+    assert yaml.safe_load(flow({"at": text})) == {"at": text}

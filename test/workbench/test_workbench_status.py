@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""What stands at the head of the page, and what diagnostics say: what went wrong, how many times, and what to do."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigid_proto_ros.ros.troubles import troubles
+from rigid_proto_ros.workbench.status import SHOWN_S, SILENT_S, Status
+
+CALM = {
+    "state": "flying",
+    "integrator": "auto",
+    "integrator_choice": "auto: sleeping",
+    "warning": "",
+    "refused_total": "0",
+    "refused_frame": "0",
+    "refused_stamp": "0",
+    "overruns": "0",
+    "real_time_lost_s": "0.0",
+    "sequence_gaps": "0",
+    "queue_full": "0",
+}
+
+
+def after(**changes: object) -> str:
+    """The page's line when this came up between two reports."""
+    status = Status("/rigid_body")
+    status.report(CALM, 0.0)
+    status.report({**CALM, **{name: str(value) for name, value in changes.items()}}, 1.0)
+    return status.text(1.0)
+
+
+def test_states_published_late_are_no_matter_of_the_pages_user() -> None:
+    assert "⚠" not in after(overruns=30, real_time_lost_s=0.05)
+    assert troubles(CALM, {**CALM, "overruns": "30"}) == ["30 states published late"]
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"refused_total": 3, "refused_frame": 2, "refused_stamp": 1}, "3 commands refused (frame 2, stamp 1)"),
+        ({"sequence_gaps": 1}, "1 message lost on the way"),
+        ({"overruns": 9, "real_time_lost_s": 0.4}, "0.4 s behind real time"),
+        ({"warning": "step too coarse"}, "step too coarse"),
+    ],
+)
+def test_what_matters_is_said_with_its_number(changes: dict, said: str) -> None:
+    assert f"⚠ {said}" in after(**changes) or f"here: {said}" in after(**changes)
+
+
+def test_a_trouble_is_shown_long_enough_to_be_read_and_then_no_more() -> None:
+    status = Status("/rigid_body")
+    refused = {**CALM, "refused_total": "1"}
+    for second, report in enumerate([CALM, refused, *[refused] * 20]):
+        status.report(report, float(second))
+        assert ("1 command refused" in status.text(float(second))) == (1 <= second < 1 + SHOWN_S)
+
+
+def test_a_node_that_is_gone_is_said_with_what_to_do_until_it_is_back() -> None:
+    status = Status("/rigid_body")
+    assert "waiting" in status.text(0.0)
+    status.report(CALM, 0.0)
+    assert "is simulating" in status.text(1.0)
+    text = status.text(1.0 + SILENT_S)
+    assert "is simulating" not in text and "has ended" in text and "Start it again" in text
+    # Another one begins to count from 0: nothing went wrong with it.
+    status.report({**CALM, "state": "paused"}, 20.0)
+    assert status.text(20.0).startswith("`/rigid_body` is paused") and "⚠" not in status.text(20.0)

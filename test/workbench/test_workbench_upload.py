@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: MIT
+"""Uploads are judged as inspect judges files, and leave nothing behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from rigid_proto_ros.base.bundled import body_path
+from rigid_proto_ros.base.errors import InputError, MeshError
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mesh import cache as mesh_cache
+from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.workbench.upload import MAX_BYTES, Uploads, shown_name
+
+BOOK = body_path("book").read_bytes()
+OPEN = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n"
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where temporary files go, and a cache of its own beside it."""
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
+    return folder
+
+
+def files(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def test_an_upload_gets_the_verdict_that_inspect_gives(place: Path, capsys: pytest.CaptureFixture) -> None:
+    uploads = Uploads()
+    upload = uploads.take("my book.obj", BOOK)
+    assert main(["inspect", upload.path, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(upload.report))
+    assert upload.refusal == ""
+    assert upload.name == "my_book.obj" == Path(upload.path).name
+    broken = uploads.take("broken.obj", OPEN)
+    assert main(["inspect", broken.path, "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["verdict"] == broken.report["verdict"]
+    assert "open" in broken.refusal
+    assert any("edge" in line for line in broken.verdict)
+    uploads.close()
+
+
+@pytest.mark.parametrize(
+    "name, data",
+    [
+        ("x.txt", b"hello"),
+        ("x.obj", b""),
+        ("x.obj", b"\x00" * 1000),
+        ("x.stl", b"solid x\nendsolid x\n"),
+        ("x.stl", b"\x00" * 80 + struct.pack("<I", 4_000_000_000)),
+        ("x.obj", b"v 0 0 0\nf 1 2 3\n"),
+        ("x.ply", BOOK),
+        ("x.glb", b"glTF"),
+        ("x.gltf", b'{"buffers": [{"uri": "../../etc/passwd"}]}'),
+        ("x.3mf", b"PK\x03\x04"),
+        ("x.dae", b"<COLLADA/>"),
+        ("x", BOOK),
+        ("", BOOK),
+    ],
+)
+def test_what_is_no_mesh_is_refused_and_nothing_is_kept_of_it(place: Path, name: str, data: bytes) -> None:
+    uploads = Uploads()
+    flown = uploads.take("flown.obj", BOOK)
+    uploads.fly(flown)
+    with pytest.raises(InputError):
+        uploads.take(name, data)
+    assert files(place) == [Path(flown.path)]
+    uploads.close()
+    assert not list(place.iterdir())
+
+
+def bust_in_millimetres() -> bytes:
+    """A box as large as a bust of half a metre, in a file whose numbers are millimetres."""
+    sides = (200.0, 250.0, 480.0)
+    corners = [[s * bool(k >> axis & 1) for axis, s in enumerate(sides)] for k in range(8)]
+    faces = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"]
+    return "".join(f"v {x} {y} {z}\n" for x, y, z in corners).encode() + "".join(f"f {f}\n" for f in faces).encode()
+
+
+def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as_much_as_a_mountain(
+    place: Path,
+) -> None:
+    upload = Uploads().take("bust.obj", bust_in_millimetres())
+    assert (upload.likely_unit, upload.likely_up) == ("mm", "z")
+    assert upload.size_and_mass("mm") == "0.2 × 0.25 × 0.48 m, 24 kg at 1000 kg/m³"
+    assert upload.size_and_mass("m") == "200 × 250 × 480 m, 2.4e+10 kg at 1000 kg/m³"
+    values = upload.flight("mm", "y")
+    body = read_scene("t_handle", {**values, "mass": 0.0}).setup
+    assert body.body.mass == pytest.approx(24.0, rel=1e-12)
+    # Its y is up now, and nothing is left of the spin and the stand-in of the body before.
+    assert matrix_from_quaternion(values["initial.orientation_xyzw"])[:, 1] == pytest.approx([0.0, 0.0, 1.0])
+    assert matrix_from_quaternion(upload.flight("mm", "x")["initial.orientation_xyzw"])[:, 0] == pytest.approx(
+        [0, 0, 1]
+    )
+    assert not body.initial[7:13].any()
+    assert (values["mesh_fallback"], values["inertia_model"], values["density"]) == ("", "solid", 1000.0)
+
+
+def test_an_upload_that_bounds_no_solid_has_a_size_and_no_mass(place: Path) -> None:
+    assert Uploads().take("open.obj", OPEN).size_and_mass("cm") == "0.01 × 0.01 × 0.01 m"
+
+
+def glb(buffer_uri: str | None = None) -> bytes:
+    trimesh = pytest.importorskip("trimesh")
+    data = trimesh.creation.box((1.0, 2.0, 3.0)).export(file_type="glb")
+    if buffer_uri is None:
+        return data
+    length = struct.unpack_from("<I", data, 12)[0]
+    parts = json.loads(data[20 : 20 + length])
+    parts["buffers"][0]["uri"] = buffer_uri
+    text = json.dumps(parts).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + length :]
+    header = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(rest))
+    return header + struct.pack("<I4s", len(text), b"JSON") + text + rest
+
+
+def test_a_glb_is_taken_in_metres_with_y_up(place: Path) -> None:
+    upload = Uploads().take("Box.glb", glb())
+    assert (upload.likely_unit, upload.likely_up, upload.refusal) == ("m", "y", "")
+    assert upload.size_and_mass("m") == "1 × 2 × 3 m, 6e+03 kg at 1000 kg/m³"
+
+
+@pytest.mark.parametrize("uri", ["../../../etc/passwd", "/etc/passwd", "file:///etc/passwd", "http://127.0.0.1/x"])
+def test_a_glb_that_names_other_files_is_refused_unread(place: Path, uri: str) -> None:
+    with pytest.raises(MeshError, match="holds all of its parts"):
+        Uploads().take("Box.glb", glb(uri))
+    assert not files(place)
+
+
+class Large(bytes):
+    """Bytes that say they are more than they are: 500 MB need not be made to be refused."""
+
+    def __len__(self) -> int:
+        return 500_000_000
+
+
+def test_500_megabytes_are_refused_unwritten_and_unread(place: Path) -> None:
+    uploads = Uploads()
+    with pytest.raises(MeshError, match="500000000 bytes"):
+        uploads.take("large.stl", Large())
+    assert not files(place)
+    assert MAX_BYTES < 500_000_000
+
+
+def test_more_triangles_than_allowed_are_refused(place: Path) -> None:
+    with pytest.raises(MeshError):
+        Uploads(max_triangles=8).take("book.obj", BOOK)
+    assert not files(place)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../../etc/passwd.obj",
+        "/etc/x.obj",
+        r"..\..\x.obj",
+        "a/../../b.obj",
+        "x\0y.obj",
+        "..obj",
+        "é" * 300 + ".OBJ",
+        "-rf.obj",
+    ],
+)
+def test_a_name_leads_nowhere(place: Path, name: str) -> None:
+    uploads = Uploads()
+    upload = uploads.take(name, BOOK)
+    path = Path(upload.path)
+    assert path.parent.parent.parent == place
+    assert path.resolve() == path
+    assert path.suffix == ".obj"
+    assert len(path.name) < 60
+    uploads.close()
+
+
+def test_shown_names_are_plain() -> None:
+    assert shown_name("C:\\parts\\Bracket v2 (final).STL") == ("Bracket_v2_final.stl", "stl")
+    assert shown_name("<script>.obj") == ("script.obj", "obj")
+
+
+def test_a_thousand_uploads_in_a_row_leave_one_file_then_none(place: Path) -> None:
+    uploads = Uploads()
+    for k in range(1000):
+        upload = uploads.take(f"part {k}.obj", OPEN)
+        if k == 500:
+            uploads.fly(upload)
+            flown = upload
+    assert sorted(files(place)) == sorted([Path(flown.path), Path(upload.path)])
+    uploads.fly(upload)
+    assert files(place) == [Path(upload.path)]
+    uploads.fly(None)
+    assert not files(place)
+    uploads.close()
+    assert not list(place.iterdir())
+    assert mesh_cache.folder() is not None
+    assert not mesh_cache.folder().exists()
+
+
+def test_the_end_of_the_process_removes_its_uploads(place: Path) -> None:
+    code = (
+        "import sys; from rigid_proto_ros.workbench.upload import Uploads; u = Uploads()\n"
+        f"print(u.take('x.obj', open({str(body_path('book'))!r}, 'rb').read()).path)\n1/0\n"
+    )
+    environment = {**os.environ, "TMPDIR": str(place), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert Path(done.stdout.strip()).parent.parent.parent == place
+    assert not list(place.iterdir())
+
+
+def test_what_a_killed_process_left_is_swept_up_by_the_next_and_a_living_ones_is_not(place: Path) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    for pid in (ended.pid, os.getpid(), "text"):
+        (place / f"rigid_proto_upload_{pid}_abc").mkdir()
+    Uploads().close()
+    assert sorted(p.name.split("_")[3] for p in place.iterdir()) == sorted([str(os.getpid()), "text"])

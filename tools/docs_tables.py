@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: MIT
+"""Tables of the docs, written from the declarations in the code.
+
+    python tools/docs_tables.py [--check]
+
+A document holds a table between ``<!-- table: NAME -->`` and ``<!-- end -->``, or what a lesson says to try between ``<!-- lesson:
+SCENE -->`` and the same end; what stands there is replaced. With
+``--check`` nothing is written and the exit status is 1 when a document is behind.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import csv
+import math
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from rigid_proto_ros import __version__
+from rigid_proto_ros.base.bundled import body_names
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.inspection import inspect_mesh
+from rigid_proto_ros.mass.tensor import principal_axes
+from rigid_proto_ros.mesh.reading import load_mesh
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.integrators.integrator import (
+    ANGULAR_DAMPING,
+    BODY_FORCE,
+    BODY_TORQUE,
+    NO_GYROSCOPIC_TERM,
+    STRING,
+    WORLD_TORQUE,
+)
+from rigid_proto_ros.ros.interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from rigid_proto_ros.scene.lessons import lesson, lessons
+from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
+
+ROOT = Path(__file__).resolve().parent.parent
+
+_MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def topics() -> str:
+    """The node's topics."""
+    words = {SUBSCRIBED: "sub", PUBLISHED: "pub"}
+    rows = [
+        (words[i.direction], _code(i.name), _code(i.type.replace("/msg/", "/")), _with_switch(i))
+        for i in INTERFACES
+        if i.direction in words
+    ]
+    return _table(("", "topic", "type", "meaning"), rows)
+
+
+def services() -> str:
+    """The node's services."""
+    rows = [
+        (_code(i.name), _code(i.type.replace("/srv/", "/")), _with_switch(i))
+        for i in INTERFACES
+        if i.direction == SERVED
+    ]
+    return _table(("service", "type", "meaning"), rows)
+
+
+def parameters() -> str:
+    """The node's parameters, which a scene file sets too."""
+    rows = [_parameter_row(p) for p in (*PARAMETERS.values(), *PATTERNS.values())]
+    return _table(("parameter", "default", "unit", "meaning"), rows)
+
+
+def integrators() -> str:
+    """What each integrator is and can't carry."""
+    needs = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM)
+    rows = []
+    for integrator in INTEGRATORS.values():
+        lacks = [need for need in needs if need not in integrator.carries]
+        order = "exact" if integrator.order is None else str(integrator.order)
+        evaluations = str(integrator.evaluations)
+        if integrator.kernel is None:  # it picks others
+            order = evaluations = "-"
+        cells = (_code(integrator.name), order, evaluations, "; ".join(lacks))
+        rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".").replace("``", "`")))
+    return _table(("name", "order", "evaluations a step", "can't carry", "good for, and what breaks it"), rows)
+
+
+def masses(short: bool = False) -> str:
+    """Mass properties here and elsewhere, from the last benchmark's own numbers. short: the README's choice of tools and errors."""
+    with (ROOT / "benchmarks" / "results" / "mass_properties.csv").open(encoding="utf-8", newline="") as file:
+        measured = [row for row in csv.DictReader(file) if row["what"] == "mass properties"]
+    found = {
+        (row["tool"], row["mesh"].split(",")[0], row["place"]): row for row in measured if "shuffled" not in row["mesh"]
+    }
+    rows = []
+    for tool in dict.fromkeys(row["tool"] for row in measured):
+        if short and tool not in _SHORT_MASSES:
+            continue
+        place = found[tool, "ellipsoid 100k", "base"]
+        errors = [found[tool, mesh, at]["inertia_error"] for mesh, at in _INERTIA_ERRORS]
+        time = f"{float(place['ns_per_triangle']):,.0f}"
+        rows.append((tool, place["version"], time, *(_error(error) for error in errors)))
+    if short:
+        head = ("tool", "ns per triangle", "error at the origin", "moved by 10³", "moved by 10⁶")
+        return _table(head, ((tool, *cells[1:5]) for tool, *cells in rows))
+    sentence = f"Measured {place['date'][:10]} on one {place['cpu']}, in one process, medians."
+    head = (
+        "tool",
+        "version",
+        "ns per triangle",
+        "error in place",
+        "moved by 10³",
+        "moved by 10⁶",
+        "plate 1 × 1 × 10⁻⁵",
+    )
+    return f"{sentence}\n\n{_table(head, rows)}"
+
+
+_SHORT_MASSES = ("rigid_proto", "trimesh", "igl.moments", "MuJoCo compile, exact", "Drake")
+
+_INERTIA_ERRORS = (
+    ("ellipsoid 100k", "base"),
+    ("ellipsoid 100k", "+1e3"),
+    ("ellipsoid 100k", "+1e6"),
+    ("plate 1 x 1 x 1e-5", "base"),
+)
+"""Mesh and place of the errors shown; times are those of the first."""
+
+
+def _error(text: str) -> str:
+    value = float(text)
+    return "refuses" if math.isnan(value) else f"{value:.0e}"
+
+
+def motions(short: bool = False) -> str:
+    """Motion here and elsewhere: each tool's most accurate run of a problem, from the last benchmark's own numbers. short: without
+    versions and date."""
+    with (ROOT / "benchmarks" / "results" / "work_precision.csv").open(encoding="utf-8", newline="") as file:
+        measured = [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
+    ours = [row for row in measured if row["tool"] == "ours" and row["integrator"] == "auto"]
+    best = {("rigid_proto, auto", row["problem"]): row for row in ours if row["step_or_tolerance"] == "1e-09"}
+    versions = {"rigid_proto, auto": __version__}
+    for row in measured:
+        if row["tool"].startswith("ours"):
+            continue
+        versions[row["tool"]] = row["version"]
+        known = best.get((row["tool"], row["problem"]))
+        if known is None or _attitude_error(row) < _attitude_error(known):
+            best[row["tool"], row["problem"]] = row
+    rows = [
+        (_TOOLS.get(tool, tool), versions[tool], *(_best_run(best.get((tool, problem))) for problem in _MOTIONS))
+        for tool in versions
+    ]
+    if short:
+        return _table(("tool", *_MOTIONS.values()), ((tool, *cells) for tool, _, *cells in rows))
+    newest = max(measured, key=lambda row: row["date"])
+    sentence = f"Measured {newest['date'][:10]} on one {newest['cpu']}, in one process, medians of whole runs."
+    return f"{sentence}\n\n{_table(('tool', 'version', *_MOTIONS.values()), rows)}"
+
+
+_MOTIONS = {
+    "P1": "100 s of repeated flips",
+    "P2": "10 s under a thruster and gravity",
+    "P4rod": "10 s of a rod at 1000 rad/s",
+}
+"""Problems of benchmarks/WORK_PRECISION.md that are shown."""
+
+_TOOLS = {
+    "mujoco": "MuJoCo",
+    "drake": "Drake",
+    "pinocchio": "Pinocchio, RKMK4",
+    "bullet": "Bullet",
+    "scipy": "SciPy, DOP853",
+    "diffrax": "diffrax",
+}
+
+
+def _best_run(row: dict[str, str] | None) -> str:
+    if row is None:
+        return "not run"
+    error = _attitude_error(row)
+    if error > 0.1:
+        return "error > 0.1 rad"
+    milliseconds = 1e3 * float(row["median_s"])
+    time = f"{milliseconds:.0f}" if milliseconds >= 10.0 else f"{milliseconds:.2g}"
+    return f"{error:.0e} rad in {time} ms"
+
+
+def _attitude_error(row: dict[str, str]) -> float:
+    error = float(row["attitude_error_rad"] or "nan")
+    return math.inf if math.isnan(error) else error
+
+
+def lesson_table() -> str:
+    """Every lesson with its page."""
+    return _table(("scene", "lesson"), ((_code(one.name), f"[{one.title}]({one.name}.md)") for one in lessons()))
+
+
+def lesson_to_try(name: str) -> str:
+    """A lesson's sentences, as the workbench shows them."""
+    return "\n".join(f"{number}. {sentence}" for number, sentence in enumerate(lesson(name).sentences, 1))
+
+
+def bodies() -> str:
+    """The bundled bodies with sizes and masses, from their meshes."""
+    rows = []
+    for name in body_names():
+        inspected = inspect_mesh(mesh_body(load_mesh(name)))
+        size = " × ".join(f"{100.0 * length:.3g}" for length in inspected.upper - inspected.lower)
+        moments, _ = principal_axes(inspected.chosen.inertia)
+        ratios = " : ".join(f"{moment / moments[0]:.3g}" for moment in moments)
+        rows.append((_code(name), size, f"{1e6 * inspected.volume:,.0f}", ratios))
+    return _table(("name", "size x × y × z [cm]", "volume [cm³]", "principal moments A : B : C"), rows)
+
+
+TABLES = {
+    "topics": topics,
+    "services": services,
+    "parameters": parameters,
+    "integrators": integrators,
+    "masses": masses,
+    "masses_short": lambda: masses(short=True),
+    "bodies": bodies,
+    "lessons": lesson_table,
+    "motions": motions,
+    "motions_short": lambda: motions(short=True),
+}
+
+
+def filled(text: str) -> str:
+    """A document with its tables written anew."""
+
+    def written(found: re.Match) -> str:
+        text = lesson_to_try(found["name"]) if found["kind"] == "lesson" else TABLES[found["name"]]()
+        return f"{found[1]}{text}\n{found[5]}"
+
+    return _MARKED.sub(written, text)
+
+
+def documents() -> list[Path]:
+    """The documents that hold tables."""
+    return [path for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))) if path.is_file()]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write the tables, or check them; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python tools/docs_tables.py", description="Tables of the docs.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 when a document is behind")
+    args = parser.parse_args(argv)
+    behind = 0
+    for path in documents():
+        text = path.read_text(encoding="utf-8")
+        new = filled(text)
+        if new == text:
+            continue
+        behind += 1
+        if args.check:
+            print(f"{path}: behind the code; write it with: python tools/docs_tables.py", file=sys.stderr)
+        else:
+            path.write_text(new, encoding="utf-8")
+    return 1 if args.check and behind else 0
+
+
+def _with_switch(interface) -> str:
+    on_request = f" (with `{interface.on_request}`)" if interface.on_request else ""
+    return interface.meaning + on_request
+
+
+def _parameter_row(parameter: Parameter) -> tuple[str, ...]:
+    meaning = parameter.description.rstrip(".")
+    if parameter.choices:
+        meaning += ": " + ", ".join(_code(choice or '""') for choice in parameter.choices)
+    if parameter.changes != LIVE:
+        meaning += " (at start only)" if parameter.changes == READ_ONLY else " (takes effect at the next reset)"
+    return _code(parameter.name), _default(parameter), parameter.unit, meaning
+
+
+def _default(parameter: Parameter) -> str:
+    value = parameter.default
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return _code(str(value).lower())
+    if isinstance(value, list):
+        return _code("[" + ", ".join(f"{x:g}" for x in value) + "]")
+    if isinstance(value, float):
+        return _code(f"{value:g}")
+    return _code(str(value) or '""')
+
+
+def _code(text: str) -> str:
+    return f"`{text}`"
+
+
+def _first_sentence(path: Path) -> str:
+    text = ast.get_docstring(ast.parse(path.read_text("utf-8"))) or ""
+    paragraph = " ".join(text.split("\n\n")[0].split()).replace("``", "`")
+    return re.split(r"(?<=\.) (?=[A-Z])", paragraph)[0].rstrip(".:")
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    head = tuple(head)
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
