@@ -54,7 +54,7 @@ def run(*command: object, cwd: Path, **environment: str) -> subprocess.Completed
 def installed_bundle(site: Path, cwd: Path, **environment: str) -> list[str]:
     """What an installed copy finds: the paths of a scene and a body, then the names of all scenes."""
     code = (
-        "from rigid_proto_ros import bundled as b; "
+        "from rigid_proto_ros.base import bundled as b; "
         "print(b.scene_path('t_handle')); print(b.body_path('t_handle')); print(*b.scene_names())"
     )
     return run(sys.executable, "-c", code, cwd=cwd, PYTHONPATH=str(site), **environment).stdout.split("\n")[:3]
