@@ -95,7 +95,9 @@ def named_files() -> list[str]:
 
 
 def test_every_named_file_exists() -> None:
-    existing = {path.name for path in [*ROOT.rglob("*.py"), *ROOT.parent.glob("test/**/*.py"), *ROOT.parent.glob("tools/*.py")]}
+    existing = {
+        path.name for path in [*ROOT.rglob("*.py"), *ROOT.parent.glob("test/**/*.py"), *ROOT.parent.glob("tools/*.py")]
+    }
     for pattern in named_files():
         assert fnmatch.filter(existing, pattern), pattern
 

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: MIT
-"""What everything stands on: errors, how kernels are compiled, rotations, exact arithmetic, and where bundled files lie."""
+"""What everything stands on: errors, how kernels are compiled, rotations, exact arithmetic, and where
+bundled files lie.
+"""

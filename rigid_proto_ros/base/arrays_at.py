@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numba import carray, float64, int64, types
-from numba.extending import intrinsic
 
-from .compilation import njit
+from .compilation import intrinsic, njit
 from .kernel_calls import _INTERPRETED
 
 
@@ -25,8 +25,8 @@ def address_of_array(array: np.ndarray) -> int:
 
 def _pointer_to(kind: types.Type) -> Callable:
     @intrinsic
-    def pointer(typing_context, address):
-        def code(context, builder, signature, arguments):
+    def pointer(_typing_context: Any, _address: Any) -> tuple:
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             return builder.inttoptr(arguments[0], context.get_value_type(types.CPointer(kind)))
 
         return types.CPointer(kind)(int64), code
@@ -39,12 +39,12 @@ def _array_at(kind: types.Type, dtype: type) -> Callable:
     pointer = _pointer_to(kind)
 
     @njit(cache=True, error_model="numpy")
-    def compiled(address, shape):
+    def compiled(address: int, shape: tuple[int, ...]) -> np.ndarray:
         return carray(pointer(address), shape)
 
-    def interpreted(address, shape):
+    def interpreted(address: int, shape: tuple[int, ...]) -> np.ndarray:
         bytes_there = (ctypes.c_char * (8 * int(np.prod(shape)))).from_address(int(address))
-        return np.frombuffer(bytes_there, dtype).reshape(shape)
+        return np.frombuffer(memoryview(bytes_there), dtype).reshape(shape)
 
     return interpreted if _INTERPRETED else compiled
 

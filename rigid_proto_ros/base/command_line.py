@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the three executables' command lines have in common: one-line refusals with the nearest known name, examples in --help."""
+"""What the three executables' command lines have in common: one-line refusals with the nearest known
+name, examples in --help.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ def completes(action: argparse.Action, names: Callable[[], Iterable[str]]) -> No
 
 
 class Parser(argparse.ArgumentParser):
-    """Usage errors are one line on stderr and exit status 2. examples: (command, what it does), shown below --help's options."""
+    """Usage errors are one line on stderr and exit status 2. examples: (command, what it does), shown
+    below --help's options.
+    """
 
     def __init__(self, *args: Any, examples: Iterable[tuple[str, str]] = (), **kwargs: Any) -> None:
         super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
@@ -49,8 +53,10 @@ class Parser(argparse.ArgumentParser):
         if lines:
             self.epilog = "\n".join(["examples:", *lines])
 
-    def parse_known_args(self, args=None, namespace=None):
-        """As argparse does it, but what isn't known is refused by the command that it was given to, which knows its options."""
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """As argparse does it, but what isn't known is refused by the command that it was given to, which
+        knows its options.
+        """
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(self._unknown(unknown))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """How kernels are compiled and kept: ``njit`` for this package, and word of it when something is being compiled.
 
-numba keeps compiled code on disk and compiles anew when the file of a function has changed, but not when a file has that this
-one imports from, though its functions are compiled in. After an update the old numbers would go on for ever. So a kernel of
-this package also counts as changed when any file has that its own imports, directly or not.
+numba keeps compiled code on disk and compiles anew when the file of a function has changed, but not when a file has
+that this one imports from, though its functions are compiled in. After an update the old numbers would go on for ever.
+So a kernel of this package also counts as changed when any file has that its own imports, directly or not.
 """
 
 from __future__ import annotations
@@ -14,13 +14,26 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from numba import njit
+import numba
 from numba.core import event
 from numba.core.caching import CacheImpl
+from numba.extending import intrinsic as numba_intrinsic
 
-__all__ = ["njit", "source_stamp", "told_when_compiling"]
+__all__ = ["intrinsic", "njit", "source_stamp", "told_when_compiling"]
+
+if TYPE_CHECKING:
+    _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+    def njit(*signature: Any, **options: Any) -> Callable[[_Function], _Function]:
+        """numba's; to a type checker a compiled function is the function that it was compiled from."""
+
+    def intrinsic(*function: Callable, **options: Any) -> Any:
+        """numba's; what it makes takes the arguments without the first, and those are values and not types."""
+
+else:
+    njit, intrinsic = numba.njit, numba_intrinsic
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 
@@ -68,7 +81,7 @@ class _WithImports:
     """Where numba itself would keep a kernel of this package, with a stamp that knows what the kernel imports."""
 
     @classmethod
-    def from_function(cls, function, file: str):
+    def from_function(cls, function: Callable, file: str) -> Any:
         """A locator as numba wants it; None for what isn't of this package."""
         path = os.path.realpath(file)
         if not path.startswith(PACKAGE + os.sep):
@@ -94,12 +107,12 @@ def told_when_compiling(tell: Callable[[], None]) -> Iterator[None]:
     class Listener(event.Listener):
         told = False
 
-        def on_start(self, _) -> None:
+        def on_start(self, _: event.Event) -> None:
             if not self.told:
                 self.told = True
                 tell()
 
-        def on_end(self, _) -> None:
+        def on_end(self, _: event.Event) -> None:
             pass
 
     with event.install_listener("numba:compile", Listener()):

@@ -3,8 +3,8 @@
 
 
 class InputError(ValueError):
-    """Input that was refused: what was received and what is accepted; or, without ``accepted``, a sentence that says both,
-    which reads better where what was received isn't one value.
+    """Input that was refused: what was received and what is accepted; or, without ``accepted``, a sentence that says
+    both, which reads better where what was received isn't one value.
 
     The command line prints ``str(error)`` as its one line on stderr and exits with status 2; the node keeps the old
     value in force and returns the same text.

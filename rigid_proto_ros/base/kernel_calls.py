@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Compiled functions as numbers, so that one loop can call whichever kernel a segment needs without compiling the others in.
+"""Compiled functions as numbers, so that one loop can call whichever kernel a segment needs without compiling the
+others in.
 
-A kernel's address stands in an array of integers; what is called there is the machine code that numba made of the kernel for
-one fixed signature. Compiling or loading it waits until somebody asks for the address.
+A kernel's address stands in an array of integers; what is called there is the machine code that numba made of the
+kernel for one fixed signature. Compiling or loading it waits until somebody asks for the address.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 from numba import boolean, config, float64, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
-from numba.extending import intrinsic
+
+from .compilation import intrinsic
 
 STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
 """A kernel (y, p, h, n)."""
@@ -57,8 +59,8 @@ def _function_at(taken_as: types.FunctionType) -> Callable:
     """The compiled function that turns an address into a function of this signature."""
 
     @intrinsic
-    def function_at(typing_context, address):
-        def code(context, builder, signature, arguments):
+    def function_at(_typing_context: Any, _address: Any) -> tuple:
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             function = cgutils.create_struct_proxy(taken_as)(context, builder)
             nothing = cgutils.get_null_value(cgutils.voidptr_t)
             function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""How far long work is, on stderr: a bar with the time left on a terminal, a line now and then elsewhere, nothing for short work."""
+"""How far long work is, on stderr: a bar with the time left on a terminal, a line now and then elsewhere,
+nothing for short work.
+"""
 
 from __future__ import annotations
 
 import sys
 import threading
 import time
+from typing import TextIO
 
 BAR = 30
 TERMINAL_FIRST_S, TERMINAL_EVERY_S = 1.0, 0.2
@@ -15,11 +18,11 @@ LINES_EVERY_S = 10.0
 
 class Progress:
     """``with Progress("reading cow.obj") as progress:`` shows what is under way, and how far it is once the work calls
-    ``fraction``. A thread shows it, so that work inside one long call is seen, too. large False shows nothing: small work is
-    done before anybody wonders. unit: of what ``fraction`` counts; without it only the share is shown.
+    ``fraction``. A thread shows it, so that work inside one long call is seen, too. large False shows nothing: small
+    work is done before anybody wonders. unit: of what ``fraction`` counts; without it only the share is shown.
     """
 
-    def __init__(self, what: str, large: bool = True, unit: str = "", stream=None) -> None:
+    def __init__(self, what: str, large: bool = True, unit: str = "", stream: TextIO | None = None) -> None:
         self.what = what
         self.large = large
         self._unit = unit
@@ -64,7 +67,7 @@ class Progress:
             self._thread.start()
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._end.set()
         if self.large:
             self._thread.join()

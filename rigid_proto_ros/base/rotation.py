@@ -7,6 +7,7 @@ Products and the matrix form follow Diebel, "Representing Attitude" (2006), sect
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from .errors import InputError
 
 
 @njit(cache=True)
-def multiply(ax, ay, az, aw, bx, by, bz, bw):
+def multiply(
+    ax: float, ay: float, az: float, aw: float, bx: float, by: float, bz: float, bw: float
+) -> tuple[float, float, float, float]:
     """Hamilton product a ⊗ b: first the rotation b, then a."""
     return (
         aw * bx + ax * bw + ay * bz - az * by,
@@ -26,7 +29,7 @@ def multiply(ax, ay, az, aw, bx, by, bz, bw):
 
 
 @njit(cache=True)
-def rotate(qx, qy, qz, qw, vx, vy, vz):
+def rotate(qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float) -> tuple[float, float, float]:
     """Turn v from body into world axes: v + 2w(u × v) + 2u × (u × v), u the vector part."""
     tx = 2.0 * (qy * vz - qz * vy)
     ty = 2.0 * (qz * vx - qx * vz)
@@ -39,20 +42,22 @@ def rotate(qx, qy, qz, qw, vx, vy, vz):
 
 
 @njit(cache=True)
-def rotate_inverse(qx, qy, qz, qw, vx, vy, vz):
+def rotate_inverse(
+    qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float
+) -> tuple[float, float, float]:
     """Turn v from world into body axes."""
     return rotate(-qx, -qy, -qz, qw, vx, vy, vz)
 
 
 @njit(cache=True, error_model="numpy")
-def normalize(qx, qy, qz, qw):
+def normalize(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, float, float]:
     """Scale to unit length."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     return qx * scale, qy * scale, qz * scale, qw * scale
 
 
 @njit(cache=True)
-def matrix_elements(x, y, z, w):
+def matrix_elements(x: float, y: float, z: float, w: float) -> tuple[float, ...]:
     """The rotation matrix, body to world, of a unit quaternion: nine numbers row by row."""
     return (
         *(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
@@ -62,7 +67,7 @@ def matrix_elements(x, y, z, w):
 
 
 @njit(cache=True)
-def _matrices(q, R):
+def _matrices(q: np.ndarray, R: np.ndarray) -> None:
     for k in range(q.shape[0]):
         elements = matrix_elements(q[k, 0], q[k, 1], q[k, 2], q[k, 3])
         for j in range(9):
@@ -78,7 +83,7 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def quaternion_of_axes(R, q):
+def quaternion_of_axes(R: np.ndarray, q: np.ndarray) -> None:
     """Unit quaternion into q (4,) xyzw, of a proper rotation matrix R (3, 3).
 
     The largest of the four squared components is taken as the divisor (Shepperd 1978), so that no digits cancel.
@@ -109,7 +114,7 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
     return q
 
 
-def unit_quaternion(q, field: str) -> np.ndarray:
+def unit_quaternion(q: Sequence[float], field: str) -> np.ndarray:
     """A given quaternion scaled to unit length; raises InputError when it has none.
 
     One that is unit already, to rounding, is kept bit for bit, so that a dumped state is read back as it was.

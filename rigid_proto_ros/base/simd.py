@@ -1,23 +1,29 @@
 # SPDX-License-Identifier: MIT
 """Vectors of doubles in processor registers, for compiled kernels: several numbers go through each operation at once.
 
-A vector has n components; where L flights go side by side each component has L numbers, one for each flight. Operations are
-those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one: so a flight has the
-same bits whether it goes alone or beside others.
+A vector has n components; where L flights go side by side each component has L numbers, one for each flight. Operations
+are those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one: so a flight
+has the same bits whether it goes alone or beside others.
 """
 
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import models, overload, register_model
+
+from .compilation import intrinsic
 
 _DOUBLE, _NUMBER = ir.DoubleType(), ir.IntType(32)
 _LINE = 64
 """Bytes."""
+Vector = Any
+"""A vector within a kernel, to a type checker."""
 
 
 class Doubles(types.Type):
@@ -30,50 +36,54 @@ class Doubles(types.Type):
 
 @register_model(Doubles)
 class _DoublesModel(models.PrimitiveModel):
-    def __init__(self, manager, kind) -> None:
+    def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.count))
 
 
 def aligned(shape: tuple[int, int]) -> np.ndarray:
-    """Zeros whose first number begins a line of the processor's cache: a vector that crosses two takes twice as long."""
+    """Zeros whose first number begins a line of the processor's cache: a vector that crosses two takes
+    twice as long.
+    """
     spare = _LINE // 8
     whole = np.zeros(shape[0] * shape[1] + spare)
     first = -(whole.ctypes.data // 8) % spare
     return whole[first : first + shape[0] * shape[1]].reshape(shape)
 
 
-def _pointer(context, builder, kind, array, at, count):
+def _pointer(context: Any, builder: ir.IRBuilder, kind: Any, array: Any, at: Any, count: Any) -> Any:
     """Of ``count`` doubles in a contiguous array, from the one numbered ``at`` on."""
     first = builder.gep(context.make_array(kind)(context, builder, array).data, [at])
     return builder.bitcast(first, ir.VectorType(_DOUBLE, count).as_pointer())
 
 
-def _shuffled(builder, a, b, chosen):
+def _shuffled(builder: ir.IRBuilder, a: Any, b: Any, chosen: Any) -> Any:
     """Elements of a, then of b, by their numbers."""
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_NUMBER, len(chosen)), chosen))
 
 
-def _filled(builder, x, count):
+def _filled(builder: ir.IRBuilder, x: Any, count: Any) -> Any:
     unknown = ir.Constant(ir.VectorType(_DOUBLE, count), ir.Undefined)
     return _shuffled(builder, builder.insert_element(unknown, x, ir.Constant(_NUMBER, 0)), unknown, [0] * count)
 
 
 @intrinsic
-def load(typing_context, array, at, like):
+def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> tuple:
     """Numbers of a contiguous array from the number ``at`` on, as many as the vector ``like`` has."""
 
-    def code(context, builder, signature, arguments):
-        return builder.load(_pointer(context, builder, signature.args[0], *arguments[:2], like.count), align=8)
+    def code(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
+        return builder.load(
+            _pointer(context, builder, signature.args[0], arguments[0], arguments[1], like.count), align=8
+        )
 
     return like(array, types.int64, like), code
 
 
 @intrinsic
-def store(typing_context, array, at, vector):
+def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> tuple:
     """Put a vector into a contiguous array from the number ``at`` on."""
 
-    def code(context, builder, signature, arguments):
-        pointer = _pointer(context, builder, signature.args[0], *arguments[:2], vector.count)
+    def code(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
+        pointer = _pointer(context, builder, signature.args[0], arguments[0], arguments[1], vector.count)
         builder.store(arguments[2], pointer, align=8)
         return context.get_dummy_value()
 
@@ -81,70 +91,72 @@ def store(typing_context, array, at, vector):
 
 
 @intrinsic(prefer_literal=True)
-def filled(typing_context, x, count):
+def filled(_typing_context: Any, _x: Any, count: Any) -> tuple:
     """A constant number of times x."""
     kind = Doubles(count.literal_value)
-    return kind(types.float64, count), lambda _, builder, signature, arguments: _filled(
+    return kind(types.float64, count), lambda _, builder, _signature, arguments: _filled(
         builder, arguments[0], kind.count
     )
 
 
 @intrinsic
-def width(typing_context, vector):
+def width(_typing_context: Any, vector: Any) -> tuple:
     """How many doubles a vector has."""
-    return types.int64(vector), lambda context, builder, signature, arguments: ir.Constant(ir.IntType(64), vector.count)
+    return types.int64(vector), lambda _context, _builder, _signature, _arguments: ir.Constant(
+        ir.IntType(64), vector.count
+    )
 
 
 @intrinsic
-def joined(typing_context, a, b, c, d):
+def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
     """The vector of the components a, b, c, d."""
 
-    def code(context, builder, signature, arguments):
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         n = a.count
-        first, second = (_shuffled(builder, *pair, list(range(2 * n))) for pair in (arguments[:2], arguments[2:]))
+        first, second = (_shuffled(builder, a, b, list(range(2 * n))) for a, b in (arguments[:2], arguments[2:]))
         return _shuffled(builder, first, second, list(range(4 * n)))
 
     return Doubles(4 * a.count)(a, b, c, d), code
 
 
 @intrinsic(prefer_literal=True)
-def arranged(typing_context, vector, order):
+def arranged(_typing_context: Any, vector: Any, order: Any) -> tuple:
     """Components of a vector of four in another order; 4 to 7 stand for the negatives of 0 to 3."""
     each = vector.count // 4
     chosen = [part.literal_value * each + k for part in order for k in range(each)]
 
-    def code(context, builder, signature, arguments):
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         return _shuffled(builder, arguments[0], builder.fneg(arguments[0]), chosen)
 
     return vector(vector, order), code
 
 
 @intrinsic(prefer_literal=True)
-def component(typing_context, vector, number):
+def component(_typing_context: Any, vector: Any, number: Any) -> tuple:
     """One component of a vector of four."""
     each = vector.count // 4
     chosen = [number.literal_value * each + k for k in range(each)]
 
-    def code(context, builder, signature, arguments):
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         return _shuffled(builder, arguments[0], arguments[0], chosen)
 
     return Doubles(each)(vector, number), code
 
 
 @intrinsic(prefer_literal=True)
-def number(typing_context, vector, at):
+def number(_typing_context: Any, vector: Any, at: Any) -> tuple:
     """One of a vector's doubles."""
     index = ir.Constant(_NUMBER, at.literal_value)
-    return types.float64(vector, at), lambda _, builder, signature, arguments: builder.extract_element(
+    return types.float64(vector, at), lambda _, builder, _signature, arguments: builder.extract_element(
         arguments[0], index
     )
 
 
 @intrinsic
-def root(typing_context, vector):
+def root(_typing_context: Any, vector: Any) -> tuple:
     """Square roots."""
 
-    def code(context, builder, signature, arguments):
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         kind = arguments[0].type
         function = builder.module.declare_intrinsic(f"llvm.sqrt.v{vector.count}f64", (), ir.FunctionType(kind, [kind]))
         return builder.call(function, arguments)
@@ -152,14 +164,14 @@ def root(typing_context, vector):
     return vector(vector), code
 
 
-def _operation(name: str):
+def _operation(name: str) -> Callable:
     """The instruction of this name on two vectors, or on a vector and a number."""
 
     @intrinsic
-    def of_vectors(typing_context, a, b):
+    def of_vectors(_typing_context: Any, a: Any, b: Any) -> tuple:
         kind = a if isinstance(a, Doubles) else b
 
-        def code(context, builder, signature, arguments):
+        def code(_context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
             sides = [
                 value if isinstance(side, Doubles) else _filled(builder, value, kind.count)
                 for side, value in zip(signature.args, arguments, strict=True)
@@ -168,12 +180,14 @@ def _operation(name: str):
 
         return kind(*(side if isinstance(side, Doubles) else types.float64 for side in (a, b))), code
 
-    def typed(a, b):
+    # numba compares the annotations of both.
+    def implementation(a: Any, b: Any) -> Any:
+        return of_vectors(a, b)
+
+    def typed(a: Any, b: Any) -> Any:
         if isinstance(a, Doubles) and isinstance(b, Doubles) and a.count != b.count:
             return None
-        if isinstance(a, Doubles) or isinstance(b, Doubles):
-            return lambda a, b: of_vectors(a, b)
-        return None
+        return implementation if isinstance(a, Doubles) or isinstance(b, Doubles) else None
 
     return typed
 

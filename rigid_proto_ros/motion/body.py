@@ -7,8 +7,10 @@ Compiled kernels read a body as a row of BODY doubles.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +31,7 @@ BODY = 33
 
 
 @njit(cache=True, error_model="numpy")
-def angular_acceleration(body, x, y, z):
+def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """I⁻¹ τ of a torque x, y, z, in body axes."""
     P, m = AXES, MOMENTS
     a = (body[P] * x + body[P + 3] * y + body[P + 6] * z) / body[m]
@@ -43,14 +45,14 @@ def angular_acceleration(body, x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
-def arm(body, x, y, z):
+def arm(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Mesh coordinates x, y, z to metres from the COM, body axes."""
     s, c = BODY_SCALE, COM
     return x * body[s] - body[c], y * body[s + 1] - body[c + 1], z * body[s + 2] - body[c + 2]
 
 
 @njit(cache=True, error_model="numpy")
-def normal(body, x, y, z):
+def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
     x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
     size = math.sqrt(x * x + y * y + z * z)
@@ -86,22 +88,24 @@ class Body:
         row[BODY_SCALE : BODY_SCALE + 3] = self.scale
         return row
 
-    def point(self, mesh_point) -> np.ndarray:
+    def point(self, mesh_point: Sequence[float]) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""
         x, y, z = mesh_point
         return np.array(arm(self.row, float(x), float(y), float(z)))
 
-    def mesh_point(self, point) -> np.ndarray:
+    def mesh_point(self, point: Sequence[float]) -> np.ndarray:
         """Metres from the COM, body axes, to mesh coordinates (3,)."""
         return (np.asarray(point) + self.center_of_mass) / self.scale
 
-    def angular_acceleration(self, torque_body) -> np.ndarray:
+    def angular_acceleration(self, torque_body: Sequence[float]) -> np.ndarray:
         """I⁻¹ τ (3,), both in body axes."""
         x, y, z = torque_body
         return np.array(angular_acceleration(self.row, float(x), float(y), float(z)))
 
 
-def make_body(mass: float, center_of_mass, inertia, scale=(1.0, 1.0, 1.0)) -> Body:
+def make_body(
+    mass: float, center_of_mass: Sequence[float], inertia: Any, scale: Sequence[float] = (1.0, 1.0, 1.0)
+) -> Body:
     """A body of given mass properties, its tensor diagonalized once."""
     inertia = np.asarray(inertia, dtype=float)
     moments, axes = principal_axes(inertia)

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: MIT
 """The frame of a wrench: which axes its numbers are in, and which point of the body it attacks.
 
-A frame is written ``axes@point[;duration=<s>|;impulse]``; README and docs list the forms. This module only reads the text;
-where the point lies on the body is settled by motion/loads.py.
+A frame is written ``axes@point[;duration=<s>|;impulse]``; README and docs list the forms. This module only reads the
+text; where the point lies on the body is settled by motion/loads.py.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 
 from ..base.errors import CommandRefused
@@ -91,7 +92,7 @@ def parse_frame(
     return Frame(axes, point, duration_s, impulse)
 
 
-def _parse_point(part: str, text: str, contacts, axes_words=()) -> tuple:
+def _parse_point(part: str, text: str, contacts: Container[str], axes_words: Sequence[str] = ()) -> tuple:
     word, *values = part.split("/")
     if part in FIXED_POINTS:
         return (part,)
@@ -146,5 +147,5 @@ def check_contact_name(name: str) -> None:
         )
 
 
-def _names(words) -> str:
+def _names(words: Iterable[str]) -> str:
     return ", ".join(sorted(words))

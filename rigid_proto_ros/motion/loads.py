@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Forces and torques on the body, and their sum as an integrator takes it.
 
-Three kinds of load differ on a turning body: a torque fixed in the world, a world force at a point of the body, and a force
-that turns with the body. Any number of each sums to the same few vectors, because the torque of world forces Fᵢ at body
-points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial vector of M R.
+Three kinds of load differ on a turning body: a torque fixed in the world, a world force at a point of the body, and a
+force that turns with the body. Any number of each sums to the same few vectors, because the torque of world forces Fᵢ
+at body points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial vector of M R.
 
 What a load does is compiled, once: live flights, offline ones and sweeps call the functions here on a load's row.
 """
@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +30,9 @@ from .state import State
 from .surface import Surface
 
 MAX_ACCELERATION = 1e15
-"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it would leave no digits."""
+"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it
+would leave no digits.
+"""
 
 # Where the sums of loads stand in one row of LOADS_SIZE doubles.
 FORCE_WORLD = 0  # (3,) [N]
@@ -57,7 +59,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def arm_of(load, body):
+def arm_of(load: np.ndarray, body: np.ndarray) -> tuple[float, float, float]:
     """From the COM to the point of attack [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
         return 0.0, 0.0, 0.0
@@ -65,7 +67,7 @@ def arm_of(load, body):
 
 
 @njit(cache=True, error_model="numpy")
-def own_force(load, body):
+def own_force(load: np.ndarray, body: np.ndarray) -> tuple[float, float, float]:
     """The force in body axes, of a load whose axes turn with the body: three numbers."""
     f = load[FORCE]
     if load[LOAD_AXES] == NORMAL_AXES:
@@ -75,14 +77,16 @@ def own_force(load, body):
 
 
 @njit(cache=True, error_model="numpy")
-def _bound(x, y, z):
+def _bound(x: float, y: float, z: float) -> float:
     """√3 times the largest component: not below the length, and without its overflow."""
     return 1.7320508075688772 * max(abs(x), abs(y), abs(z))
 
 
 @njit(cache=True, error_model="numpy")
-def magnitudes(load, body):
-    """Bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes: by |r||F| and the smallest moment."""
+def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
+    """Bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes: by |r||F| and the
+    smallest moment.
+    """
     force = _bound(load[FORCE], load[FORCE + 1], load[FORCE + 2])
     torque = _bound(load[TORQUE], load[TORQUE + 1], load[TORQUE + 2])
     if load[HAS_POINT] != 0.0:
@@ -92,7 +96,7 @@ def magnitudes(load, body):
 
 
 @njit(cache=True, error_model="numpy")
-def is_within_magnitude(load, body):
+def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
     """Whether both stay within MAX_ACCELERATION; an overflow to NaN doesn't."""
     linear, angular = magnitudes(load, body)
     return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
@@ -104,14 +108,16 @@ def _within_magnitude() -> Callable:
 
 
 @njit(cache=True, error_model="numpy")
-def is_zero(load):
+def is_zero(load: np.ndarray) -> bool:
     """Whether there is neither force nor torque."""
     return not load[FORCE : FORCE + 6].any()
 
 
 @njit(cache=True, error_model="numpy")
-def share_of(load, body, share):
-    """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r Fᵀ of a world force."""
+def share_of(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
+    """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r
+    Fᵀ of a world force.
+    """
     share[:] = 0.0
     rx, ry, rz = arm_of(load, body)
     tx, ty, tz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
@@ -131,7 +137,7 @@ def share_of(load, body, share):
 
 
 @njit(cache=True, error_model="numpy")
-def apply_impulse(load, body, row):
+def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
     """What an impulse does to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
     hx, hy, hz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
@@ -159,8 +165,8 @@ def apply_impulse(load, body, row):
 class Load(NamedTuple):
     """One command's wrench, its point settled on the body.
 
-    axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,): the
-    inward normal there, for ``normal``. force [N, or N s for an impulse], torque about the point [N m, or N m s].
+    axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,):
+    the inward normal there, for ``normal``. force [N, or N s for an impulse], torque about the point [N m, or N m s].
     """
 
     axes: str
@@ -171,6 +177,7 @@ class Load(NamedTuple):
 
     @property
     def is_zero(self) -> bool:
+        """Whether there is neither force nor torque."""
         return not (any(self.force) or any(self.torque))
 
     @property
@@ -234,7 +241,8 @@ def load_of_bytes(row: bytes) -> Load:
 
 
 class LoadSum:
-    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F world).
+    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F
+    world).
 
     All are parts of ``values`` (LOADS_SIZE,), in the order of ``share_of``.
     """
@@ -249,14 +257,17 @@ class LoadSum:
 
 
 def light_amount(body: Body) -> float:
-    """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh coordinates."""
+    """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh
+    coordinates.
+    """
     largest = max(*map(abs, body.scale.tolist()), *map(abs, body.center_of_mass.tolist()))
     return 0.1 * MAX_ACCELERATION * min(body.mass, float(body.principal_moments[0]) / (1.0 + 3.0 * largest))
 
 
-def light_row(frame: Frame, force, torque, most: float) -> bytes:
-    """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its amount no more
-    than ``most`` (of ``light_amount``). Empty for any other: ``settle`` says what it is, or what is wrong with it.
+def light_row(frame: Frame, force: Sequence[float], torque: Sequence[float], most: float) -> bytes:
+    """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its
+    amount no more than ``most`` (of ``light_amount``). Empty for any other: ``settle`` says what it is, or what is
+    wrong with it.
     """
     word, axes = frame.point[0], frame.axes
     fx, fy, fz = force
@@ -277,7 +288,13 @@ def light_row(frame: Frame, force, torque, most: float) -> bytes:
 
 
 def settle(
-    frame: Frame, force, torque, body: Body, surface: Surface | None, contacts: dict, state: State | None
+    frame: Frame,
+    force: Sequence[float],
+    torque: Sequence[float],
+    body: Body,
+    surface: Surface | None,
+    contacts: dict,
+    state: State | None,
 ) -> Load:
     """Settle a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
 
@@ -303,7 +320,9 @@ def settle(
     return Load(frame.axes, mesh_point, force, torque, mesh_normal)
 
 
-def _mesh_point(frame, body, surface, contacts, state):
+def _mesh_point(
+    frame: Frame, body: Body, surface: Surface | None, contacts: dict, state: State | None
+) -> tuple[float, float, float] | None:
     word, *values = frame.point
     if word == "com":
         return None
@@ -330,10 +349,10 @@ def _mesh_point(frame, body, surface, contacts, state):
     return tuple(float(x) for x in hit[0])
 
 
-def cross(a, b) -> np.ndarray:
+def cross(a: Sequence[float], b: Sequence[float]) -> np.ndarray:
     """a × b of two (3,) arrays."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _transposed_times(R, v) -> np.ndarray:
+def _transposed_times(R: np.ndarray, v: np.ndarray) -> np.ndarray:
     return R[0] * v[0] + R[1] * v[1] + R[2] * v[2]

@@ -7,15 +7,17 @@ diagonal): I₁ ≤ I₂ ≤ I₃, torques τ and arms r. The motion is
     I ω' = τ_b + Rᵀ τ_w + vee(M R) + r × RᵀF − c_ω ω − ω × I ω,    q' = ½ q ⊗ ω,
     x' = v,    v' = g_w + R g_b + F/m − c_v v
 
-with g_w = gravity + F_w/m [m/s², world], g_b = F_b/m [m/s², principal], M = Σ r F_wᵀ (r principal, F world), c_v = c/m and
-F the pull of the string (motion/string.py) on its knot at r.
+with g_w = gravity + F_w/m [m/s², world], g_b = F_b/m [m/s², principal], M = Σ r F_wᵀ (r principal, F world), c_v = c/m
+and F the pull of the string (motion/string.py) on its knot at r.
 
 Translation is split into a reference that has a closed form and what is added to it (motion/variables.py), so that an
-integrator carries no more than it must. Without a string the reference is what g_w and c_v do from the start on, with one
-it is the even motion of the string's free end.
+integrator carries no more than it must. Without a string the reference is what g_w and c_v do from the start on, with
+one it is the even motion of the string's free end.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from ..base.compilation import njit
 from . import body as of_body
@@ -61,7 +63,14 @@ STRING = 13
 
 
 @njit(cache=True, error_model="numpy")
-def begin_body(p, body, gravity, linear_damping, angular_damping, gyroscopic):
+def begin_body(
+    p: np.ndarray,
+    body: np.ndarray,
+    gravity: np.ndarray,
+    linear_damping: float,
+    angular_damping: float,
+    gyroscopic: float,
+) -> None:
     """Fill p with what is the same in every segment of a body (BODY,): all but loads, string and start."""
     p[:] = 0.0
     for k in range(3):
@@ -80,7 +89,7 @@ def begin_body(p, body, gravity, linear_damping, angular_damping, gyroscopic):
 
 
 @njit(cache=True, error_model="numpy")
-def begin_problem(p, loads, row):
+def begin_problem(p: np.ndarray, loads: np.ndarray, row: np.ndarray) -> None:
     """Complete the body's part p with loads and the start, as far as they go without a string."""
     P, mass = PRINCIPAL_AXES, p[MASS]
     turns, pushes = False, False
@@ -107,8 +116,12 @@ def begin_problem(p, loads, row):
 
 
 @njit(cache=True, error_model="numpy")
-def begin_string(p, body, string, begin_ns, end_ns, row, now_ns):
-    """Complete the problem p with a tied string (STRING,) whose free end goes from origin to target between these times."""
+def begin_string(
+    p: np.ndarray, body: np.ndarray, string: np.ndarray, begin_ns: int, end_ns: int, row: np.ndarray, now_ns: int
+) -> None:
+    """Complete the problem p with a tied string (STRING,) whose free end goes from origin to target
+    between these times.
+    """
     seconds, ends = (end_ns - begin_ns) * 1e-9, now_ns >= end_ns
     x, y, z = of_body.arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
     P = PRINCIPAL_AXES

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,18 +25,22 @@ class State:
 
     @property
     def position(self) -> np.ndarray:
+        """COM position x [m, world]."""
         return self.row[0:3]
 
     @property
     def orientation_xyzw(self) -> np.ndarray:
+        """Attitude q, body to world."""
         return self.row[3:7]
 
     @property
     def linear_velocity(self) -> np.ndarray:
+        """COM velocity v [m/s, world]."""
         return self.row[7:10]
 
     @property
     def angular_velocity_body(self) -> np.ndarray:
+        """ω [rad/s, body axes]."""
         return self.row[10:13]
 
     @property
@@ -69,6 +74,11 @@ def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2]
 
 
-def state_row(position, orientation_xyzw, linear_velocity, angular_velocity_body) -> np.ndarray:
+def state_row(
+    position: Sequence[float],
+    orientation_xyzw: Sequence[float],
+    linear_velocity: Sequence[float],
+    angular_velocity_body: Sequence[float],
+) -> np.ndarray:
     """The 13 numbers of a state in their order."""
     return np.concatenate([position, orientation_xyzw, linear_velocity, angular_velocity_body]).astype(float)

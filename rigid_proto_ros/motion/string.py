@@ -5,15 +5,16 @@ With l the distance from free end to knot and x = l − rest length, it pulls th
 
     T = max(0, k x + c l') while x > 0, else 0;        bilateral: T = k x + c l' always.
 
-Rest length 0: F = −k a − c a' with a the vector from free end to knot, regular at distance 0. Otherwise there is no pull
-within 1e-12 rest lengths of the free end, where it has no direction. k and c come from the effective mass that the knot
-shows along the string, 1/m_eff = 1/m + (r × n)ᵀ I⁻¹ (r × n), taken when the string is tied and when the body or the string
-changes, then held: c = 2ζ√(k m_eff), and k = m_eff ω² when a frequency is asked for.
+Rest length 0: F = −k a − c a' with a the vector from free end to knot, regular at distance 0. Otherwise there is no
+pull within 1e-12 rest lengths of the free end, where it has no direction. k and c come from the effective mass that the
+knot shows along the string, 1/m_eff = 1/m + (r × n)ᵀ I⁻¹ (r × n), taken when the string is tied and when the body or
+the string changes, then held: c = 2ζ√(k m_eff), and k = m_eff ω² when a frequency is asked for.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +24,9 @@ from .loads import cross
 from .state import State
 
 RAMP_NS = 100_000_000
-"""The free end takes at most this long to a new target: targets come at 10 Hz and more from a hand that moves evenly."""
+"""The free end takes at most this long to a new target: targets come at 10 Hz and more from a hand that
+moves evenly.
+"""
 
 NO_DIRECTION = 1e-12
 """Rest lengths from the free end within which the string doesn't pull."""
@@ -54,8 +57,8 @@ class StringSettings:
 @dataclass(frozen=True)
 class Tied:
     """A tied string. attach: the knot in mesh coordinates. The free end goes evenly from ``origin`` at begin_ns to
-    ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns: when it lets go,
-    or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as settled.
+    ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns: when it lets
+    go, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as settled.
     """
 
     attach: tuple[float, float, float]
@@ -127,7 +130,7 @@ class Tied:
             return 0.0
         return 0.5 * self.stiffness * stretch * stretch
 
-    def moved(self, target, time_ns: int, timeout_ns: int) -> Tied:
+    def moved(self, target: Sequence[float], time_ns: int, timeout_ns: int) -> Tied:
         """The hand goes to a new target: over the time since the last one, at most RAMP_NS."""
         ramp_ns = min(time_ns - self.last_target_ns, RAMP_NS)
         return replace(
@@ -141,8 +144,9 @@ class Tied:
         )
 
     def settled(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> Tied:
-        """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the effective
-        mass of the body as it is."""
+        """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the
+        effective mass of the body as it is.
+        """
         least = NO_DIRECTION * settings.rest_length
         mass = mass or effective_mass(body, self.arm(body), state, self.span(body, state), least)
         stiffness = mass * settings.frequency**2 if settings.frequency > 0.0 else settings.stiffness
@@ -157,7 +161,15 @@ class Tied:
         )
 
 
-def tie(settings: StringSettings, attach, target, body: Body, state: State, timeout_ns: int, mass: float = 0.0) -> Tied:
+def tie(
+    settings: StringSettings,
+    attach: Sequence[float],
+    target: Sequence[float],
+    body: Body,
+    state: State,
+    timeout_ns: int,
+    mass: float = 0.0,
+) -> Tied:
     """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
 
     timeout_ns 0 never lets go. mass: as ``settled`` takes it.
@@ -182,9 +194,9 @@ def tie(settings: StringSettings, attach, target, body: Body, state: State, time
     return tied.settled(settings, body, state, mass)
 
 
-def effective_mass(body: Body, arm, state: State, span, least: float) -> float:
-    """m_eff [kg] of the point ``arm`` (3,) [m, body] along ``span`` (3,) [world]; over all directions when the span is none: shorter
-    than ``least`` [m] or what rounding of the places that it lies between makes of zero.
+def effective_mass(body: Body, arm: np.ndarray, state: State, span: np.ndarray, least: float) -> float:
+    """m_eff [kg] of the point ``arm`` (3,) [m, body] along ``span`` (3,) [world]; over all directions when the span is
+    none: shorter than ``least`` [m] or what rounding of the places that it lies between makes of zero.
     """
     length = _length(span)
     if length > max(least, ROUNDINGS * 2.0**-52 * (_length(state.position) + _length(np.asarray(arm)))):
@@ -200,7 +212,7 @@ def effective_mass(body: Body, arm, state: State, span, least: float) -> float:
     return 1.0 / (1.0 / body.mass + turning)
 
 
-def _length(vector) -> float:
+def _length(vector: np.ndarray) -> float:
     largest = float(np.abs(vector).max())
     if largest == 0.0:
         return 0.0

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 """The body's surface as commands need it: where a ray meets it, and which way is inward at a point.
 
-Everything here is in mesh coordinates (the file's numbers). One pass over all triangles per query: a poke is rare, and a
-million triangles take some milliseconds.
+Everything here is in mesh coordinates (the file's numbers). One pass over all triangles per query: a poke is rare, and
+a million triangles take some milliseconds.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,7 +29,7 @@ class Surface:
         """Sides of the bounding box (3,)."""
         return self.vertices.max(axis=0) - self.vertices.min(axis=0)
 
-    def ray_hit(self, origin, direction) -> tuple[np.ndarray, int] | None:
+    def ray_hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, int] | None:
         """First point (3,) where the ray meets the surface from either side, and its triangle; None for a miss."""
         direction = np.asarray(direction, dtype=float)
         direction = direction / np.abs(direction).max()
@@ -37,12 +38,12 @@ class Surface:
             return None
         return np.asarray(origin, dtype=float) + distance * direction, int(triangle)
 
-    def nearest_point(self, point) -> np.ndarray:
+    def nearest_point(self, point: Sequence[float]) -> np.ndarray:
         """The point (3,) of the surface nearest to ``point`` (3,)."""
         nearest, _, _ = _nearest(self.vertices, self.triangles, np.asarray(point, dtype=float))
         return np.array(nearest)
 
-    def inward_normal(self, point) -> np.ndarray:
+    def inward_normal(self, point: Sequence[float]) -> np.ndarray:
         """Unit inward normal (3,) of the surface where it is nearest to ``point`` (3,).
 
         On an edge or at a vertex it is the angle-weighted mean of the faces that meet there (Baerentzen & Aanaes 2005),
@@ -56,8 +57,12 @@ class Surface:
 
 
 @njit(cache=True)
-def _first_hit(vertices, triangles, origin, direction):
-    """Distance along ``direction`` and triangle of the first hit: Woop, Benthin and Wald (2013), watertight at edges."""
+def _first_hit(
+    vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray, direction: np.ndarray
+) -> tuple[float, int]:
+    """Distance along ``direction`` and triangle of the first hit: Woop, Benthin and Wald (2013),
+    watertight at edges.
+    """
     kz = 0
     if abs(direction[1]) > abs(direction[kz]):
         kz = 1
@@ -96,7 +101,7 @@ def _first_hit(vertices, triangles, origin, direction):
 
 
 @njit(cache=True)
-def _nearest_on_triangle(p, a, b, c):
+def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[float, float, float]:
     """Nearest point of a triangle, squared distance, and the angle that the triangle spans there: its corner's, π on an
     edge, 2π inside. After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
@@ -147,18 +152,18 @@ def _nearest_on_triangle(p, a, b, c):
 
 
 @njit(cache=True)
-def _cross(a, b):
+def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
-def _angle(a, b):
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
     x, y, z = _cross(a, b)
     return math.atan2(math.sqrt(x * x + y * y + z * z), (a * b).sum())
 
 
 @njit(cache=True)
-def _nearest(vertices, triangles, point):
+def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray) -> tuple[tuple[float, ...], float, int]:
     best = math.inf
     best_point = (0.0, 0.0, 0.0)
     best_triangle = -1
@@ -174,7 +179,9 @@ def _nearest(vertices, triangles, point):
 
 
 @njit(cache=True)
-def _pseudo_normal(vertices, triangles, point, tolerance):
+def _pseudo_normal(
+    vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray, tolerance: float
+) -> tuple[float, float, float]:
     nearest, squared, _ = _nearest(vertices, triangles, point)
     foot = np.array(nearest)
     nx, ny, nz = 0.0, 0.0, 0.0

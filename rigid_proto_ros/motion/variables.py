@@ -2,11 +2,12 @@
 """From a state to an integrator's variables and back.
 
 The variables y of a segment: attitude q xyzw of the principal axes (principal to world), ω in principal axes, the added
-displacement and velocity, and what the hand has worked and the string's damper has heated since the segment's start [J].
+displacement and velocity, and what the hand has worked and the string's damper has heated since the segment's start
+[J].
 
-Position is reference plus added displacement. The reference is closed form and has no error to accumulate: under a constant
-acceleration g and damping c, x = x₀ + t (v₀ φ₁(ct) + t g φ₂(ct)) with φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 + e⁻ᶻ)/z².
-Damping is linear, so what a body-fixed force adds obeys u' = R g_b − c u whatever the reference does.
+Position is reference plus added displacement. The reference is closed form and has no error to accumulate: under a
+constant acceleration g and damping c, x = x₀ + t (v₀ φ₁(ct) + t g φ₂(ct)) with φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 +
+e⁻ᶻ)/z². Damping is linear, so what a body-fixed force adds obeys u' = R g_b − c u whatever the reference does.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ STORED = 22
 
 
 @njit(cache=True, error_model="numpy")
-def damping_functions(z):
+def damping_functions(z: float) -> tuple[float, float]:
     """φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 + e⁻ᶻ)/z², z ≥ 0, to rounding."""
     if z == 0.0:
         return 1.0, 0.5
@@ -55,7 +56,7 @@ def damping_functions(z):
 
 
 @njit(cache=True, error_model="numpy")
-def to_variables(row, p, y):
+def to_variables(row: np.ndarray, p: np.ndarray, y: np.ndarray) -> None:
     """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
     P, Q = PRINCIPAL_AXES, PRINCIPAL_QUATERNION
     y[0], y[1], y[2], y[3] = multiply(row[3], row[4], row[5], row[6], p[Q], p[Q + 1], p[Q + 2], p[Q + 3])
@@ -68,7 +69,7 @@ def to_variables(row, p, y):
 
 
 @njit(cache=True, error_model="numpy")
-def to_row(y, p, elapsed, row):
+def to_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray) -> None:
     """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = PRINCIPAL_AXES, PRINCIPAL_QUATERNION
     c = p[REFERENCE_DAMPING]
@@ -83,7 +84,7 @@ def to_row(y, p, elapsed, row):
 
 
 @njit(cache=True, error_model="numpy")
-def to_good_row(y, p, elapsed, row, limit):
+def to_good_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray, limit: float) -> bool:
     """``to_row``; returns whether no number of the row is beyond ``limit`` or no number at all."""
     to_row(y, p, elapsed, row)
     good = True

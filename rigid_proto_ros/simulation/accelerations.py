@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..motion.loads import LoadSum, cross
@@ -34,7 +36,9 @@ def accelerations(setup: Setup, loads: LoadSum, string: Tied | None, state: Stat
     return setup.gravity + force / body.mass, body.angular_acceleration(torque)
 
 
-def specific_force(setup: Setup, loads: LoadSum, string: Tied | None, state: State, point) -> np.ndarray:
+def specific_force(
+    setup: Setup, loads: LoadSum, string: Tied | None, state: State, point: Sequence[float]
+) -> np.ndarray:
     """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows (3,) [m/s², body axes]:
     Rᵀ(a − g) + ω' × r + ω × (ω × r).
     """
@@ -43,5 +47,5 @@ def specific_force(setup: Setup, loads: LoadSum, string: Tied | None, state: Sta
     return _times(state.rotation.T, linear - setup.gravity) + cross(angular, point) + cross(w, cross(w, point))
 
 
-def _times(matrix, vector) -> np.ndarray:
+def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2]

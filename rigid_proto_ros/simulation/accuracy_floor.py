@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Where rounding, and not the accuracy asked for, decides how far a motion can be trusted: said in one line.
 
-A state is held in doubles, so three things no method can better: a spin known to ε turns into an attitude known to ε|ω|t, a
-position far from the world's origin is known to half a unit in its last place, and a slender body's tensor given in axes other than its
-own holds its smallest moment, and the difference of the others, to ε I₃ alone.
+A state is held in doubles, so three things no method can better: a spin known to ε turns into an attitude known to
+ε|ω|t, a position far from the world's origin is known to half a unit in its last place, and a slender body's tensor
+given in axes other than its own holds its smallest moment, and the difference of the others, to ε I₃ alone.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ from .setup import Setup
 
 _EPSILON = 2.0**-52
 ROUNDINGS = 2.0
-"""ε|ω|t that the exact free step's attitude may err. Measured in 36 flights at 1e3 to 1e6 rad/s: up to 1.1 where the tensor is given in its
-own axes, and up to 1.0 times I₃/I₁ where it isn't."""
+"""ε|ω|t that the exact free step's attitude may err. Measured in 36 flights at 1e3 to 1e6 rad/s: up to 1.1 where the
+tensor is given in its own axes, and up to 1.0 times I₃/I₁ where it isn't.
+"""
 
 
 def accuracy_floor(setup: Setup, state: State, step_floor: bool, exact_step: bool, elapsed: float) -> str:
     """Why the motion is held to less than ``setup.accuracy``; empty when it is held to it.
 
-    step_floor: the stepper's own report. exact_step: the segment is one exact step. elapsed: since the segment's start [s].
+    step_floor: the stepper's own report. exact_step: the segment is one exact step. elapsed: since the segment's start
+    [s].
     """
     accuracy, spin = setup.accuracy, math.sqrt(float((state.angular_velocity_body**2).sum()))
     inertia, moments = setup.body.inertia, setup.body.principal_moments

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -25,8 +26,9 @@ from .quantities import CONTEXT, STATE, begin, which_is_met
 
 @dataclass
 class Variants:
-    """Many variations of one scene. settings (n, SETTINGS), times (n, TIMES), ballast (n, k, 4), constants (CONSTANTS,):
-    simulation/batch_body.py. commands (n, c, 3), loads (n, c, LOAD): simulation/flight.py and motion/loads.py. Those alike in all have one row only.
+    """Many variations of one scene. settings (n, SETTINGS), times (n, TIMES), ballast (n, k, 4), constants
+    (CONSTANTS,): simulation/batch_body.py. commands (n, c, 3), loads (n, c, LOAD): simulation/flight.py and
+    motion/loads.py. Those alike in all have one row only.
     """
 
     settings: np.ndarray
@@ -78,20 +80,35 @@ _VARIANTS = (
     boolean,  # the method is chosen by what a segment holds
     int64[:, :, ::1],  # methods by degree
 )
+_Flights = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool, np.ndarray]
+"""Arrays of a block, in the order of _VARIANTS."""
 _LOOKS = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
 _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1])
 
 
 @njit(cache=True, error_model="numpy")
-def _fly(
-    settings, times, body, gyroscopic, chooses, methods, commands, loads, looks_ns, stops, context, tables, states
-):
+def _fly(  # noqa: PLR0913
+    settings: np.ndarray,
+    times: np.ndarray,
+    body: np.ndarray,
+    gyroscopic: float,
+    chooses: bool,
+    methods: np.ndarray,
+    commands: np.ndarray,
+    loads: np.ndarray,
+    looks_ns: np.ndarray,
+    stops: np.ndarray,
+    context: np.ndarray,
+    tables: tuple,
+    states: np.ndarray,
+) -> tuple[int, int]:
     """One flight: fills states (m, STATE) at looks_ns (m,) ascending, each before what acts at that very time.
 
-    settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods: motion/integrators/stepping.py. commands
-    (c, 3) in the order in which they act and loads (c, LOAD). stops (k, 3): the flight ends at the first look at which one
-    holds. context: simulation/quantities.py, filled here. tables: arrays of simulation/flight.py with room for all. Returns how many looks
-    it reached, and which stop held or −1; 0 looks: the simulation must say what is wrong.
+    settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods:
+    motion/integrators/stepping.py. commands (c, 3) in the order in which they act and loads (c, LOAD). stops (k, 3):
+    the flight ends at the first look at which one holds. context: simulation/quantities.py, filled here. tables: arrays
+    of simulation/flight.py with room for all. Returns how many looks it reached, and which stop held or −1; 0 looks:
+    the simulation must say what is wrong.
     """
     f, n, rows_ns, rows, events = tables
     count = commands.shape[0]
@@ -129,23 +146,23 @@ def _fly(
 
 
 @njit(cache=True, error_model="numpy")
-def _one(
-    i,
-    settings,
-    ballast,
-    constants,
-    loads,
-    times,
-    commands,
-    chooses,
-    methods,
-    body,
-    looks_ns,
-    stops,
-    context,
-    tables,
-    states,
-):
+def _one(  # noqa: PLR0913
+    i: int,
+    settings: np.ndarray,
+    ballast: np.ndarray,
+    constants: np.ndarray,
+    loads: np.ndarray,
+    times: np.ndarray,
+    commands: np.ndarray,
+    chooses: bool,
+    methods: np.ndarray,
+    body: np.ndarray,
+    looks_ns: np.ndarray,
+    stops: np.ndarray,
+    context: np.ndarray,
+    tables: tuple,
+    states: np.ndarray,
+) -> tuple[int, int]:
     """Body and flight of variation i; as ``_fly`` returns."""
     own = settings[i if settings.shape[0] > 1 else 0]
     if not make_body_row(own, ballast[i if ballast.shape[0] > 1 else 0], constants, body):
@@ -161,7 +178,7 @@ def _one(
 
 
 @njit(cache=True, error_model="numpy")
-def _tables(variants, references):
+def _tables(variants: tuple, references: tuple) -> tuple[np.ndarray, ...]:
     """Arrays of simulation/flight.py with room for any of these flights."""
     commands, room = 0, 0
     for side in (variants, references):
@@ -174,7 +191,18 @@ def _tables(variants, references):
     return f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
 
 
-def _fly_block(first, last, variants, references, has_references, looks_ns, watched, stops, measures, results):
+def _fly_block(  # noqa: PLR0913
+    first: int,
+    last: int,
+    variants: _Flights,
+    references: _Flights,
+    has_references: bool,
+    looks_ns: np.ndarray,
+    watched: np.ndarray,
+    stops: np.ndarray,
+    measures: np.ndarray,
+    results: tuple,
+) -> None:
     """Variations first to last − 1."""
     status, end_ns, stop, measured, finals = results
     body, context, tables = np.zeros(BODY), np.zeros(CONTEXT), _tables(variants, references)
@@ -198,7 +226,7 @@ def _fly_block(first, last, variants, references, has_references, looks_ns, watc
 
 
 @cache
-def _compiled():
+def _compiled() -> Callable:
     """``_fly_block`` compiled, or loaded from the cache: when it is first wanted and not at import."""
     block = (types.Tuple(_VARIANTS), types.Tuple(_VARIANTS), boolean, *_LOOKS, types.Tuple(_RESULTS))
     signature = types.void(int64, int64, *block)

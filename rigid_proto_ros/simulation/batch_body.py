@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Bodies of many variations, compiled: from a row of settings and a mesh's ten numbers to what a flight needs.
 
-Every operation stands in the order in which ``scenario``, ``mass/properties.py`` and ``motion/body.py`` do it, so the bits are
-theirs. Whatever is out of the ordinary (a bound, a doubtful tensor) makes no body: the caller then goes their way, which
-knows what to say about it.
+Every operation stands in the order in which ``scenario``, ``mass/properties.py`` and ``motion/body.py`` do it, so the
+bits are theirs. Whatever is out of the ordinary (a bound, a doubtful tensor) makes no body: the caller then goes their
+way, which knows what to say about it.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ EXPLICIT, ORDINARY, SHELL = 0, 1, 2
 
 
 @njit(cache=True, error_model="numpy")
-def divided(product, factor):
+def divided(product: float, factor: float) -> float:
     """x with x · factor == product where there is one, else the nearest; as ``scenario`` does it."""
     x = product / factor
     if x * factor == product:
@@ -83,12 +83,12 @@ def divided(product, factor):
 
 
 @njit(cache=True, error_model="numpy")
-def _plainly_good(a, b, c):
+def _plainly_good(a: float, b: float, c: float) -> bool:
     return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
 
 
 @njit(cache=True, error_model="numpy")
-def _points_with_mass(ballast):
+def _points_with_mass(ballast: np.ndarray) -> tuple[np.ndarray, bool]:
     """The rows of ``ballast`` (k, 4) with a mass; and whether all are in order."""
     count = 0
     for k in range(ballast.shape[0]):
@@ -109,7 +109,7 @@ def _points_with_mass(ballast):
 
 
 @njit(cache=True, error_model="numpy")
-def _explicit(s, settings, points):
+def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, bool]:
     """Mass, COM (3,), inertia (3, 3) and whether the given numbers are plainly good."""
     given = settings[GIVEN_TENSOR : GIVEN_TENSOR + 6]
     inertia = np.empty((3, 3))
@@ -134,7 +134,9 @@ def _explicit(s, settings, points):
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(s, settings, points, constants):
+def _spread(
+    s: np.ndarray, settings: np.ndarray, points: np.ndarray, constants: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray, bool]:
     """The same for a model whose mass is spread over a mesh."""
     measure = constants[SOLID_MEASURE]
     mass = settings[BODY_MASS]
@@ -161,8 +163,10 @@ def _spread(s, settings, points, constants):
 
 
 @njit(cache=True, error_model="numpy")
-def make_body_row(settings, ballast, constants, body):
-    """Fill ``body`` (BODY,) from settings (SETTINGS,), ballast (k, 4) and a mesh's constants; False when it takes a look."""
+def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarray, body: np.ndarray) -> bool:
+    """Fill ``body`` (BODY,) from settings (SETTINGS,), ballast (k, 4) and a mesh's constants; False when
+    it takes a look.
+    """
     s = settings[SCALE : SCALE + 3].copy()
     for k in range(3):
         if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
@@ -194,7 +198,7 @@ def make_body_row(settings, ballast, constants, body):
 
 
 @njit(cache=True, error_model="numpy")
-def initial_row(settings, row):
+def initial_row(settings: np.ndarray, row: np.ndarray) -> bool:
     """The state row (13,) at time 0; False when the orientation has no length."""
     q = settings[ORIENTATION : ORIENTATION + 4]
     largest = max(abs(q[0]), abs(q[1]), abs(q[2]), abs(q[3]))

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Commands as the simulation takes them, and the order in which equal times act.
 
-Commands that act at the same nanosecond act in the order of ``order_key``, never by arrival: four publishers in any order give
-one trajectory.
+Commands that act at the same nanosecond act in the order of ``order_key``, never by arrival: four publishers in any
+order give one trajectory.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -50,10 +50,12 @@ class WrenchCommand:
 
     @property
     def rank(self) -> Rank:
+        """Its place among commands of one time."""
         return Rank.WRENCH if self.held else Rank.POKE
 
     @property
     def kind(self) -> str:
+        """As events name it."""
         return "wrench" if self.held else "poke"
 
     @property
@@ -89,6 +91,7 @@ class ClearWrench:
 
     @property
     def content(self) -> dict:
+        """What an event line holds of it."""
         return {}
 
 
@@ -110,8 +113,8 @@ class Change:
 class TieString:
     """Where on the body the string is, or will be, tied.
 
-    axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto the
-    surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent; message: serialized bytes.
+    axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto
+    the surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent; message: serialized bytes.
     """
 
     axes: str
@@ -129,6 +132,7 @@ class TieString:
 
     @property
     def content(self) -> dict:
+        """What an event line holds of it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
 
 
@@ -148,6 +152,7 @@ class MoveString:
 
     @property
     def content(self) -> dict:
+        """What an event line holds of it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.target)}
 
 
@@ -161,10 +166,11 @@ class ReleaseString:
 
     @property
     def content(self) -> dict:
+        """What an event line holds of it."""
         return {}
 
 
-def _check_point(field: str, point) -> None:
+def _check_point(field: str, point: Sequence[float]) -> None:
     if not all(math.isfinite(x) for x in point):
         raise CommandRefused("nonfinite", field, list(point), "three finite numbers")
     if not all(abs(x) <= FARTHEST for x in point):
@@ -172,8 +178,8 @@ def _check_point(field: str, point) -> None:
 
 
 def order_key(command: Command, listed: Listed | None) -> tuple:
-    """What decides among commands of one instant: first the entries of lists, each list's in its own order and lists by their
-    bytes; then single messages by rank and bytes.
+    """What decides among commands of one instant: first the entries of lists, each list's in its own order and lists by
+    their bytes; then single messages by rank and bytes.
     """
     return (0, *listed) if listed is not None else (1, command.rank, command.message)
 
@@ -186,8 +192,8 @@ Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | Releas
 
 @dataclass(slots=True)
 class Pending:
-    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row as the flight's
-    tables hold them, the row empty until its load is settled, and the setup under which that was.
+    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row as the
+    flight's tables hold them, the row empty until its load is settled, and the setup under which that was.
     """
 
     time_ns: int

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The log of everything that happened to the body, each line chained to those before it.
 
-A line is a JSON object with ``time_ns`` (simulated), ``kind``, ``content`` and ``sha256``: the hash of all lines since the
-start or the last reset, this one included, each taken without its own ``sha256`` and ended by a newline.
+A line is a JSON object with ``time_ns`` (simulated), ``kind``, ``content`` and ``sha256``: the hash of all lines since
+the start or the last reset, this one included, each taken without its own ``sha256`` and ended by a newline.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ class Noted(NamedTuple):
 
 
 class EventLog:
-    """Counts and chains the events of one run. Those that nobody reads as they happen are chained when somebody asks."""
+    """Counts and chains the events of one run. Those that nobody reads as they happen are chained when
+    somebody asks.
+    """
 
     def __init__(self) -> None:
         self.reset()

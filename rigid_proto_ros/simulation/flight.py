@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """A flight under commands, compiled: what live simulations, offline ones, replays and sweeps advance with.
 
-Everything a flight is stands in a few arrays: doubles ``f``, integers ``n``, and tables whose rows are loads (``times``,
-``loads``). Commands cut it into segments; ``fly`` goes from event to event until the time asked for, and writes down what began
-and ended on the way. What it can't do (a ray, a change of parameters, a string tied or let go) is brought about between two
-calls, by the same functions.
+Everything a flight is stands in a few arrays: doubles ``f``, integers ``n``, and tables whose rows are loads
+(``times``, ``loads``). Commands cut it into segments; ``fly`` goes from event to event until the time asked for, and
+writes down what began and ended on the way. What it can't do (a ray, a change of parameters, a string tied or let go)
+is brought about between two calls, by the same functions.
 """
 
 from __future__ import annotations
@@ -82,8 +82,10 @@ REACHED, FAILED, NO_KERNEL = range(3)
 
 
 @njit(cache=True, error_model="numpy")
-def begin_segment(f, n, loads, methods):
-    """Begin a segment at START: what acts is summed afresh, in the order in which it began, and the method is chosen."""
+def begin_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
+    """Begin a segment at START: what acts is summed afresh, in the order in which it began, and the
+    method is chosen.
+    """
     sums, p = f[SUMS : SUMS + LOADS_SIZE], f[PROBLEM : PROBLEM + pr.SIZE]
     start, body = f[START : START + 13], f[BODY : BODY + of_body.BODY]
     sums[:] = 0.0
@@ -99,7 +101,7 @@ def begin_segment(f, n, loads, methods):
 
 
 @njit(cache=True, error_model="numpy")
-def begin_variables(f, n, methods):
+def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
     """Begin a segment whose PROBLEM is made."""
     p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
     y[:] = 0.0
@@ -121,7 +123,7 @@ def begin_variables(f, n, methods):
 
 
 @njit(cache=True, error_model="numpy")
-def commit_until(f, n, methods, until_ns):
+def commit_until(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; whether all were good."""
     if until_ns == n[COMMITTED_NS]:
         return True
@@ -141,8 +143,10 @@ def commit_until(f, n, methods, until_ns):
 
 
 @njit(cache=True, error_model="numpy")
-def sample(f, n, methods, at_ns, row):
-    """The state at ``at_ns``, less than one step after the last committed one, into row; commits nothing. Whether it is good."""
+def sample(f: np.ndarray, n: np.ndarray, methods: np.ndarray, at_ns: int, row: np.ndarray) -> bool:
+    """The state at ``at_ns``, less than one step after the last committed one, into row; commits nothing.
+    Whether it is good.
+    """
     if at_ns == n[START_NS]:
         row[:] = f[START : START + 13]
         return True
@@ -162,7 +166,7 @@ def sample(f, n, methods, at_ns, row):
 
 
 @njit(cache=True, error_model="numpy")
-def carry(f, n, methods, until_ns):
+def carry(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> int:
     """Go on in the segment to ``until_ns``: full steps, then one shorter step that ends exactly there, on a copy."""
     n[WAITS] = 0 if is_provided(methods, n[METHOD]) else 1
     if n[WAITS] != 0:
@@ -175,7 +179,7 @@ def carry(f, n, methods, until_ns):
 
 
 @njit(cache=True, error_model="numpy")
-def last_good_state(f, n, row):
+def last_good_state(f: np.ndarray, n: np.ndarray, row: np.ndarray) -> None:
     """The state at the last committed step, into row."""
     if n[COMMITTED_NS] == n[START_NS]:
         row[:] = f[START : START + 13]
@@ -185,7 +189,7 @@ def last_good_state(f, n, row):
 
 
 @njit(cache=True, error_model="numpy")
-def stop_in_last_good_state(f, n):
+def stop_in_last_good_state(f: np.ndarray, n: np.ndarray) -> None:
     """Stay where the last good step ended, or at NOW_NS where that is later."""
     row = f[TRIAL : TRIAL + 13]
     last_good_state(f, n, row)
@@ -198,13 +202,13 @@ def stop_in_last_good_state(f, n):
 
 
 @njit(cache=True, error_model="numpy")
-def steps_of_segment(f, n):
+def steps_of_segment(f: np.ndarray, n: np.ndarray) -> int:
     """Steps committed in the segment."""
     return n[TAKEN] + int(f[CONTROL + ctl.STEPS])
 
 
 @njit(cache=True, error_model="numpy")
-def evaluations_of_segment(f, n, methods):
+def evaluations_of_segment(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> int:
     """Evaluations of the equations of motion in them."""
     # The step that ends a segment takes the series of the one that waits.
     counted = f[CONTROL + ctl.EVALUATIONS] + f[CONTROL + ctl.PENDING]
@@ -212,7 +216,7 @@ def evaluations_of_segment(f, n, methods):
 
 
 @njit(cache=True, error_model="numpy")
-def finish_segment(f, n, loads, methods):
+def finish_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
     """Keep the segment's counts and begin another from the state at NOW_NS."""
     n[STEPS_BEFORE] += steps_of_segment(f, n)
     n[EVALUATIONS_BEFORE] += evaluations_of_segment(f, n, methods)
@@ -224,7 +228,7 @@ def finish_segment(f, n, loads, methods):
 
 
 @njit(cache=True, error_model="numpy")
-def cut_segment(f, n, loads, methods):
+def cut_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
     """End the segment at NOW_NS by the step that looking there took, and begin another."""
     if n[NOW_NS] > n[COMMITTED_NS] and methods[n[METHOD], SLEEPS] == 0:
         n[TAKEN] += 1
@@ -232,14 +236,14 @@ def cut_segment(f, n, loads, methods):
 
 
 @njit(cache=True, error_model="numpy")
-def _write(n, events, what, load_id, row):
+def _write(n: np.ndarray, events: np.ndarray, what: int, load_id: int, row: int) -> None:
     event = events[n[EVENTS]]
     event[EVENT_NS], event[WHAT], event[LOAD_ID], event[ROW_OF] = n[NOW_NS], what, load_id, row
     n[EVENTS] += 1
 
 
 @njit(cache=True, error_model="numpy")
-def _keep(n, times, loads, kept, row):
+def _keep(n: np.ndarray, times: np.ndarray, loads: np.ndarray, kept: int, row: int) -> None:
     """Let the load of a row that acts go on as row ``kept``, which is not after it."""
     if kept != row:
         times[kept], loads[kept] = times[row], loads[row]
@@ -248,7 +252,7 @@ def _keep(n, times, loads, kept, row):
 
 
 @njit(cache=True, error_model="numpy")
-def end_due(n, times, loads, events):
+def end_due(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray) -> bool:
     """End what ends at NOW_NS or should have before; whether anything did."""
     kept = 0
     for row in range(n[ACTING]):
@@ -265,7 +269,7 @@ def end_due(n, times, loads, events):
 
 
 @njit(cache=True, error_model="numpy")
-def end_held(n, times, loads, events):
+def end_held(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray) -> None:
     """End the held wrench, if there is one."""
     held = n[HELD]
     if held == NOBODY:
@@ -278,7 +282,7 @@ def end_held(n, times, loads, events):
 
 
 @njit(cache=True, error_model="numpy")
-def end_all(n, times, events):
+def end_all(n: np.ndarray, times: np.ndarray, events: np.ndarray) -> None:
     """End everything that acts."""
     for row in range(n[ACTING]):
         _write(n, events, ENDED, times[row, ID], row)
@@ -286,13 +290,13 @@ def end_all(n, times, events):
 
 
 @njit(cache=True, error_model="numpy")
-def end_of_held(n, begin_ns):
+def end_of_held(n: np.ndarray, begin_ns: int) -> int:
     """When a held wrench that began at ``begin_ns`` ends."""
     return max(begin_ns + n[TIMEOUT_NS], n[NOW_NS]) if n[TIMEOUT_NS] != 0 else NEVER
 
 
 @njit(cache=True, error_model="numpy")
-def _begin(n, times, loads, body, row, end_ns):
+def _begin(n: np.ndarray, times: np.ndarray, loads: np.ndarray, body: np.ndarray, row: int, end_ns: int) -> None:
     """Let the load of a row act from NOW_NS until ``end_ns``, as the last of those that act."""
     to = n[ACTING]
     if to != row:
@@ -303,7 +307,7 @@ def _begin(n, times, loads, body, row, end_ns):
 
 
 @njit(cache=True, error_model="numpy")
-def apply(f, n, times, loads, events, row):
+def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray, row: int) -> None:
     """Bring about the command of a row at NOW_NS. Rows before it may be taken by loads that act."""
     kind, body = times[row, KIND], f[BODY : BODY + of_body.BODY]
     if kind != CLEAR:
@@ -329,7 +333,7 @@ def apply(f, n, times, loads, events, row):
 
 
 @njit(cache=True, error_model="numpy")
-def next_event_ns(n, times):
+def next_event_ns(n: np.ndarray, times: np.ndarray) -> int:
     """When the next load ends or command acts, or the string's free end arrives."""
     event_ns = times[n[DUE], AT_NS] if n[DUE] < n[DUE_END] else NEVER
     for row in range(n[ACTING]):
@@ -340,7 +344,15 @@ def next_event_ns(n, times):
 
 
 @njit(cache=True, error_model="numpy")
-def fly(f, n, times, loads, events, methods, until_ns):
+def fly(
+    f: np.ndarray,
+    n: np.ndarray,
+    times: np.ndarray,
+    loads: np.ndarray,
+    events: np.ndarray,
+    methods: np.ndarray,
+    until_ns: int,
+) -> int:
     """Carry the body to ``until_ns``; ROW is its state there, before what acts at that very time.
 
     Returns REACHED, FAILED (ROW is the last good state), or NO_KERNEL: then call again with a kernel for METHOD.

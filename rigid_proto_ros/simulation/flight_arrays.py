@@ -55,8 +55,10 @@ class Acting(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _arrays(at):
-    """f, n, times, loads, events and methods of the flight whose integers are at this address, with its doubles behind them."""
+def _arrays(at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """f, n, times, loads, events and methods of the flight whose integers are at this address, with its
+    doubles behind them.
+    """
     n = integers_at(at, (INTEGERS,))
     f = doubles_at(at + 8 * INTEGERS, (n[DOUBLES],))
     rows, times_at = n[TABLE_ROWS], n[TABLES_AT]
@@ -68,20 +70,20 @@ def _arrays(at):
 
 
 @njit(cache=True, error_model="numpy")
-def _fly_at(at, until_ns):
+def _fly_at(at: int, until_ns: int) -> int:
     f, n, times, loads, events, methods = _arrays(at)
     return fl.fly(f, n, times, loads, events, methods, until_ns)
 
 
 @njit(cache=True, error_model="numpy")
-def _begin_at(at):
+def _begin_at(at: int) -> int:
     f, n, _, loads, _, methods = _arrays(at)
     fl.begin_segment(f, n, loads, methods)
     return 0
 
 
 @njit(cache=True, error_model="numpy")
-def _share_anew(at):
+def _share_anew(at: int) -> int:
     """What the loads that act add to the sums, for another body."""
     f, n, times, loads, _, _ = _arrays(at)
     for row in range(n[fl.ACTING]):
@@ -97,7 +99,9 @@ def _entries() -> tuple[Callable, Callable]:
 
 
 class FlightArrays:
-    """f, n, times, loads, events: as simulation/flight.py lays them out. What isn't a matter of arrays is the simulation's."""
+    """f, n, times, loads, events: as simulation/flight.py lays them out. What isn't a matter of arrays is
+    the simulation's.
+    """
 
     def __init__(self, setup: Setup) -> None:
         self.first_due = 0
@@ -213,6 +217,7 @@ class FlightArrays:
 
     @property
     def time_ns(self) -> int:
+        """Simulated time [ns]."""
         return self._head[fl.NOW_NS]
 
     @property

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What is measured of one flight, from its states at the looks: one number a measure.
 
-A measure is a row (MEASURE,): a kind, a quantity or difference by number (simulation/quantities.py), and what the kind needs.
+A measure is a row (MEASURE,): a kind, a quantity or difference by number (simulation/quantities.py), and what the kind
+needs.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ from .quantities import START, difference, met, quantity
 
 FINAL, SAMPLE, LARGEST, SMALLEST, FIRST, FLIPS, DIFFERENCE, LARGEST_DIFFERENCE = range(8)
 KIND, CODE, A, B, C, D, MEASURE = range(7)
-"""SAMPLE: A the look's number. FIRST: A sign and B limit of the condition. FLIPS: A margin, B to D the axis in the body, all
-zero for that of the first spin."""
+"""SAMPLE: A the look's number. FIRST: A sign and B limit of the condition. FLIPS: A margin, B to D the axis in the
+body, all zero for that of the first spin.
+"""
 
 
 @njit(cache=True, error_model="numpy")
-def count_flips(measure, states, watched, reached, context):
+def count_flips(
+    measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray
+) -> float:
     """How often a body axis turns over: its cosine to where it pointed at the start passes −margin, then margin, ...
 
     The margin keeps an axis that lies across from being counted at each tremble. NaN without an axis.
@@ -47,7 +51,7 @@ def count_flips(measure, states, watched, reached, context):
 
 
 @njit(cache=True, error_model="numpy")
-def _extreme(measure, states, watched, reached, context):
+def _extreme(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray) -> float:
     sign = 1.0 if measure[KIND] == LARGEST else -1.0
     found = -math.inf
     for k in range(reached):
@@ -57,7 +61,16 @@ def _extreme(measure, states, watched, reached, context):
 
 
 @njit(cache=True, error_model="numpy")
-def measure_flight(measures, states, others, looks_ns, watched, reached, context, out):
+def measure_flight(
+    measures: np.ndarray,
+    states: np.ndarray,
+    others: np.ndarray,
+    looks_ns: np.ndarray,
+    watched: np.ndarray,
+    reached: int,
+    context: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """Fill out (k,) with the measures (k, MEASURE) of a flight that reached so many of its looks.
 
     states, others (m, STATE): at looks_ns (m,), of the flight and of its reference. watched (m,): which looks count for

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 class FlightStart(NamedTuple):
-    """f (ROOM,) and n (INTEGERS,) as simulation/flight.py lays them out; methods: the integrator's table, and its address. room: of
-    the largest workspace [doubles].
+    """f (ROOM,) and n (INTEGERS,) as simulation/flight.py lays them out; methods: the integrator's table, and its
+    address. room: of the largest workspace [doubles].
     """
 
     f: np.ndarray

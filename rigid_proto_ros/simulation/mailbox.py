@@ -88,7 +88,9 @@ class Mailbox:
             self._filling.marks.append(Mark(self._filling.count, time_ns, _wall_ns(), kind, content))
 
     def hurry(self) -> None:
-        """Hand the next row over at once, with all that comes before it: how a run begins should be on disk from its start."""
+        """Hand the next row over at once, with all that comes before it: how a run begins should be on
+        disk from its start.
+        """
         with self._lock:
             self._hurried = True
 

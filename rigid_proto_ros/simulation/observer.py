@@ -8,9 +8,16 @@ The producer calls these methods from the thread that steps the body; an impleme
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..motion.body import Body
+    from ..motion.loads import Load
+    from .commands import WrenchCommand
 
 STATE_FIELDS = (
     *("position.x", "position.y", "position.z"),
@@ -99,7 +106,7 @@ class Observer:
     def load_ended(self, time_ns: int, load_id: int) -> None:
         """The load with this id acts no longer."""
 
-    def applied(self, time_ns: int, command, load, body) -> None:
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
         """A wrench or poke took effect: the WrenchCommand, the Load that it settled to, and the Body it acts on."""
 
     def string_changed(self, time_ns: int, string: ShownString | None) -> None:
@@ -162,8 +169,8 @@ def _methods_of(kind: type) -> frozenset[str]:
     return frozenset(name for name in _METHODS if getattr(kind, name) is not getattr(Observer, name))
 
 
-def _in_turn(methods):
-    def call(*arguments) -> None:
+def _in_turn(methods: Sequence[Callable[..., None]]) -> Callable[..., None]:
+    def call(*arguments: Any) -> None:
         for method in methods:
             method(*arguments)
 

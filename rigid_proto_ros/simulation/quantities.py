@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Scalars of a flight by name: what measures take maxima of, what conditions compare, what samples hold.
 
-A quantity is a function of the state now and of the start, which is kept as a row (CONTEXT,): mass, tensor, gravity, the
-state row at time 0, its energy and angular momentum.
+A quantity is a function of the state now and of the start, which is kept as a row (CONTEXT,): mass, tensor, gravity,
+the state row at time 0, its energy and angular momentum.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import rotate
@@ -37,8 +39,9 @@ QUANTITIES = {
     "angular_momentum": "N m s",
     "momentum_turned": "rad",
 }
-"""Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are from the
-start, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the drift of L's direction."""
+"""Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are from
+the start, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the drift of L's direction.
+"""
 
 NAMES = tuple(QUANTITIES)
 SPEED, SPIN, DISTANCE, TURNED, KINETIC, POTENTIAL, ENERGY, DRIFT, MOMENTUM, MOMENTUM_TURNED = range(13, 23)
@@ -53,7 +56,7 @@ MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10,
 
 
 @njit(cache=True, error_model="numpy")
-def _momentum(row, context):
+def _momentum(row: np.ndarray, context: np.ndarray) -> tuple[float, float, float]:
     """R I ω (3,)."""
     I, x, y, z = INERTIA, row[10], row[11], row[12]
     return rotate(
@@ -68,7 +71,7 @@ def _momentum(row, context):
 
 
 @njit(cache=True, error_model="numpy")
-def _kinetic(row, context):
+def _kinetic(row: np.ndarray, context: np.ndarray) -> float:
     I, x, y, z = INERTIA, row[10], row[11], row[12]
     turning = (
         x * (context[I] * x + context[I + 1] * y + context[I + 2] * z)
@@ -79,19 +82,19 @@ def _kinetic(row, context):
 
 
 @njit(cache=True, error_model="numpy")
-def _potential(row, context):
+def _potential(row: np.ndarray, context: np.ndarray) -> float:
     g = GRAVITY
     fallen = context[g] * row[0] + context[g + 1] * row[1] + context[g + 2] * row[2]
     return row[13] - context[MASS] * fallen
 
 
 @njit(cache=True, error_model="numpy")
-def _length(x, y, z):
+def _length(x: float, y: float, z: float) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
 @njit(cache=True, error_model="numpy")
-def attitude_angle(a, b):
+def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
@@ -101,7 +104,7 @@ def attitude_angle(a, b):
 
 
 @njit(cache=True, error_model="numpy")
-def begin(mass, inertia, gravity, row, context):
+def begin(mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray, context: np.ndarray) -> None:
     """Fill the context (CONTEXT,) from mass, tensor (9,), gravity (3,) and the state row (STATE,) at time 0."""
     context[MASS] = mass
     context[INERTIA : INERTIA + 9] = inertia
@@ -113,7 +116,7 @@ def begin(mass, inertia, gravity, row, context):
 
 
 @njit(cache=True, error_model="numpy")
-def quantity(code, row, context):
+def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     """The quantity NAMES[code] of a state row (STATE,)."""
     if code < 13:
         return row[code]
@@ -144,7 +147,7 @@ def quantity(code, row, context):
 
 
 @njit(cache=True, error_model="numpy")
-def difference(code, a, b):
+def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
     """The difference number ``code`` of DIFFERENCES between two state rows."""
     if code == 0:
         return attitude_angle(a[3:7], b[3:7])
@@ -161,13 +164,13 @@ STOP_CODE, STOP_SIGN, STOP_LIMIT = range(3)
 
 
 @njit(cache=True, error_model="numpy")
-def met(condition, row, context):
+def met(condition: np.ndarray, row: np.ndarray, context: np.ndarray) -> bool:
     """Whether a condition (code, sign, limit) holds: the quantity is above the limit (sign 1) or below it (−1)."""
     return condition[STOP_SIGN] * (quantity(int(condition[STOP_CODE]), row, context) - condition[STOP_LIMIT]) > 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def which_is_met(conditions, row, context):
+def which_is_met(conditions: np.ndarray, row: np.ndarray, context: np.ndarray) -> int:
     """Number of the first condition (k, 3) that holds, or −1."""
     for k in range(conditions.shape[0]):
         if met(conditions[k], row, context):

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""What can be read off a running simulation: energies, momentum, what an accelerometer shows, what the motion has cost."""
+"""What can be read off a running simulation: energies, momentum, what an accelerometer shows, what the
+motion has cost.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,7 +22,9 @@ from .string_control import StringControl
 FEWEST_EVALUATIONS = 20_000
 """In a segment, from which on they are judged: the first tiny steps of a transient say nothing about those after it."""
 MOST_EVALUATIONS_A_SECOND = {True: 2e5, False: 5e6}
-"""That the clock leaves time for: for methods that choose their steps, a series or an implicit stage each, and for fixed steps."""
+"""That the clock leaves time for: for methods that choose their steps, a series or an implicit stage
+each, and for fixed steps.
+"""
 
 
 class Readings:
@@ -61,7 +67,9 @@ class Readings:
 
     @property
     def accuracy_floor(self) -> str:
-        """Why rounding, and not the accuracy asked for, limits the present segment; empty when it doesn't or nothing adapts to it."""
+        """Why rounding, and not the accuracy asked for, limits the present segment; empty when it doesn't
+        or nothing adapts to it.
+        """
         setup, segment = self.setup, self._segment
         if setup.integrator.name not in ("auto", "free_body"):
             return ""
@@ -70,7 +78,9 @@ class Readings:
 
     @property
     def too_coarse(self) -> str:
-        """Why the fixed step says nothing here, |ω|h or ω_s h being beyond the integrator's limit; empty when it does."""
+        """Why the fixed step says nothing here, |ω|h or ω_s h being beyond the integrator's limit; empty
+        when it does.
+        """
         setup = self.setup
         limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
         spin = float((self.state.angular_velocity_body**2).sum()) ** 0.5 * h
@@ -149,7 +159,7 @@ class Readings:
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
         return still and not self._arrays.acts and self.string is None and not self.has_pending
 
-    def specific_force(self, point) -> np.ndarray:
+    def specific_force(self, point: Sequence[float]) -> np.ndarray:
         """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]."""
         return specific_force(self.setup, self._load_sum(), self.string, self.state, point)
 

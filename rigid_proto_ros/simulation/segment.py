@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A stretch of simulated time in which all commands are constant, as it can be read off a flight.
 
-Steps count from the segment's start, and only full ones are committed; looking at a time in between takes one shorter step
-on a copy. So the motion depends on where segments begin and end, that is on commands and their times, and not on how often or
-in which portions it was asked for.
+Steps count from the segment's start, and only full ones are committed; looking at a time in between takes one shorter
+step on a copy. So the motion depends on where segments begin and end, that is on commands and their times, and not on
+how often or in which portions it was asked for.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from .flight_arrays import FlightArrays
 class Segment:
     """The segment that a flight is in: views of its arrays, so what is read is what is so now.
 
-    number: of segments begun before it and itself. start: state at the segment's start. committed_ns: where the last full step
-    ended. problem: motion/problem.py. variables: motion/variables.py, at the last committed step.
+    number: of segments begun before it and itself. start: state at the segment's start. committed_ns: where the last
+    full step ended. problem: motion/problem.py. variables: motion/variables.py, at the last committed step.
     """
 
     def __init__(self, arrays: FlightArrays) -> None:
@@ -31,22 +31,27 @@ class Segment:
 
     @property
     def number(self) -> int:
+        """Which segment of the flight it is, counted from 1."""
         return int(self._arrays.n[fl.SEGMENTS])
 
     @property
     def start(self) -> State:
+        """State at the segment's start."""
         return State(int(self._arrays.n[fl.START_NS]), self._arrays.f[fl.START : fl.START + 13].copy())
 
     @property
     def committed_ns(self) -> int:
+        """Where its last full step ended [ns]."""
         return int(self._arrays.n[fl.COMMITTED_NS])
 
     @property
     def problem(self) -> np.ndarray:
+        """Its problem (motion/problem.py)."""
         return self._arrays.f[fl.PROBLEM : fl.PROBLEM + SIZE]
 
     @property
     def variables(self) -> np.ndarray:
+        """Its variables at the last committed step (motion/variables.py)."""
         return self._arrays.f[fl.VARIABLES : fl.VARIABLES + STORED]
 
     @property

@@ -20,10 +20,11 @@ from .flight_start import FlightStart, flight_start
 
 @dataclass(frozen=True)
 class Setup:
-    """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the mesh.
-    contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m s].
-    wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps. initial (13,): the state row at time 0.
-    initial_string_mass [kg]: what settles a string that is tied at time 0; 0 for the effective mass of the body as it is then.
+    """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the
+    mesh. contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m
+    s]. wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps.
+    initial (13,): the state row at time 0. initial_string_mass [kg]: what settles a string that is tied at time 0; 0
+    for the effective mass of the body as it is then.
     """
 
     body: Body
@@ -48,7 +49,9 @@ class Setup:
 
     @property
     def length(self) -> float:
-        """Half the diagonal of the mesh's box as scaled, by which displacement errors are measured; 1 m without a mesh."""
+        """Half the diagonal of the mesh's box as scaled, by which displacement errors are measured; 1 m
+        without a mesh.
+        """
         if self.surface is None:
             return 1.0
         diagonal = self.surface.extent * self.body.scale

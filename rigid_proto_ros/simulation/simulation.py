@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The simulation: commands in, motion out.
 
-Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/segment.py); within one, commands are
-constant and an integrator carries the body. ``advance`` is the whole story.
+Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/segment.py); within one,
+commands are constant and an integrator carries the body. ``advance`` is the whole story.
 """
 
 from __future__ import annotations
@@ -48,15 +48,16 @@ from .string_control import StringControl
 class Follower(Protocol):
     """Whoever takes the same commands at the same times, such as a ghost."""
 
-    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None: ...
+    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
+        """Take a command that acts at ``when_ns``."""
 
 
 class Simulation(Readings):
     """One body under commands; what can be read off it is in readings.py.
 
     Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
-    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place of the
-    command that acts at this moment in its list, if it is an entry of one.
+    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place
+    of the command that acts at this moment in its list, if it is an entry of one.
     """
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
@@ -113,9 +114,9 @@ class Simulation(Readings):
     ) -> int:
         """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
 
-        listed: its place, when it is an entry of a list. judged: what ``judge`` gave, and the setup that it was given, where
-        that isn't the present one: a change before it in its list may allow what the present setup doesn't. Raises
-        CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
+        listed: its place, when it is an entry of a list. judged: what ``judge`` gave, and the setup that it was given,
+        where that isn't the present one: a change before it in its list may allow what the present setup doesn't.
+        Raises CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
         row, setup = (judge(command, self.setup), self.setup) if judged is None else judged
@@ -358,8 +359,8 @@ class Simulation(Readings):
 
 
 def judge(command: Command, setup: Setup) -> bytes:
-    """The row of a command's load, empty for what is none or can't be settled before it acts; raises CommandRefused for what a
-    body of this setup can't take.
+    """The row of a command's load, empty for what is none or can't be settled before it acts; raises CommandRefused for
+    what a body of this setup can't take.
     """
     if isinstance(command, WrenchCommand):
         row = _settled(command, setup, None)

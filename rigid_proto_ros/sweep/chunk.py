@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Some rows of a study, flown and measured: what a thread here and a worker of a cluster both do.
 
-Rows that differ in numbers alone go through the compiled batch together. Those that it can't carry or judge are flown one by
-one by the simulation, with the same bits.
+Rows that differ in numbers alone go through the compiled batch together. Those that it can't carry or judge are flown
+one by one by the simulation, with the same bits.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ GROUPS_KEPT = 512
 
 @dataclass
 class Chunk:
-    """Columns of a table by name: float64, int64, or objects (text or None). simulated: how many rows the simulation flew."""
+    """Columns of a table by name: float64, int64, or objects (text or None). simulated: how many rows the
+    simulation flew.
+    """
 
     columns: dict[str, np.ndarray]
     simulated: int
@@ -98,8 +100,8 @@ class _ByFingerprint:
     def __hash__(self) -> int:
         return hash(self.study.fingerprint)
 
-    def __eq__(self, other) -> bool:
-        return self.study.fingerprint == other.study.fingerprint
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByFingerprint) and self.study.fingerprint == other.study.fingerprint
 
 
 def _fly_group(study: Study, key: tuple, members: np.ndarray, columns: list[np.ndarray], flown: _Rows) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Chunks of a study on a Dask cluster: its scheduler deals them out, and gives those of a lost worker to another.
 
-Workers need this package and the study's meshes under the same names. A chunk is a function of study and rows alone, so it
-doesn't matter who computes it, or how often.
+Workers need this package and the study's meshes under the same names. A chunk is a function of study and rows alone, so
+it doesn't matter who computes it, or how often.
 """
 
 from __future__ import annotations

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from ..base.errors import InputError
 from ..base.nearest_name import one_of
 
 
-def number(value, field: str, lower: float = -1e100, upper: float = 1e100, above: float = -math.inf) -> float:
+def number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100, above: float = -math.inf) -> float:
     """A finite number within bounds; text that reads as one counts, as YAML has 1e-3 for text."""
     if isinstance(value, str):
         try:
@@ -27,7 +28,7 @@ def number(value, field: str, lower: float = -1e100, upper: float = 1e100, above
     return float(value)
 
 
-def whole(value, field: str, lower: int, upper: int) -> int:
+def whole(value: Any, field: str, lower: int, upper: int) -> int:
     """A whole number within bounds."""
     x = number(value, field, lower, upper)
     if x != int(x):
@@ -35,7 +36,7 @@ def whole(value, field: str, lower: int, upper: int) -> int:
     return int(value) if isinstance(value, int) else int(x)
 
 
-def mapping(value, field: str, known: Iterable[str], required: Iterable[str] = ()) -> dict:
+def mapping(value: Any, field: str, known: Iterable[str], required: Iterable[str] = ()) -> dict:
     """A mapping with known keys alone; an unknown one is answered with the nearest."""
     known = tuple(known)
     if not isinstance(value, Mapping):
@@ -56,7 +57,7 @@ def known_name(name: str, field: str, known: Iterable[str]) -> str:
     return name
 
 
-def names(value, field: str, known: Iterable[str]) -> list[str]:
+def names(value: Any, field: str, known: Iterable[str]) -> list[str]:
     """One known name or a list of them."""
     listed = [value] if isinstance(value, str) else value
     if not isinstance(listed, list) or not listed or not all(isinstance(name, str) for name in listed):

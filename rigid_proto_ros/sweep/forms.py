@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +30,8 @@ _RANDOM = {
     "random_vertex": VERTEX,
 }
 _ACCEPTED = (
-    "grid: [...] or {from, to, count, log}, list: [...], uniform: [a, b], log_uniform: [a, b], normal: [mean, deviation], "
-    "direction: length, random_rotation, or random_vertex"
+    "grid: [...] or {from, to, count, log}, list: [...], uniform: [a, b], log_uniform: [a, b], "
+    "normal: [mean, deviation], direction: length, random_rotation, or random_vertex"
 )
 
 
@@ -95,7 +97,7 @@ class Draw:
         return out[:, 0] if out.shape[1] == 1 else out
 
 
-def read_form(spec, field: str) -> Points | Draw:
+def read_form(spec: Any, field: str) -> Points | Draw:
     """The form that a study gives; raises InputError naming the field."""
     if spec in ("random_rotation", "random_vertex"):
         spec = {spec: None}
@@ -123,7 +125,7 @@ def read_form(spec, field: str) -> Points | Draw:
     return Draw(shape, a, b)
 
 
-def _points(value, field: str) -> list:
+def _points(value: Any, field: str) -> list:
     if isinstance(value, dict):
         spec = mapping(value, field, ("from", "to", "count", "log"), ("from", "to", "count"))
         a, b = number(spec["from"], f"{field}, from"), number(spec["to"], f"{field}, to")
@@ -142,14 +144,14 @@ def _points(value, field: str) -> list:
     return value
 
 
-def _check_finite(item, field: str) -> None:
+def _check_finite(item: Any, field: str) -> None:
     """Numbers anywhere in a value are finite."""
     for x in _leaves(item):
         if isinstance(x, float) and not math.isfinite(x):
             raise InputError(field, item, "finite numbers")
 
 
-def _leaves(item):
+def _leaves(item: Any) -> Iterator[Any]:
     inner = item.values() if isinstance(item, dict) else item if isinstance(item, list) else None
     if inner is None:
         yield item
@@ -158,10 +160,10 @@ def _leaves(item):
             yield from _leaves(x)
 
 
-def _is_number(value) -> bool:
+def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def as_text(value) -> str:
+def as_text(value: Any) -> str:
     """A value that isn't a number as a table holds it."""
     return value if isinstance(value, str) else json.dumps(value)

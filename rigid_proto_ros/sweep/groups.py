@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -49,8 +50,8 @@ def is_structural(vary: Vary) -> bool:
 
 
 class Group:
-    """Rows that share all but numbers. Making one raises InputError or NotCarried: then the simulation flies its rows, and says
-    what is wrong.
+    """Rows that share all but numbers. Making one raises InputError or NotCarried: then the simulation flies its rows,
+    and says what is wrong.
     """
 
     def __init__(self, study: Study, structural: Mapping[str, object], reference: Mapping[str, object] | None) -> None:
@@ -91,7 +92,9 @@ class Group:
             commands, loads = self._expanded(columns, count, good)
         return Variants(settings, times, ballast, self.constants, self.integrator, commands, loads), good
 
-    def _numbers(self, columns, count: int, good: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _numbers(
+        self, columns: Sequence[np.ndarray], count: int, good: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         settings = np.broadcast_to(self.settings, (count, bb.SETTINGS)).copy()
         times = np.broadcast_to(self.times, (count, bb.TIMES)).copy()
         names = ballast_names(self.values)
@@ -120,7 +123,7 @@ class Group:
                 times[:, bb.DEGREE] = [degree_for(a) if a > 0.0 else 1 for a in column.tolist()]
         return settings, times, ballast
 
-    def _expanded(self, columns, count: int, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _expanded(self, columns: Sequence[np.ndarray], count: int, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Commands and loads of scripts that are expanded row by row, padded with commands that never come."""
         scripts: list[Script | None] = []
         for i in range(count):
@@ -142,7 +145,7 @@ class Group:
                 loads[i, : len(script.loads)] = script.loads
         return commands, loads
 
-    def _script(self, chosen: list):
+    def _script(self, chosen: list) -> Any:
         script = copy.deepcopy(self.study.script)
         entries = script_entries(script)
         for vary, value in zip(self.study.vary, chosen, strict=True):

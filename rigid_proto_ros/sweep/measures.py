@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +22,8 @@ _STATE_PARTS = {"position": 3, "orientation": 4, "velocity": 3, "spin": 3}
 
 @dataclass(frozen=True)
 class Measures:
-    """columns: names of what is measured, rows of ``table`` (k, MEASURE). stops: names and (k, 3) conditions. looks_ns (m,)
-    ascending, the last at the end; watched (m,): which of them count for extremes, firsts, flips and stops.
+    """columns: names of what is measured, rows of ``table`` (k, MEASURE). stops: names and (k, 3) conditions. looks_ns
+    (m,) ascending, the last at the end; watched (m,): which of them count for extremes, firsts, flips and stops.
     """
 
     columns: tuple[str, ...]
@@ -38,7 +39,7 @@ class Measures:
         return bool(np.isin(self.table[:, fm.KIND], (fm.DIFFERENCE, fm.LARGEST_DIFFERENCE)).any())
 
 
-def read_measures(spec, stop, watch: float, duration_s: float, field: str) -> Measures:
+def read_measures(spec: Any, stop: Any, watch: float, duration_s: float, field: str) -> Measures:
     """What ``measure`` and ``stop`` of a study say; raises InputError naming the field."""
     spec = mapping({"final": ["position", "orientation", "velocity", "spin"]} if spec is None else spec, field, KINDS)
     duration_ns = nanoseconds(duration_s)
@@ -71,7 +72,7 @@ def _looks(watch: float, samples_ns: list[int], duration_ns: int) -> tuple[np.nd
     return np.array(looks, np.int64), np.array([look in watched_ns for look in looks])
 
 
-def _sample_times(spec, duration_s: float, field: str) -> list[int]:
+def _sample_times(spec: Any, duration_s: float, field: str) -> list[int]:
     spec = mapping(spec, field, ("at", "of"), ("at", "of"))
     times = spec["at"] if isinstance(spec["at"], list) else [spec["at"]]
     if not times:
@@ -88,7 +89,7 @@ def _expanded(quantities: list[str]) -> list[str]:
     return found
 
 
-def _rows(kind: str, value, field: str, looks_ns: np.ndarray) -> list[tuple[str, list[float]]]:
+def _rows(kind: str, value: Any, field: str, looks_ns: np.ndarray) -> list[tuple[str, list[float]]]:
     known = (*_STATE_PARTS, *(name for name in NAMES if name not in _STATE_PARTS))
     if kind == "final":
         chosen = _expanded(names(value, field, known))
@@ -110,7 +111,7 @@ def _rows(kind: str, value, field: str, looks_ns: np.ndarray) -> list[tuple[str,
     return [(f"{kind}.{name}", [code, listed.index(name)]) for name in names(value, field, listed)]
 
 
-def _flips(value, field: str) -> list[float]:
+def _flips(value: Any, field: str) -> list[float]:
     spec = mapping({} if value is True else value, field, ("axis", "margin"))
     axis = spec.get("axis", "spin")
     margin = number(spec.get("margin", 0.5), f"{field}, margin", 0.0, 0.99)
@@ -121,7 +122,7 @@ def _flips(value, field: str) -> list[float]:
     return [margin, *(number(x, f"{field}, axis") for x in axis)]
 
 
-def _conditions(spec, field: str) -> dict[str, list[float]]:
+def _conditions(spec: Any, field: str) -> dict[str, list[float]]:
     """Conditions by name: quantity number, sign and limit."""
     if not isinstance(spec, dict):
         raise InputError(field, spec, "names with {quantity, above} or {quantity, below}")

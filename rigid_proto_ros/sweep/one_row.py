@@ -24,7 +24,9 @@ def row_summary(study: Study, row: int) -> dict:
 
 
 def write_scene(study: Study, row: Variation, file: Path, time: float | None) -> dict:
-    """Write the row as a scene, its script beside it as NAME_script.yaml; returns the files and the command that flies them."""
+    """Write the row as a scene, its script beside it as NAME_script.yaml; returns the files and the
+    command that flies them.
+    """
     duration = time if time is not None else study.duration_ns / 1e9
     scenario, commands = row.scenario, row.commands
     output_file("--as-scene", file)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Numbers of a poke script that vary from row to row, written straight into the arrays of the compiled batch.
 
-That is possible where a varied field changes numbers alone: when a poke acts, how long, how hard. Anything else (where it
-acts, repeats, held wrenches) is expanded row by row.
+That is possible where a varied field changes numbers alone: when a poke acts, how long, how hard. Anything else (where
+it acts, repeats, held wrenches) is expanded row by row.
 """
 
 from __future__ import annotations
@@ -44,13 +44,17 @@ def _fits(target: Target, entry: dict, whole_timing: bool) -> bool:
 
 @dataclass(frozen=True)
 class Overlay:
-    """A script whose numbers vary. base: with the study's own numbers, in the order in which the script lists ``commands``."""
+    """A script whose numbers vary. base: with the study's own numbers, in the order in which the script
+    lists ``commands``.
+    """
 
     base: Script
     commands: list[ScriptCommand]
 
     def rows(self, targets: list[tuple[Target, np.ndarray]], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Commands (n, c, 3) and loads (n, c, LOAD) of ``count`` rows in order of time, and which rows have good values (n,)."""
+        """Commands (n, c, 3) and loads (n, c, LOAD) of ``count`` rows in order of time, and which rows
+        have good values (n,).
+        """
         size = len(self.commands)
         commands = np.broadcast_to(self.base.commands, (count, size, 3)).copy()
         loads = np.broadcast_to(self.base.loads, (count, size, ld.LOAD)).copy()
@@ -85,7 +89,9 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
 
 
 def make_overlay(study: Study, settler: Settler, wrench_timeout: float) -> tuple[Overlay, list]:
-    """The script ready for varied numbers, and the loads that the integrator has to carry; raises NotCarried, InputError."""
+    """The script ready for varied numbers, and the loads that the integrator has to carry; raises
+    NotCarried, InputError.
+    """
     commands = expand_script(study.script, "script", wrench_timeout)
     commands.sort(key=lambda command: command.entry)
     script, loads = script_of(commands, settler)

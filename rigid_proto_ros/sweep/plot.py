@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""A picture of a table: points, or a map where x and y make a full grid. matplotlib draws, and is loaded only for it."""
+"""A picture of a table: points, or a map where x and y make a full grid. matplotlib draws, and is loaded
+only for it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +32,9 @@ class Plot:
 
 
 def read_plot(text: str, table: Path) -> Plot:
-    """``x=column,y=column[,color=column][,log=x+y+color][,to=FILE.svg]``; without ``to`` the picture stands beside the table."""
+    """``x=column,y=column[,color=column][,log=x+y+color][,to=FILE.svg]``; without ``to`` the picture
+    stands beside the table.
+    """
     given = {}
     for part in text.split(","):
         key, equals, value = part.partition("=")
@@ -62,7 +67,7 @@ def _axes(plot: Plot) -> list[tuple[str, str]]:
     return [(axis, name) for axis, name in (("x", plot.x), ("y", plot.y), ("color", plot.color)) if name]
 
 
-def _figure():
+def _figure() -> Any:
     try:
         from matplotlib import rcParams
         from matplotlib.figure import Figure
@@ -110,7 +115,7 @@ def plot_table(plot: Plot, table: Path) -> None:
         raise InputError("--plot", str(plot.file), f"a file that can be written ({error.strerror})") from None
 
 
-def _groups_of_points(axes, x: np.ndarray, y: np.ndarray, color: np.ndarray | None) -> None:
+def _groups_of_points(axes: Any, x: np.ndarray, y: np.ndarray, color: np.ndarray | None) -> None:
     """Points in one colour, or one for each text."""
     by_text = color is not None and x.dtype == object and np.array_equal(x, color)
     if x.dtype == object:
@@ -126,7 +131,7 @@ def _groups_of_points(axes, x: np.ndarray, y: np.ndarray, color: np.ndarray | No
         axes.legend(fontsize="small")
 
 
-def _spread(axes, text: np.ndarray) -> np.ndarray:
+def _spread(axes: Any, text: np.ndarray) -> np.ndarray:
     """Places (n,) for text: a column for each, its points beside one another in their order."""
     names = sorted({str(t) for t in text})
     number = np.array([names.index(str(t)) for t in text])
@@ -143,7 +148,7 @@ def _drawable(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return tuple(v.astype(str) if v.dtype == object else v for v in (x, y))
 
 
-def _as_grid(x: np.ndarray, y: np.ndarray, color: np.ndarray):
+def _as_grid(x: np.ndarray, y: np.ndarray, color: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Axes and colours (ny, nx) when every pair of x and y is there once; None otherwise."""
     if x.dtype == object or y.dtype == object:
         return None

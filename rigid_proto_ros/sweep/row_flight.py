@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""One row flown by ``Simulation``: what a row is by definition, and how those go that the compiled batch can't carry."""
+"""One row flown by ``Simulation``: what a row is by definition, and how those go that the compiled batch
+can't carry.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ from .variation import Variation
 
 @dataclass
 class RowResult:
-    """failure: why there is no result, or empty. stop: number of the condition that ended the flight, or −1. end_ns: when it
-    ended. measured (k,), state (13,) at the end.
+    """failure: why there is no result, or empty. stop: number of the condition that ended the flight, or −1. end_ns:
+    when it ended. measured (k,), state (13,) at the end.
     """
 
     failure: str

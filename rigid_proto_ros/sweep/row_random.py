@@ -2,8 +2,8 @@
 """Random numbers that belong to a row: the same whatever rows are drawn beside it, in which order and by whom.
 
 Row i's numbers are those of ``numpy.random.default_rng(SeedSequence(seed, spawn_key=(i,))).random(n)``, computed here
-without an object per row: SeedSequence is O'Neill's seed_seq (pcg-random.org, "Developing a seed_seq alternative", 2015) and
-the generator PCG64 XSL RR (O'Neill, HMC-CS-2014-0905), both as NumPy's documentation fixes them.
+without an object per row: SeedSequence is O'Neill's seed_seq (pcg-random.org, "Developing a seed_seq alternative",
+2015) and the generator PCG64 XSL RR (O'Neill, HMC-CS-2014-0905), both as NumPy's documentation fixes them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MULTIPLIER_HIGH, _MULTIPLIER_LOW = uint64(2549297995355413924), uint64(48655405
 
 
 @njit(cache=True)
-def _hashed(value, constant, multiplier):
+def _hashed(value: int, constant: int, multiplier: int) -> tuple[int, int]:
     """The value hashed, and the next constant."""
     value = uint32(value ^ constant)
     constant = uint32(constant * multiplier)
@@ -30,13 +30,13 @@ def _hashed(value, constant, multiplier):
 
 
 @njit(cache=True)
-def _mixed(x, y):
+def _mixed(x: int, y: int) -> int:
     result = uint32(uint32(x * uint32(0xCA01F9DD)) - uint32(y * uint32(0x4973F715)))
     return uint32(result ^ (result >> uint32(16)))
 
 
 @njit(cache=True)
-def _fill_pool(entropy, pool):
+def _fill_pool(entropy: np.ndarray, pool: np.ndarray) -> None:
     constant = uint32(0x43B0D7E5)
     for i in range(_POOL):
         pool[i], constant = _hashed(entropy[i] if i < entropy.size else uint32(0), constant, uint32(0x931E8875))
@@ -52,7 +52,7 @@ def _fill_pool(entropy, pool):
 
 
 @njit(cache=True)
-def _words(pool, out):
+def _words(pool: np.ndarray, out: np.ndarray) -> None:
     """Four 64-bit words of the sequence."""
     constant = uint32(0x8B51F9DD)
     for k in range(8):
@@ -61,7 +61,7 @@ def _words(pool, out):
 
 
 @njit(cache=True)
-def _times(a, b):
+def _times(a: int, b: int) -> tuple[int, int]:
     """Upper and lower half of the 128-bit product of two 64-bit words."""
     a0, a1, b0, b1 = a & _LOW, a >> uint64(32), b & _LOW, b >> uint64(32)
     low, middle, other = a0 * b0, a0 * b1, a1 * b0
@@ -71,7 +71,7 @@ def _times(a, b):
 
 
 @njit(cache=True)
-def _stepped(high, low, added_high, added_low):
+def _stepped(high: int, low: int, added_high: int, added_low: int) -> tuple[int, int]:
     """state · multiplier + increment, modulo 2¹²⁸."""
     product_high, product_low = _times(low, _MULTIPLIER_LOW)
     product_high += low * _MULTIPLIER_HIGH + high * _MULTIPLIER_LOW
@@ -80,8 +80,10 @@ def _stepped(high, low, added_high, added_low):
 
 
 @njit(cache=True)
-def row_uniforms(seed_words, rows, out):
-    """Fill out (n, k) with the first k uniform numbers in [0, 1) of each row (n,). seed_words: the seed in 32-bit words."""
+def row_uniforms(seed_words: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (n, k) with the first k uniform numbers in [0, 1) of each row (n,). seed_words: the seed
+    in 32-bit words.
+    """
     length = max(seed_words.size, _POOL)
     words, pool = np.zeros(4, np.uint64), np.zeros(_POOL, np.uint32)
     for i in range(rows.size):
@@ -114,7 +116,7 @@ def seed_words(seed: int) -> np.ndarray:
 
 
 @njit(cache=True)
-def _scrambled(value, key):
+def _scrambled(value: int, key: int) -> int:
     """A 64-bit hash of value and key (SplitMix64's finalizer; Steele, Lea and Flood, OOPSLA 2014)."""
     x = value + key * uint64(0x9E3779B97F4A7C15)
     x = (x ^ (x >> uint64(30))) * uint64(0xBF58476D1CE4E5B9)
@@ -123,9 +125,9 @@ def _scrambled(value, key):
 
 
 @njit(cache=True)
-def permuted(index, size, key):
-    """Where a random permutation of 0 … size − 1 takes ``index``: six Feistel rounds on the next power of four, repeated until
-    within size (Black and Rogaway, CT-RSA 2002, "cycle walking"). No table, so any size costs the same.
+def permuted(index: int, size: int, key: int) -> int:
+    """Where a random permutation of 0 … size − 1 takes ``index``: six Feistel rounds on the next power of four,
+    repeated until within size (Black and Rogaway, CT-RSA 2002, "cycle walking"). No table, so any size costs the same.
     """
     half = uint64(1)
     while (uint64(1) << (uint64(2) * half)) < uint64(size):
@@ -142,7 +144,7 @@ def permuted(index, size, key):
 
 
 @njit(cache=True)
-def latin_uniforms(keys, rows, size, jitter, out):
+def latin_uniforms(keys: np.ndarray, rows: np.ndarray, size: int, jitter: np.ndarray, out: np.ndarray) -> None:
     """Fill out (n, k) with rows (n,) of a Latin hypercube of ``size`` points: (π_k(i) + u)/size. keys (k,) choose the
     permutations; jitter (n, k) are the u.
     """
@@ -152,7 +154,7 @@ def latin_uniforms(keys, rows, size, jitter, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _tail(r, c, d):
+def _tail(r: float, c: tuple[float, ...], d: tuple[float, ...]) -> float:
     return (((((((c[7] * r + c[6]) * r + c[5]) * r + c[4]) * r + c[3]) * r + c[2]) * r + c[1]) * r + c[0]) / (
         ((((((d[6] * r + d[5]) * r + d[4]) * r + d[3]) * r + d[2]) * r + d[1]) * r + d[0]) * r + 1.0
     )
@@ -207,11 +209,19 @@ _E = (
     2.71155556874348757815e-5,
     2.01033439929228813265e-7,
 )
-_F = (5.99832206555887937690e-1, 1.36929880922735805310e-1, 1.48753612908506148525e-2, 7.86869131145613259100e-4, 1.84631831751005468180e-5, 1.42151175831644588870e-7, 2.04426310338993978564e-15)  # fmt: skip
+_F = (
+    5.99832206555887937690e-1,
+    1.36929880922735805310e-1,
+    1.48753612908506148525e-2,
+    7.86869131145613259100e-4,
+    1.84631831751005468180e-5,
+    1.42151175831644588870e-7,
+    2.04426310338993978564e-15,
+)
 
 
 @njit(cache=True, error_model="numpy")
-def normal_quantile(u):
+def normal_quantile(u: float) -> float:
     """x with Φ(x) = u, 0 < u < 1."""
     q = u - 0.5
     if abs(q) <= 0.425:
@@ -229,8 +239,9 @@ NUMBERS = {UNIFORM: 1, LOG_UNIFORM: 1, NORMAL: 1, ROTATION: 4, DIRECTION: 3}
 
 
 @njit(cache=True, error_model="numpy")
-def shape_uniforms(kind, a, b, u, out):
-    """Fill out (n, NUMBERS) from uniforms u (n, UNIFORMS): between a and b, mean a and deviation b, or a direction of length a.
+def shape_uniforms(kind: int, a: float, b: float, u: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (n, NUMBERS) from uniforms u (n, UNIFORMS): between a and b, mean a and deviation b, or a direction of
+    length a.
 
     A rotation is uniform over the group (Shoemake, Graphics Gems III, 1992), a direction over the sphere.
     """

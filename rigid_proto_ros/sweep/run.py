@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A study from beginning to end, or from where a killed run left it: chunks come in, parts are kept, the table is joined."""
+"""A study from beginning to end, or from where a killed run left it: chunks come in, parts are kept, the
+table is joined.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,8 @@ class Interrupted(KeyboardInterrupt):
 def run_study(
     study: Study, file: Path, *, workers: int = 0, dask: str = "", resume: bool = False, progress: bool = True
 ) -> dict:
-    """Fly all rows that aren't done yet and write the table; returns its metadata. workers 0: one a core; dask: address of a
-    scheduler. Raises Interrupted on Ctrl-C, with a readable table of what was done.
+    """Fly all rows that aren't done yet and write the table; returns its metadata. workers 0: one a core; dask: address
+    of a scheduler. Raises Interrupted on Ctrl-C, with a readable table of what was done.
     """
     workers = workers or cores()
     if resume and _is_done(study, file):

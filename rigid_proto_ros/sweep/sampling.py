@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Uniform numbers of rows: independent, a Latin hypercube, or Sobol's sequence; each row's whatever rows are asked for with it."""
+"""Uniform numbers of rows: independent, a Latin hypercube, or Sobol's sequence; each row's whatever rows
+are asked for with it.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ MAX_SOBOL = 1 << 30
 def uniforms(sampler: str, seed: int, rows: np.ndarray, samples: int, dimensions: int) -> np.ndarray:
     """Uniform numbers (n, dimensions) in [0, 1) of rows (n,); each run of ``samples`` rows is one design.
 
-    ``random``: those of SeedSequence(seed, spawn_key=(row,)). ``latin_hypercube``: one number in each of ``samples`` strata per
-    dimension; where in it, by the row's own numbers. ``sobol``: scrambled by the seed (scipy.stats.qmc).
+    ``random``: those of SeedSequence(seed, spawn_key=(row,)). ``latin_hypercube``: one number in each of ``samples``
+    strata per dimension; where in it, by the row's own numbers. ``sobol``: scrambled by the seed (scipy.stats.qmc).
     """
     if sampler == "sobol":
         return _sobol(seed, dimensions).points(rows % samples)
@@ -36,7 +38,9 @@ def uniforms(sampler: str, seed: int, rows: np.ndarray, samples: int, dimensions
 
 
 class _Sobol:
-    """Points of the sequence by number. It goes forward from where it stands, so that chunk after chunk costs no more."""
+    """Points of the sequence by number. It goes forward from where it stands, so that chunk after chunk
+    costs no more.
+    """
 
     def __init__(self, seed: int, dimensions: int) -> None:
         try:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A study: one scene, one script, what varies, what is measured. Read and checked whole before anything runs.
 
-Row i is a function of the study and i alone. Grids make every combination, the first one slowest; lists go in step with one
-another and count as one more grid; each combination is drawn ``samples`` times where something is random.
+Row i is a function of the study and i alone. Grids make every combination, the first one slowest; lists go in step with
+one another and count as one more grid; each combination is drawn ``samples`` times where something is random.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,8 @@ class Vary:
 @dataclass(frozen=True)
 class Study:
     """values: all parameters of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
-    samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise, or None.
+    samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise,
+    or None.
     """
 
     name: str
@@ -118,7 +120,7 @@ class Study:
         return found
 
 
-def script_entries(script) -> list:
+def script_entries(script: Any) -> list:
     """The list of entries in a script as YAML gives it."""
     return (script["script"] if isinstance(script, dict) else script) or []
 
@@ -146,19 +148,21 @@ def _yaml(path: Path) -> object:
 
 
 def read_study(name: str, yes: bool = False) -> Study:
-    """A study file, by path or bundled name, checked whole; raises InputError naming the field. yes: however many rows."""
+    """A study file, by path or bundled name, checked whole; raises InputError naming the field. yes:
+    however many rows.
+    """
     path = study_file(name)
     return make_study(_yaml(path), str(path), path.parent, yes)
 
 
-def make_study(spec, name: str = "study", folder: Path = Path(), yes: bool = False) -> Study:
+def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool = False) -> Study:
     """The same from what YAML gives; scene and script are found from ``folder`` on."""
     spec = mapping(spec, name, _KEYS, ("scene", "duration", "vary"))
     scene = str(spec["scene"])
     beside = folder / scene
     path = beside if beside.is_file() else scene_file(scene)
     own = convert_all(_settings(spec.get("set"), f"{name}, set"))
-    given = {**scene_values(path, lambda text: None), **own}
+    given = {**scene_values(path, lambda _text: None), **own}
     if "density" in own and "mass" not in own:
         given["mass"] = 0.0
     base = make_scenario(given)
@@ -184,14 +188,14 @@ def make_study(spec, name: str = "study", folder: Path = Path(), yes: bool = Fal
     return replace(study, fingerprint=hashlib.sha256(content.encode()).hexdigest())
 
 
-def _with_text_keys(value):
+def _with_text_keys(value: Any) -> Any:
     """The same for numbers and nothing as keys, which have no order among text."""
     if isinstance(value, dict):
         return {str(key): _with_text_keys(inner) for key, inner in value.items()}
     return [_with_text_keys(inner) for inner in value] if isinstance(value, list) else value
 
 
-def _settings(spec, field: str) -> dict:
+def _settings(spec: Any, field: str) -> dict:
     if spec is None:
         return {}
     if not isinstance(spec, dict):
@@ -209,7 +213,7 @@ def _settings(spec, field: str) -> dict:
     return found
 
 
-def _script(spec, folder: Path, field: str):
+def _script(spec: Any, folder: Path, field: str) -> Any:
     if spec is None:
         return []
     if isinstance(spec, str):
@@ -223,7 +227,7 @@ def _script(spec, folder: Path, field: str):
     return spec
 
 
-def _vary(spec, name: str, values, entries: list) -> tuple[Vary, ...]:
+def _vary(spec: Any, name: str, values: Mapping[str, object], entries: list) -> tuple[Vary, ...]:
     if not isinstance(spec, dict) or not spec:
         raise InputError(f"{name}, vary", spec, "{name: how, ...} with at least one thing that varies")
     found = []
@@ -243,7 +247,7 @@ def _vary(spec, name: str, values, entries: list) -> tuple[Vary, ...]:
     return tuple(found)
 
 
-def _check_value(target: Target, value, field: str, values, entries: list) -> None:
+def _check_value(target: Target, value: Any, field: str, values: Mapping[str, object], entries: list) -> None:
     """Put a value where it will stand, and see whether that is accepted there."""
     changed, copied = dict(values), copy.deepcopy(entries)
     try:
@@ -257,7 +261,7 @@ def _check_value(target: Target, value, field: str, values, entries: list) -> No
         raise InputError(field, value, f"a value that fits {target.name}") from None
 
 
-def _reference(spec, field: str, base: Scenario) -> dict | None:
+def _reference(spec: Any, field: str, _base: Scenario) -> dict | None:
     if spec is None:
         return None
     changes = _settings(spec, field)
@@ -269,7 +273,7 @@ def _reference(spec, field: str, base: Scenario) -> dict | None:
     return changes
 
 
-def _samples(spec, field: str, vary: tuple[Vary, ...], sampler: str) -> int:
+def _samples(spec: Any, field: str, vary: tuple[Vary, ...], sampler: str) -> int:
     random = any(isinstance(v.form, Draw) for v in vary)
     points = any(isinstance(v.form, Points) for v in vary)
     if not random:
@@ -290,7 +294,9 @@ def _check_rows(study: Study, field: str, yes: bool) -> None:
 
 
 def _check_flyable(study: Study, base: Scenario) -> None:
-    """The scene as it stands takes off with its script, and so does its reference: what fails later is the row's own."""
+    """The scene as it stands takes off with its script, and so does its reference: what fails later is
+    the row's own.
+    """
     commands = expand_script(study.script, "script", base.values["wrench_timeout"])
     OfflineRun(base, commands)
     if study.reference is not None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The table of a sweep as a Parquet file, made from parts, so that a run that was killed loses no finished part.
 
-FILE.parts/ holds a manifest and one Arrow file for each finished chunk of rows, whole from the moment it has its name. When
-all are there, or on Ctrl-C, they are joined to FILE in order of rows, one row group after another, and never held at once.
+FILE.parts/ holds a manifest and one Arrow file for each finished chunk of rows, whole from the moment it has its name.
+When all are there, or on Ctrl-C, they are joined to FILE in order of rows, one row group after another, and never held
+at once.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +33,7 @@ GROUP_ROWS = 65536
 """Rows of one row group, at least, where there are so many."""
 
 
-def arrow():
+def arrow() -> tuple[ModuleType, ModuleType]:
     """pyarrow and its Parquet part; raises InputError where they aren't installed."""
     try:
         import pyarrow

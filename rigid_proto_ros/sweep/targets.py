@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..base.errors import InputError
 from ..base.nearest_name import one_of
@@ -23,8 +24,8 @@ SCRIPT_FIELDS = ("t", *_LOAD_FIELDS, "repeat", "every", "jitter", "seed", "wrenc
 
 @dataclass(frozen=True)
 class Target:
-    """name: as the study writes it. parameter: and ``path`` a component (k,) or (). Otherwise ``entry`` counts from 1 in the
-    script, and ``path`` leads to the field.
+    """name: as the study writes it. parameter: and ``path`` a component (k,) or (). Otherwise ``entry`` counts from 1
+    in the script, and ``path`` leads to the field.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Target:
     entry: int = 0
     path: tuple = ()
 
-    def put(self, values: dict, entries: list, value) -> None:
+    def put(self, values: dict, entries: list, value: Any) -> None:
         """Set the varied value in parameters (complete ones) or in the script's entries."""
         if self.parameter:
             whole = _with_component(values[self.parameter], self.path[0], value) if self.path else value
@@ -68,14 +69,16 @@ def component_labels(parameter: str, count: int) -> list[str]:
     return _COMPONENTS[count].split() if count in _COMPONENTS else [str(k) for k in range(count)]
 
 
-def _with_component(vector: list, k: int, value) -> list:
+def _with_component(vector: list, k: int, value: Any) -> list:
     vector = list(vector) * (3 if len(vector) == 1 else 1)
     vector[k] = value
     return vector
 
 
 def read_target(name: str, field: str, values: Mapping[str, object], entries: list) -> Target:
-    """The target of a name, given the scene's values and the script's entries; raises InputError with the nearest name."""
+    """The target of a name, given the scene's values and the script's entries; raises InputError with the
+    nearest name.
+    """
     if name.split(".")[0] == "script":
         return _script_target(name, field, entries)
     parameter, component = name, ""

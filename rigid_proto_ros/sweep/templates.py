@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What rows have in common, settled once: mesh constants, integrator, and the script as arrays for the compiled batch."""
+"""What rows have in common, settled once: mesh constants, integrator, and the script as arrays for the
+compiled batch.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError, MeshError
-from ..motion.frames import parse_frame
+from ..motion.frames import Frame, parse_frame
 from ..motion.integrators import check_carried, integrator_named
 from ..motion.integrators.integrator import (
     ANGULAR_DAMPING,
@@ -56,7 +58,9 @@ class NotCarried(Exception):
 
 @dataclass(frozen=True)
 class Script:
-    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of simulation/flight.py and motion/loads.py."""
+    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of simulation/flight.py
+    and motion/loads.py.
+    """
 
     commands: np.ndarray
     loads: np.ndarray
@@ -92,7 +96,9 @@ def ballast_of(values: Mapping[str, object]) -> np.ndarray:
 
 
 def constants_of(values: Mapping[str, object], body_mesh: BodyMesh | None) -> np.ndarray:
-    """What of the mesh and the model doesn't change with a row's settings (CONSTANTS,); raises NotCarried, InputError."""
+    """What of the mesh and the model doesn't change with a row's settings (CONSTANTS,); raises
+    NotCarried, InputError.
+    """
     row = np.zeros(bb.CONSTANTS)
     model = values["inertia_model"]
     row[bb.GYROSCOPIC] = float(values["gyroscopic"])
@@ -149,7 +155,7 @@ class Settler:
         self._surface = body_mesh.surface if body_mesh else None
         self._known: dict[str, tuple] = {}
 
-    def frame(self, text: str):
+    def frame(self, text: str) -> tuple[Frame, Load]:
         """The frame, and a load of no force settled there; raises InputError, or NotCarried for a ray."""
         if text not in self._known:
             frame = parse_frame(text, set(self._contacts))
@@ -178,7 +184,9 @@ class Settler:
 
 
 def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
-    """Commands, in order of time, as arrays, and the loads that the integrator has to carry; raises NotCarried, InputError."""
+    """Commands, in order of time, as arrays, and the loads that the integrator has to carry; raises
+    NotCarried, InputError.
+    """
     if len(commands) > MAX_COMMANDS:
         raise NotCarried
     ordered = [settler.numbers(command) for command in commands]

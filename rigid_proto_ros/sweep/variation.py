@@ -7,6 +7,7 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import yaml
@@ -71,7 +72,7 @@ def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
     return int(uniform * len(body_mesh.surface.vertices)) if body_mesh else 0
 
 
-def plain(value) -> object:
+def plain(value: Any) -> object:
     """A value as YAML has it."""
     if isinstance(value, np.ndarray):
         return value.tolist()

@@ -2,11 +2,11 @@
 """Integrators by name.
 
 An integrator takes the variables of a segment (motion/variables.py) forward in time under the segment's problem
-(motion/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone, and
-``advance`` commits only steps at full length, so that looking at the motion never changes it.
+(motion/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone,
+and ``advance`` commits only steps at full length, so that looking at the motion never changes it.
 
-Kernels divide as IEEE 754 does (``error_model="numpy"``): a step that explodes comes out as inf or NaN and is refused, where
-Python's rule would raise in the middle of it.
+Kernels divide as IEEE 754 does (``error_model="numpy"``): a step that explodes comes out as inf or NaN and is refused,
+where Python's rule would raise in the middle of it.
 """
 
 from __future__ import annotations

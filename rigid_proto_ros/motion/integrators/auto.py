@@ -8,12 +8,12 @@
 | spin, no torque, no force that turns along | one exact step, however long |
 | a body-axes wrench, damping | Taylor series of the spin and what it carries along |
 | loads that depend on the attitude, a string | Taylor series of the whole motion |
-| loads so weak against the spin that many turns pass before they show | free_body_strang, steps as long as the accuracy allows |
+| loads weak against the spin: they show after many turns | free_body_strang, steps as long as the accuracy allows |
 | damping that dies out long before anything else moves | Radau IIA, implicit, steps as long as the accuracy allows |
 | a string too stiff to resolve | discrete_gradient at the fixed step, accuracy not met and said so |
 
-Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's problem and
-start and of the accuracy; steps are functions of what they start from.
+Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's
+problem and start and of the accuracy; steps are functions of what they start from.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ FASTEST_STRING = 1e6
 
 
 @njit(cache=True, error_model="numpy")
-def steady_steps(y, p, h, n):
+def steady_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Closed form for a body that doesn't spin, or whose spin nothing changes for want of the gyroscopic term."""
     for done in range(n):
         B, c = ACCELERATION_BODY, p[DAMPING_LINEAR]
@@ -91,22 +91,22 @@ SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(7, 11)
 
 
 @njit(cache=True, error_model="numpy")
-def _vector(p, at):
+def _vector(p: np.ndarray, at: int) -> bool:
     """Whether any of three numbers isn't zero."""
     return p[at] != 0.0 or p[at + 1] != 0.0 or p[at + 2] != 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def fastest_swing(p):
-    """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against the
-    smallest moment.
+def fastest_swing(p: np.ndarray) -> float:
+    """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against
+    the smallest moment.
     """
     x, y, z = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
     return math.sqrt(p[STIFFNESS] * (1.0 / p[MASS] + (x * x + y * y + z * z) / p[MOMENTS]))
 
 
 @njit(cache=True, error_model="numpy")
-def _kind_on_string(p, y):
+def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
     turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
     accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
     if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
@@ -117,7 +117,7 @@ def _kind_on_string(p, y):
 
 
 @njit(cache=True, error_model="numpy")
-def kind_of_segment(p, y, accuracy):
+def kind_of_segment(p: np.ndarray, y: np.ndarray, accuracy: float) -> int:
     """Which of the kinds a segment with problem p from variables y on is, at this accuracy."""
     spins = _vector(y, 4)
     turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
@@ -140,19 +140,19 @@ def kind_of_segment(p, y, accuracy):
 
 
 def _constant(choice: str) -> Callable[..., str]:
-    return lambda p, step_s, accuracy: choice
+    return lambda _p, _step_s, _accuracy: choice
 
 
 def _series(why: str) -> Callable[..., str]:
-    return lambda p, step_s, accuracy: f"auto: taylor of degree {degree_for(accuracy)}, {why.format(fastest_swing(p))}"
+    return lambda p, _step_s, accuracy: f"auto: taylor of degree {degree_for(accuracy)}, {why.format(fastest_swing(p))}"
 
 
-def _stiff(p: np.ndarray, step_s: float, accuracy: float) -> str:
+def _stiff(p: np.ndarray, _step_s: float, _accuracy: float) -> str:
     fastest = fastest_swing(p)
     return f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
 
 
-def _methods(integrator: Integrator) -> tuple[Method, ...]:
+def _methods(_integrator: Integrator) -> tuple[Method, ...]:
     """A method for each kind of segment."""
     gradient = DISCRETE_GRADIENT
     series = (series_steps.steps, series_steps.workspace)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What a kernel that chooses its own steps keeps between calls, as one array of doubles.
 
-An accepted step that reaches beyond the time asked for is kept until it can be committed, so that when anybody asks never
-changes the steps.
+An accepted step that reaches beyond the time asked for is kept until it can be committed, so that when anybody asks
+never changes the steps.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def new_control(accuracy: float, degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def commit(control):
+def commit(control: np.ndarray) -> None:
     """Count the step that waited as committed."""
     control[ELAPSED_NS] += control[ACCEPTED_NS]
     control[EVALUATIONS] += control[PENDING]

@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: MIT
 """discrete_gradient: the energy-momentum midpoint rule with a string of any stiffness.
 
-Over a step the string pulls with F = −μ (a + a⁺), a the vector from free end to knot, where μ makes the work of F equal to the
-loss of potential exactly (Gonzalez, J. Nonlinear Sci. 6 (1996) 449): μ (l + l⁺) = T with
+Over a step the string pulls with F = −μ (a + a⁺), a the vector from free end to knot, where μ makes the work of F equal
+to the loss of potential exactly (Gonzalez, J. Nonlinear Sci. 6 (1996) 449): μ (l + l⁺) = T with
 
     T = (V(l⁺) − V(l))/(l⁺ − l) + θ c (l⁺ − l)/h,    V(l) = ½ k max(0, l − rest length)²,
 
-θ the stretched part of the way from l to l⁺; a string that doesn't push has T ≥ 0. Slack and taut need no search: V is smooth
-enough for its discrete gradient. The force acts on ½(r + F r) of the knot's arm, which makes angular momentum about the
-free end exact too. Attitude and spin: integrators/midpoint_spin.py.
+θ the stretched part of the way from l to l⁺; a string that doesn't push has T ≥ 0. Slack and taut need no search: V is
+smooth enough for its discrete gradient. The force acts on ½(r + F r) of the knot's arm, which makes angular momentum
+about the free end exact too. Attitude and spin: integrators/midpoint_spin.py.
 
-Order 2 while ω_s h is small, bounded energy at any ω_s h: a stiff string becomes an inextensible one, its unresolved swing
-along its length wrong in phase. Given μ, what remains is one equation for the mean spin (Newton); μ itself is the root of a
-monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺. Where the spin turns by so much in
-a step that none is found, or rounding leaves one that doesn't keep the energy, the step is halved until there is one. Where
-that takes too many parts the string is taken as inextensible over the step (integrators/inextensible.py), which always has a solution.
+Order 2 while ω_s h is small, bounded energy at any ω_s h: a stiff string becomes an inextensible one, its unresolved
+swing along its length wrong in phase. Given μ, what remains is one equation for the mean spin (Newton); μ itself is the
+root of a monotone function, bracketed. Rest length 0 has no root to find: the force is linear in a⁺. Where the spin
+turns by so much in a step that none is found, or rounding leaves one that doesn't keep the energy, the step is halved
+until there is one. Where that takes too many parts the string is taken as inextensible over the step
+(integrators/inextensible.py), which always has a solution.
 
-Attitude and displacement carry low words, and everything else about the string is computed as a change (integrators/knot.py):
-otherwise roundings of the knot's place, weighed by the tension, add up to 1e-8 of the energy at 1e5 rad/s.
+Attitude and displacement carry low words, and everything else about the string is computed as a change
+(integrators/knot.py): otherwise roundings of the knot's place, weighed by the tension, add up to 1e-8 of the energy at
+1e5 rad/s.
 """
 
 from __future__ import annotations
@@ -67,18 +69,22 @@ _MOST_HALVINGS = 12
 """Of a step for which no solution is found: a string that turns the body about within the step."""
 
 _LOSS = 1e-11
-"""Of the energy, in one step: what differs by more is no solution but a tension that changes by its own size within roundings."""
+"""Of the energy, in one step: what differs by more is no solution but a tension that changes by its own
+size within roundings.
+"""
 
 _MOST_PARTS = 256
 """Of a step, tried ones included: with 2 µs each a step of 1 ms is made in time."""
 
-# Of the scratch array: mean spin, the force it came to, the vector from free end to knot at the start and its change; its
-# length and stretch at the start.
+# Of the scratch array: mean spin, the force it came to, the vector from free end to knot at the start and its change;
+# its length and stretch at the start.
 _O, _FORCE, _A, _CHANGE, _LENGTH, _STRETCH, _SIZE = 0, 3, 6, 9, 12, 13, 14
 
 
 @njit(cache=True, error_model="numpy")
-def _momentum(y, p, h, mu, rho, s):
+def _momentum(
+    y: np.ndarray, p: np.ndarray, h: float, mu: float, rho: float, s: np.ndarray
+) -> tuple[float, float, float]:
     """I(ω⁺ − ω) from the mean spin s[0:3] under the pull F = −μ(a + a⁺) + ρ a; keeps F and a⁺ − a in s."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
     qx, qy, qz, qw = y[0], y[1], y[2], y[3]
@@ -89,7 +95,8 @@ def _momentum(y, p, h, mu, rho, s):
     tx, ty, tz = tx + gx, ty + gy, tz + gz
     if p[HAS_STRING] != 0.0:
         R, F, G = ATTACH, ACCELERATION_BODY, ACCELERATION_ADDED
-        # What the Cayley turn adds to the arm, in the axes of the step's start: 2(v × r + v × (v × r))/(1 + v²), v = ½hω̄.
+        # What the Cayley turn adds to the arm, in the axes of the step's start: 2(v × r + v × (v × r))/(1 + v²), v =
+        # ½hω̄.
         vx, vy, vz = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
         f = 2.0 / (1.0 + (vx * vx + vy * vy + vz * vz))
         cx, cy, cz = vy * p[R + 2] - vz * p[R + 1], vz * p[R] - vx * p[R + 2], vx * p[R + 1] - vy * p[R]
@@ -116,7 +123,7 @@ def _momentum(y, p, h, mu, rho, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_spin(y, p, h, mu, rho, s):
+def _solve_spin(y: np.ndarray, p: np.ndarray, h: float, mu: float, rho: float, s: np.ndarray) -> bool:
     """The mean spin under a given pull, from the one in s; returns whether it was found."""
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     change = 0.0
@@ -138,7 +145,7 @@ def _solve_spin(y, p, h, mu, rho, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _length_after(s):
+def _length_after(s: np.ndarray) -> tuple[float, float]:
     """l⁺, and l⁺ − l = (a⁺ − a)·(a⁺ + a)/(l⁺ + l) without cancellation."""
     square, change = 0.0, 0.0
     for k in range(3):
@@ -151,7 +158,7 @@ def _length_after(s):
 
 
 @njit(cache=True, error_model="numpy")
-def _tension(x0, change, h, p):
+def _tension(x0: float, change: float, h: float, p: np.ndarray) -> tuple[float, float]:
     """T over a step in which the stretch x0 changes, and the part of the way θ in which the damper works."""
     k, c = p[STIFFNESS], p[STRING_DAMPING]
     x1 = x0 + change
@@ -170,7 +177,7 @@ def _tension(x0, change, h, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _excess(y, p, h, mu, s):
+def _excess(y: np.ndarray, p: np.ndarray, h: float, mu: float, s: np.ndarray) -> tuple[float, float]:
     """μ(l + l⁺) − T(l⁺), which rises with μ, and l + l⁺. NaN where the spin was not found."""
     if not _solve_spin(y, p, h, mu, 0.0, s):
         return math.nan, math.nan
@@ -181,7 +188,7 @@ def _excess(y, p, h, mu, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _lightness(y, p, s):
+def _lightness(y: np.ndarray, p: np.ndarray, s: np.ndarray) -> float:
     """1/m + (r × n)ᵀ I⁻¹ (r × n) with n along a: what the knot yields to a pull."""
     length = s[_LENGTH]
     if length == 0.0:
@@ -194,7 +201,7 @@ def _lightness(y, p, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_pull(y, p, h, s):
+def _solve_pull(y: np.ndarray, p: np.ndarray, h: float, s: np.ndarray) -> float:
     """μ, the spin with it left in s; NaN when there is none."""
     lower, upper = -math.inf, math.inf
     mu = 0.0
@@ -235,7 +242,7 @@ def _solve_pull(y, p, h, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _keeps_energy(y, p, h, out, s):
+def _keeps_energy(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray) -> bool:
     """Whether kinetic and potential energy changed by the work of loads and dampers, as a solution's do."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
     F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
@@ -255,7 +262,7 @@ def _keeps_energy(y, p, h, out, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y, p, h, out, s):
+def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray) -> bool:
     """One step from y into out; returns whether a solution was found."""
     s[_O], s[_O + 1], s[_O + 2] = y[4], y[5], y[6]
     if p[HAS_STRING] != 0.0:
@@ -293,7 +300,7 @@ def _step(y, p, h, out, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _translate(y, p, h, out, s):
+def _translate(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray) -> None:
     """Displacement, velocity and the string's energies from the force in s."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
     F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
@@ -325,8 +332,10 @@ def _translate(y, p, h, out, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _step_in_parts(y, p, h, out, part, s):
-    """A step as a chain of shorter ones, halved until a solution is found and doubled again where they meet; whether it got through."""
+def _step_in_parts(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, part: np.ndarray, s: np.ndarray) -> bool:
+    """A step as a chain of shorter ones, halved until a solution is found and doubled again where they
+    meet; whether it got through.
+    """
     part[:] = y
     halvings, done, whole = 1, 0, 1 << _MOST_HALVINGS
     for _ in range(_MOST_PARTS):
@@ -346,7 +355,7 @@ def _step_in_parts(y, p, h, out, part, s):
 
 
 @njit(cache=True, error_model="numpy")
-def discrete_gradient_steps(y, p, h, n):
+def discrete_gradient_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new, part, scratch = y.copy(), y.copy(), np.zeros(_SIZE)
     for done in range(n):
@@ -366,7 +375,8 @@ DISCRETE_GRADIENT = Integrator(
     order=2,
     evaluations=12,
     source="Gonzalez, J. Nonlinear Sci. 6 (1996) 449, with the midpoint rule of Simo and Wong (1991)",
-    limits="Bounded energy at any stiffness. A swing along the string that the step doesn't resolve has the wrong phase; where the string turns the body about many times within a step, the string counts as inextensible.",
+    limits="Bounded energy at any stiffness. A swing along the string that the step doesn't resolve has the wrong "
+    "phase; where the string turns the body about many times within a step, the string counts as inextensible.",
     stability_limit=1.0,
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=discrete_gradient_steps,

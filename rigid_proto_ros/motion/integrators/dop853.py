@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """dop853: the explicit Runge-Kutta method of order 8 of Prince and Dormand, fixed steps.
 
-Order 8, 12 evaluations a step. Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section
-II.10. The one for large steps under loads of any kind; not conservative, and useless beyond |ω|h of about 4.
+Order 8, 12 evaluations a step. Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993),
+section II.10. The one for large steps under loads of any kind; not conservative, and useless beyond |ω|h of about 4.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def dop853_steps(y, p, h, n):
+def dop853_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     k, z, new = np.zeros((12, 15)), np.empty(15), y.copy()
     for done in range(n):
@@ -32,7 +32,7 @@ def dop853_steps(y, p, h, n):
 
 
 @njit(cache=True, error_model="numpy")
-def dop853_string_steps(y, p, h, n):
+def dop853_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
     k, z, new, trial = np.zeros((12, 15)), np.empty(15), y.copy(), y.copy()
     search = slack.new_search()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The tableau of DOP853: an explicit Runge-Kutta method of order 8 with error estimates of orders 5 and 3.
 
-Source: Prince and Dormand (1981) as published by Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993),
-section II.10 and their code dop853.f; checked by the order test.
+Source: Prince and Dormand (1981) as published by Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I
+(1993), section II.10 and their code dop853.f; checked by the order test.
 """
 
 import numpy as np

@@ -21,7 +21,7 @@ _DUPLICATION = 3e-3
 
 
 @njit(cache=True, error_model="numpy")
-def complete_quarter_period(m1):
+def complete_quarter_period(m1: float) -> float:
     """K(m) by the arithmetic-geometric mean, m₁ > 0."""
     a, b = 1.0, math.sqrt(m1)
     while abs(a - b) > 1e-8 * a:
@@ -31,7 +31,7 @@ def complete_quarter_period(m1):
 
 
 @njit(cache=True, error_model="numpy")
-def sn_cn_dn(u, m, m1):
+def sn_cn_dn(u: float, m: float, m1: float) -> tuple[float, float, float]:
     """sn, cn, dn (u | m); cn and dn keep their relative accuracy where they are small. |u| ≤ K, or m₁ = 0."""
     if m1 == 0.0:
         sech = 1.0 / math.cosh(u) if abs(u) < 700.0 else 0.0
@@ -44,7 +44,7 @@ def sn_cn_dn(u, m, m1):
 
 
 @njit(cache=True, error_model="numpy")
-def _by_series(u, m):
+def _by_series(u: float, m: float) -> tuple[float, float, float]:
     """Maclaurin series, after halving u until it is small; then duplication (A&S 16.18)."""
     doublings = 0
     while abs(u) > SMALL_ARGUMENT:
@@ -80,7 +80,7 @@ def _by_series(u, m):
 
 
 @njit(cache=True, error_model="numpy")
-def _by_landen(u, m1):
+def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
     """Bulirsch's sncndn: descending Landen transformations of cot am, which keeps small cn and dn accurate."""
     squeeze = m1
     means, roots = (0.0,) * 14, (0.0,) * 14
@@ -111,7 +111,7 @@ def _by_landen(u, m1):
 
 
 @njit(cache=True, error_model="numpy")
-def _set(values, index, value):
+def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
     """A tuple of 14 with one entry replaced: tuples live in registers where an array would be allocated each call."""
     return (
         value if index == 0 else values[0],
@@ -132,7 +132,7 @@ def _set(values, index, value):
 
 
 @njit(cache=True, error_model="numpy")
-def _rc_of_one(e):
+def _rc_of_one(e: float) -> float:
     """R_C(1, 1 + e), e > −1."""
     if abs(e) < 1e-3:
         # Σ (−e)ᵏ/(2k + 1), six terms.
@@ -142,7 +142,7 @@ def _rc_of_one(e):
 
 
 @njit(cache=True, error_model="numpy")
-def carlson_rj(x, y, z, p):
+def carlson_rj(x: float, y: float, z: float, p: float) -> float:
     """R_J(x, y, z, p), x, y, z ≥ 0 with at most one of them 0, p > 0."""
     delta = (p - x) * (p - y) * (p - z)
     total, weight = 0.0, 1.0

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """The equations of motion in principal axes, as integrators evaluate them.
 
-q xyzw takes principal to world axes, ω is in principal axes, d and u are the added displacement and velocity in world axes
-(motion/variables.py), p is the segment's problem (motion/problem.py). ``taut`` says whether the string's law of tension holds;
-where it changes is found by integrators/slack.py.
+q xyzw takes principal to world axes, ω is in principal axes, d and u are the added displacement and velocity in world
+axes (motion/variables.py), p is the segment's problem (motion/problem.py). ``taut`` says whether the string's law of
+tension holds; where it changes is found by integrators/slack.py.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate, rotate_inverse
@@ -38,7 +40,7 @@ from ..string import NO_DIRECTION
 
 
 @njit(cache=True, error_model="numpy")
-def undamped_torque(qx, qy, qz, qw, p):
+def undamped_torque(qx: float, qy: float, qz: float, qw: float, p: np.ndarray) -> tuple[float, float, float]:
     """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
     tx, ty, tz = p[TORQUE_BODY], p[TORQUE_BODY + 1], p[TORQUE_BODY + 2]
     if p[HAS_WORLD_TORQUE] != 0.0:
@@ -55,7 +57,9 @@ def undamped_torque(qx, qy, qz, qw, p):
 
 
 @njit(cache=True, error_model="numpy")
-def torque(qx, qy, qz, qw, wx, wy, wz, p):
+def torque(
+    qx: float, qy: float, qz: float, qw: float, wx: float, wy: float, wz: float, p: np.ndarray
+) -> tuple[float, float, float]:
     """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
     tx, ty, tz = undamped_torque(qx, qy, qz, qw, p)
     c = p[DAMPING_ANGULAR]
@@ -63,7 +67,9 @@ def torque(qx, qy, qz, qw, wx, wy, wz, p):
 
 
 @njit(cache=True, error_model="numpy")
-def angular_acceleration(wx, wy, wz, tx, ty, tz, p):
+def angular_acceleration(
+    wx: float, wy: float, wz: float, tx: float, ty: float, tz: float, p: np.ndarray
+) -> tuple[float, float, float]:
     """Euler's equations in principal axes: ω' = I⁻¹(τ − ω × Iω); without the gyroscopic term I⁻¹τ."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     g = p[GYROSCOPIC]
@@ -71,7 +77,9 @@ def angular_acceleration(wx, wy, wz, tx, ty, tz, p):
 
 
 @njit(cache=True, error_model="numpy")
-def added_acceleration(qx, qy, qz, qw, ux, uy, uz, p):
+def added_acceleration(
+    qx: float, qy: float, qz: float, qw: float, ux: float, uy: float, uz: float, p: np.ndarray
+) -> tuple[float, float, float]:
     """Acceleration of the added motion without the string: its constant part, R g_b and −c_v u."""
     B, G = ACCELERATION_BODY, ACCELERATION_ADDED
     ax, ay, az = rotate(qx, qy, qz, qw, p[B], p[B + 1], p[B + 2])
@@ -80,7 +88,22 @@ def added_acceleration(qx, qy, qz, qw, ux, uy, uz, p):
 
 
 @njit(cache=True, error_model="numpy")
-def knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p):
+def knot(  # noqa: PLR0913
+    qx: float,
+    qy: float,
+    qz: float,
+    qw: float,
+    wx: float,
+    wy: float,
+    wz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    p: np.ndarray,
+) -> tuple[float, ...]:
     """From the free end to the knot, a (3,), and its rate a' (3,), world axes."""
     A, S = ATTACH, STRING_START
     rx, ry, rz = p[A], p[A + 1], p[A + 2]
@@ -90,8 +113,26 @@ def knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p):
 
 
 @njit(cache=True, error_model="numpy")
-def string_pull(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
-    """Force on the knot (world axes), torque about the COM (principal axes), power of the hand, power lost in the damper."""
+def string_pull(  # noqa: PLR0913
+    qx: float,
+    qy: float,
+    qz: float,
+    qw: float,
+    wx: float,
+    wy: float,
+    wz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    p: np.ndarray,
+    taut: bool,
+) -> tuple[float, ...]:
+    """Force on the knot (world axes), torque about the COM (principal axes), power of the hand, power
+    lost in the damper.
+    """
     ax, ay, az, vx, vy, vz = knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p)
     k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
     if rest == 0.0:
@@ -114,7 +155,23 @@ def string_pull(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
 
 
 @njit(cache=True, error_model="numpy")
-def accelerations(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
+def accelerations(  # noqa: PLR0913
+    qx: float,
+    qy: float,
+    qz: float,
+    qw: float,
+    wx: float,
+    wy: float,
+    wz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    p: np.ndarray,
+    taut: bool,
+) -> tuple[float, ...]:
     """ω' (principal axes), u' (world axes), power of the hand, power lost in the string's damper, for a unit q."""
     tx, ty, tz = torque(qx, qy, qz, qw, wx, wy, wz, p)
     if p[TRANSLATES] == 0.0:
@@ -132,7 +189,7 @@ def accelerations(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut):
 
 
 @njit(cache=True, error_model="numpy")
-def stretch(y, p):
+def stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p[BILATERAL] != 0.0 or p[HAS_STRING] == 0.0:
         return 1.0, 0.0
@@ -144,7 +201,7 @@ def stretch(y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def tension_margin(x, rate, p):
+def tension_margin(x: float, rate: float, p: np.ndarray) -> float:
     """Positive exactly while the string pulls: min(k x, k x + c x')."""
     spring = p[STIFFNESS] * x
     return min(spring, spring + p[STRING_DAMPING] * rate)

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""How large an error is: attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s), the largest of them.
+"""How large an error is: attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s), the largest of
+them.
 
-``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε a
-step.
+``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε
+a step.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ..problem import (
@@ -31,8 +34,10 @@ FLOOR = 32.0 * 2.0**-52
 
 
 @njit(cache=True, error_model="numpy")
-def scales(y, p, elapsed):
-    """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into the segment."""
+def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
+    """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into
+    the segment.
+    """
     spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
     if p[TRANSLATES] == 0.0:
         return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
@@ -48,8 +53,12 @@ def scales(y, p, elapsed):
 
 
 @njit(cache=True, error_model="numpy")
-def heavier(ending, weights):
-    """The larger of the weights at a step's end and start, and whether they are clearly more than those at the start: a quarter."""
+def heavier(
+    ending: tuple[float, float, float, float], weights: tuple[float, float, float, float]
+) -> tuple[tuple[float, float, float, float], bool]:
+    """The larger of the weights at a step's end and start, and whether they are clearly more than those
+    at the start: a quarter.
+    """
     spin, speed = max(ending[1], weights[1]), max(ending[3], weights[3])
     return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
 
@@ -59,7 +68,7 @@ _SQUARED = 1e140
 
 
 @njit(cache=True, error_model="numpy")
-def length_of(x, y, z, w):
+def length_of(x: float, y: float, z: float, w: float) -> float:
     """√(x² + y² + z² + w²), scaled by a power of two where squares would over- or underflow."""
     square = x * x + y * y + z * z + w * w
     if 1.0 / _SQUARED < square < _SQUARED:
@@ -73,7 +82,7 @@ def length_of(x, y, z, w):
 
 
 @njit(cache=True, error_model="numpy")
-def size(e, attitude, spin, place, speed):
+def size(e: np.ndarray, attitude: float, spin: float, place: float, speed: float) -> float:
     """The measure of a small difference e (≥ 13,) of variables."""
     a = attitude * length_of(e[0], e[1], e[2], e[3])
     a = max(a, spin * length_of(e[4], e[5], e[6], 0.0))
@@ -84,8 +93,10 @@ def size(e, attitude, spin, place, speed):
 
 
 @njit(cache=True, error_model="numpy")
-def jump_of_displacement(p, spin, speed):
-    """Error that a displacement by one unit of the measure causes when a damped string jerks taut that much too early or late."""
+def jump_of_displacement(p: np.ndarray, spin: float, speed: float) -> float:
+    """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
+    much too early or late.
+    """
     if p[HAS_STRING] == 0.0:
         return 0.0
     arm = math.sqrt(p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2)

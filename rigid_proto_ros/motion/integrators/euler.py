@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """euler: the explicit Euler step on a rotation matrix kept orthonormal by Gram-Schmidt, the paper's first method.
 
-Order 1, one evaluation a step (the paper's O(n²) is the local error). Source: "Interactively prototyping properties of rigid
-bodies for physically-based animation" (2019); Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993),
-section II.1. Energy grows steadily; with ``gyroscopic: false`` it is the paper's eq. 9.
+Order 1, one evaluation a step (the paper's O(n²) is the local error). Source: "Interactively prototyping properties of
+rigid bodies for physically-based animation" (2019); Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations
+I (1993), section II.1. Energy grows steadily; with ``gyroscopic: false`` it is the paper's eq. 9.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from ...base.compilation import njit
 from . import slack
@@ -24,7 +26,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y, p, h, taut, out):
+def _step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, out: np.ndarray) -> None:
     """One step of h seconds from y into out, the string's law given."""
     qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     ex, ey, ez, ax, ay, az, work, heat = accelerations(
@@ -40,7 +42,7 @@ def _step(y, p, h, taut, out):
 
 
 @njit(cache=True, error_model="numpy")
-def euler_steps(y, p, h, n):
+def euler_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
     for done in range(n):
@@ -52,7 +54,7 @@ def euler_steps(y, p, h, n):
 
 
 @njit(cache=True, error_model="numpy")
-def euler_string_steps(y, p, h, n):
+def euler_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
     new, trial = y.copy(), y.copy()
     search = slack.new_search()

@@ -9,7 +9,7 @@ from ...base.compilation import njit
 
 
 @njit(cache=True, error_model="numpy")
-def exponential(x, y, z):
+def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Unit quaternion xyzw of the turn by |v| [rad] about v = (x, y, z); exact in the limit of small turns too."""
     angle = math.sqrt(x * x + y * y + z * z)
     # sin(a/2)/a: below 1e-4 the series ½ − a²/48 errs by 1e-19.

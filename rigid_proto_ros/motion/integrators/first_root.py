@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The first time at which a polynomial rises above zero: never just some root of it.
 
-On an interval a polynomial lies within the hull of its Bernstein coefficients, and with one change of sign among them it has
-exactly one root there (Lane and Riesenfeld, BIT 21 (1981) 112). So intervals without a positive coefficient are passed over, those with
-one change are closed in on, and all others are halved, the earlier half first. Halving averages neighbours (de Casteljau), so what it
-rounds is small against the interval's own values, and a double root is told from none as well as its coefficients can tell it.
+On an interval a polynomial lies within the hull of its Bernstein coefficients, and with one change of sign among them
+it has exactly one root there (Lane and Riesenfeld, BIT 21 (1981) 112). So intervals without a positive coefficient are
+passed over, those with one change are closed in on, and all others are halved, the earlier half first. Halving averages
+neighbours (de Casteljau), so what it rounds is small against the interval's own values, and a double root is told from
+none as well as its coefficients can tell it.
 """
 
 from __future__ import annotations
@@ -21,13 +22,15 @@ _RESOLUTION = 2.0**-51
 
 _NEWTONS = 40
 _MOST_TRIALS = 1200
-"""Newton's steps that a root is given before it is halved in on, and all together: as often as a double can be halved."""
+"""Newton's steps that a root is given before it is halved in on, and all together: as often as a double
+can be halved.
+"""
 
 NONE = -1.0
 
 
 @njit(cache=True, error_model="numpy")
-def first_rise(g, degree):
+def first_rise(g: np.ndarray, degree: int) -> float:
     """First s in [0, 1] past which Σ gₖ sᵏ is above zero, which it isn't at 0; NONE if it never is."""
     while degree > 0 and g[degree] == 0.0:
         degree -= 1
@@ -64,7 +67,7 @@ def first_rise(g, degree):
 
 
 @njit(cache=True, error_model="numpy")
-def _bernstein(g, degree, b):
+def _bernstein(g: np.ndarray, degree: int, b: np.ndarray) -> None:
     """Coefficients b on [0, 1]: bᵢ = Σ C(i, k)/C(n, k) gₖ."""
     scale = 1.0
     for k in range(degree + 1):
@@ -76,7 +79,7 @@ def _bernstein(g, degree, b):
 
 
 @njit(cache=True, error_model="numpy")
-def _signs(b, degree):
+def _signs(b: np.ndarray, degree: int) -> tuple[int, int]:
     """Sign of the first coefficient that isn't zero, and how often the sign changes."""
     first, before, changes = 0, 0, 0
     for k in range(degree + 1):
@@ -92,7 +95,7 @@ def _signs(b, degree):
 
 
 @njit(cache=True, error_model="numpy")
-def _halve(b, left, degree):
+def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
     """Coefficients of the left half into ``left``, those of the right one in place."""
     left[0] = b[0]
     for j in range(1, degree + 1):
@@ -102,7 +105,7 @@ def _halve(b, left, degree):
 
 
 @njit(cache=True, error_model="numpy")
-def _root(g, degree, low, high):
+def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
     """The one root in an interval over which the polynomial rises: Newton's steps kept within it, or halving."""
     t = 0.5 * (low + high)
     for trial in range(_MOST_TRIALS):

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """free_body: torque-free motion, exact to rounding for any time in one step.
 
-Its kernel can take many steps, for splittings and tests; in a simulation each look is one step from the segment's start, so
-nothing accumulates. Attitude errs less than 50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear damping are
-closed form beside it.
+Its kernel can take many steps, for splittings and tests; in a simulation each look is one step from the segment's
+start, so nothing accumulates. Attitude errs less than 50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear
+damping are closed form beside it.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ..problem import MOMENTS
@@ -18,7 +20,7 @@ from .stepping import ONE_STEP, Method
 
 
 @njit(cache=True, error_model="numpy")
-def free_body_steps(y, p, h, n):
+def free_body_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     q0, q1, q2, q3, w1, w2, w3 = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
@@ -30,8 +32,8 @@ def free_body_steps(y, p, h, n):
     return n
 
 
-def _methods(integrator: Integrator) -> tuple[Method, ...]:
-    return (Method(ONE_STEP, free_body_steps, lambda p, step_s, accuracy: "free_body: one exact step", 1),)
+def _methods(_integrator: Integrator) -> tuple[Method, ...]:
+    return (Method(ONE_STEP, free_body_steps, lambda _p, _step_s, _accuracy: "free_body: one exact step", 1),)
 
 
 FREE_BODY = Integrator(

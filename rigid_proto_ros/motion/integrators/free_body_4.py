@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: MIT
 """free_body_4: exact free motion and kicks composed to order 4, Runge-Kutta-Nyström type with six kicks.
 
-Order 4, six evaluations a step. Source: Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313, method S6 of order 4. Like
-all of its kind it needs loads that depend on the attitude and not on velocities: no damping of an integrated velocity.
+Order 4, six evaluations a step. Source: Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313, method S6 of order 4.
+Like all of its kind it needs loads that depend on the attitude and not on velocities: no damping of an integrated
+velocity.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ..problem import MOMENTS, TRANSLATES
@@ -24,7 +27,7 @@ DRIFTS = (_A1, _A2, 0.5 - (_A1 + _A2), 0.5 - (_A1 + _A2), _A2, _A1)
 
 
 @njit(cache=True, error_model="numpy")
-def free_body_4_steps(y, p, h, n):
+def free_body_4_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     new = y.copy()
@@ -37,7 +40,7 @@ def free_body_4_steps(y, p, h, n):
                 new[0], new[1], new[2], new[3], new[4], new[5], new[6], a, b, c, t
             )
             if p[TRANSLATES] != 0.0:
-                drift_freely(new, p, t)
+                drift_freely(new, t)
             pushed = push(new, p)
         kick(new, p, KICKS[6] * h, pushed)
         if not is_good(new):

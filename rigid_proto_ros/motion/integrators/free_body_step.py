@@ -1,28 +1,30 @@
 # SPDX-License-Identifier: MIT
 """Torque-free rotation over any time, exactly: the map that free_body and the splittings are made of.
 
-In principal axes the angular velocity follows Jacobi's elliptic functions, the attitude a turn about the angular momentum.
-Written for A, B, C and w = (w₁, w₂, w₃) with C the axis that the angular momentum circulates about in the body, w₃ ≥ 0:
+In principal axes the angular velocity follows Jacobi's elliptic functions, the attitude a turn about the angular
+momentum. Written for A, B, C and w = (w₁, w₂, w₃) with C the axis that the angular momentum circulates about in the
+body, w₃ ≥ 0:
 
     P = B|B−A| w₂² + C|C−A| w₃²,  Q = A|C−A| w₁² + B|C−B| w₂²,  ω_p² = |C−B| P/(ABC),
     m = |B−A| Q/(|C−B| P),  m₁ = 1 − m = |C−A| (C|C−B| w₃² − A|B−A| w₁²)/(|C−B| P).
 
-ω after h comes by the addition theorem with S = sn/ω_p, c = cn, d = dn at u = ω_p h, so that no elliptic integral is inverted
-and no division vanishes: with D = 1 − β sn² and β = B|B−A| w₂²/P,
+ω after h comes by the addition theorem with S = sn/ω_p, c = cn, d = dn at u = ω_p h, so that no elliptic integral is
+inverted and no division vanishes: with D = 1 − β sn² and β = B|B−A| w₂²/P,
 
     w₁⁺ = (w₁ c − (C−B)/A w₂w₃ S d)/D,  w₂⁺ = (w₂ c d + (C−A)/B w₁w₃ S)/D,  w₃⁺ = (w₃ d − (B−A)/C w₁w₂ S c)/D.
 
-The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest turn that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to the third
-axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. A short step integrates ψ' by Gauss's rule, a long one in closed
-form: with dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ = (1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ' becomes
-f_a + f_b s²/(1 + νs²), whose integral from the start of a period is Carlson's R_J, every argument positive. The integral from
-any other phase on is that over the time alone plus an arc tangent (addition theorem of the third kind): a difference of two
-incomplete integrals would cancel where both are large, near a middle axis that the body leaves or comes to.
+The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest turn that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to the
+third axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. A short step integrates ψ' by Gauss's rule, a long one
+in closed form: with dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ = (1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ'
+becomes f_a + f_b s²/(1 + νs²), whose integral from the start of a period is Carlson's R_J, every argument positive. The
+integral from any other phase on is that over the time alone plus an arc tangent (addition theorem of the third kind): a
+difference of two incomplete integrals would cancel where both are large, near a middle axis that the body leaves or
+comes to.
 
-Sources: Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies (1937), section 69; van Zon and Schofield,
-J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084; Byrd
-and Friedman, Handbook of Elliptic Integrals (1971), 116.03, for the addition theorem; the gauge and the positive forms are
-worked out here.
+Sources: Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies (1937), section 69; van Zon and
+Schofield, J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084;
+Byrd and Friedman, Handbook of Elliptic Integrals (1971), 116.03, for the addition theorem; the gauge and the positive
+forms are worked out here.
 """
 
 from __future__ import annotations
@@ -41,7 +43,9 @@ FARTHEST_ON_SEPARATRIX = 300.0
 """u at which a body on the separatrix lies on its middle axis to 1e-130; beyond it sech² would leave the doubles."""
 
 NO_SPIN = 1e-140
-"""Part of the largest ω below which a component is taken as none: its square times a ratio of moments would leave the doubles."""
+"""Part of the largest ω below which a component is taken as none: its square times a ratio of moments
+would leave the doubles.
+"""
 
 # Gauss-Legendre nodes and weights on (0, 1); ψ' has its poles at least about 1.2 from the real u axis.
 _NODES_3 = (0.11270166537925831, 0.5, 0.8872983346207417)
@@ -59,7 +63,19 @@ _WEIGHTS_8 = (
 
 
 @njit(cache=True, error_model="numpy")
-def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
+def free_step(  # noqa: PLR0913
+    qx: float,
+    qy: float,
+    qz: float,
+    qw: float,
+    wx: float,
+    wy: float,
+    wz: float,
+    i1: float,
+    i2: float,
+    i3: float,
+    h: float,
+) -> tuple[float, ...]:
     """Attitude q and ω (principal axes, moments i1 ≤ i2 ≤ i3) after h seconds without torque."""
     largest = max(abs(wx), abs(wy), abs(wz))
     if largest == 0.0 or h == 0.0:
@@ -101,8 +117,10 @@ def free_step(qx, qy, qz, qw, wx, wy, wz, i1, i2, i3, h):
 
 
 @njit(cache=True, error_model="numpy")
-def circulation(i1, i2, i3, wx, wy, wz):
-    """ω_p [1/s] and m₁ (0 on the separatrix, at most 1) of the free motion with angular velocity w, moments i1 ≤ i2 ≤ i3."""
+def circulation(i1: float, i2: float, i3: float, wx: float, wy: float, wz: float) -> tuple[float, float]:
+    """ω_p [1/s] and m₁ (0 on the separatrix, at most 1) of the free motion with angular velocity w,
+    moments i1 ≤ i2 ≤ i3.
+    """
     side = i3 * (i3 - i2) * wz * wz - i1 * (i2 - i1) * wx * wx
     A, C, outer = (i1, i3, wz) if side > 0.0 or (side == 0.0 and i3 - i2 >= i2 - i1) else (i3, i1, wx)
     P = i2 * abs(i2 - A) * wy * wy + C * abs(C - A) * outer * outer
@@ -113,7 +131,7 @@ def circulation(i1, i2, i3, wx, wy, wz):
 
 
 @njit(cache=True, error_model="numpy")
-def _circulate(A, B, C, w1, w2, w3, h):
+def _circulate(A: float, B: float, C: float, w1: float, w2: float, w3: float, h: float) -> tuple[float, ...]:
     """The turn r xyzw (not normalized) over h, and w after it."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
     P = B * gba * w2 * w2 + C * gca * w3 * w3
@@ -136,7 +154,7 @@ def _circulate(A, B, C, w1, w2, w3, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _even_turn(w1, w2, w3, h):
+def _even_turn(w1: float, w2: float, w3: float, h: float) -> tuple[float, float, float, float]:
     """Turn by |w| h about w."""
     size = math.sqrt(w1 * w1 + w2 * w2 + w3 * w3)
     s = math.sin(0.5 * size * h) / size
@@ -144,14 +162,16 @@ def _even_turn(w1, w2, w3, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _third(w3, twist, beta, rate, m, t):
+def _third(w3: float, twist: float, beta: float, rate: float, m: float, t: float) -> float:
     """w₃ after t, from the short-time sn, cn, dn; ``twist`` is (B−A)/C w₁w₂."""
     s, c, d = sn_cn_dn(rate * t, m, 1.0)
     return (w3 * d - twist * (s / rate) * c) / (1.0 - beta * s * s)
 
 
 @njit(cache=True, error_model="numpy")
-def _short(A, B, C, w1, w2, w3, P, rate, m, h):
+def _short(  # noqa: PLR0913
+    A: float, B: float, C: float, w1: float, w2: float, w3: float, P: float, rate: float, m: float, h: float
+) -> tuple[float, float, float, float]:
     """w and ψ after a short h; w as increments, which keeps energy and momentum from drifting."""
     beta = B * abs(B - A) * w2 * w2 / P
     s, c, d = sn_cn_dn(rate * h, m, 1.0)
@@ -193,7 +213,9 @@ def _short(A, B, C, w1, w2, w3, P, rate, m, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
+def _long(  # noqa: PLR0913
+    A: float, B: float, C: float, w1: float, w2: float, w3: float, P: float, Q: float, rate: float, h: float
+) -> tuple[float, float, float, float]:
     """w and ψ after any h."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
     m, m1 = gba * Q / (gcb * P), gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P)
@@ -244,7 +266,7 @@ def _long(A, B, C, w1, w2, w3, P, Q, rate, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _side_of_separatrix(A, B, C, w1, w3):
+def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> float:
     """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion hangs on its last digits."""
     g, g_low = two_sum(C, -B)
     x, x_low = pair_multiply(g, g_low, C, 0.0)
@@ -259,7 +281,7 @@ def _side_of_separatrix(A, B, C, w1, w3):
 
 
 @njit(cache=True, error_model="numpy")
-def _gauss_phase(cn, sn, dn, k1):
+def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, float]:
     """sn and cn of Gauss's transformed modulus."""
     s = sn * (1.0 + k1) / (1.0 + dn)
     c = cn * math.sqrt(2.0 * (1.0 + k1) / ((dn + k1) * (1.0 + dn)))
@@ -268,8 +290,10 @@ def _gauss_phase(cn, sn, dn, k1):
 
 
 @njit(cache=True, error_model="numpy")
-def _added_by_phase(s0, s, s1, c1, modulus1, kappa, nu):
-    """∫ from u₀ to u₀ + u less ∫ from 0 to u of sn²/(1 + ν sn²): s₀, s, s₁ are sn of u₀, u and u₀ + u, c₁ cn of the last."""
+def _added_by_phase(s0: float, s: float, s1: float, c1: float, modulus1: float, kappa: float, nu: float) -> float:
+    """∫ from u₀ to u₀ + u less ∫ from 0 to u of sn²/(1 + ν sn²): s₀, s, s₁ are sn of u₀, u and u₀ + u, c₁
+    cn of the last.
+    """
     d1 = math.sqrt(c1 * c1 + modulus1 * s1 * s1)
     product = s0 * s * s1 / (1.0 + nu * s1 * s1 - nu * s0 * s * c1 * d1)
     root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
@@ -278,7 +302,7 @@ def _added_by_phase(s0, s, s1, c1, modulus1, kappa, nu):
 
 
 @njit(cache=True, error_model="numpy")
-def _third_kind(s, c, modulus1, nu):
+def _third_kind(s: float, c: float, modulus1: float, nu: float) -> float:
     """∫ sin²/(1 + ν sin²)/√(1 − κ² sin²) from 0 to φ."""
     cc, ss = c * c, s * s
     return s * ss / 3.0 * carlson_rj(cc, cc + modulus1 * ss, 1.0, 1.0 + nu * ss)

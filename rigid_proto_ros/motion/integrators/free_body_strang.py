@@ -2,13 +2,15 @@
 """free_body_strang: half a kick, exact free motion, half a kick.
 
 Order 2, one evaluation a step, time-reversible. Source: Strang, SIAM J. Numer. Anal. 5 (1968) 506; for rigid bodies
-McLachlan and Quispel, Acta Numerica 11 (2002) 341. Its error has the torque as a factor, so it pays when the body spins fast
-under weak loads, at any |ω|h; angular momentum is exact under loads without torque.
+McLachlan and Quispel, Acta Numerica 11 (2002) 341. Its error has the torque as a factor, so it pays when the body spins
+fast under weak loads, at any |ω|h; angular momentum is exact under loads without torque.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ..problem import MOMENTS, TRANSLATES
@@ -20,7 +22,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def free_body_strang_steps(y, p, h, n):
+def free_body_strang_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     new = y.copy()
@@ -31,7 +33,7 @@ def free_body_strang_steps(y, p, h, n):
             new[0], new[1], new[2], new[3], new[4], new[5], new[6], a, b, c, h
         )
         if p[TRANSLATES] != 0.0:
-            drift_freely(new, p, h)
+            drift_freely(new, h)
         # The next step's first half kick sees the same attitude.
         pushed = push(new, p)
         kick(new, p, 0.5 * h, pushed)

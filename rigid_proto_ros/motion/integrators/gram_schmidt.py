@@ -12,7 +12,9 @@ from ...base.compilation import njit
 
 
 @njit(cache=True, error_model="numpy")
-def columns(x, y, z, w):
+def columns(
+    x: float, y: float, z: float, w: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
     """Columns of the rotation matrix of a unit quaternion."""
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
@@ -22,7 +24,14 @@ def columns(x, y, z, w):
 
 
 @njit(cache=True, error_model="numpy")
-def turned(start, at, wx, wy, wz, h):
+def turned(
+    start: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+    at: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+    wx: float,
+    wy: float,
+    wz: float,
+    h: float,
+) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
     """``start`` + h R [ω]× with R = ``at``: each axis moves with the velocity of its tip."""
     e, f, g = at
     a, b, c = start
@@ -46,7 +55,9 @@ def turned(start, at, wx, wy, wz, h):
 
 
 @njit(cache=True, error_model="numpy")
-def orthonormal(matrix):
+def orthonormal(
+    matrix: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
     """Gram-Schmidt: the first axis keeps its direction, the second its plane, the third completes the right hand."""
     a, b, _ = matrix
     a = _unit(a)
@@ -56,13 +67,19 @@ def orthonormal(matrix):
 
 
 @njit(cache=True, error_model="numpy")
-def _unit(v):
+def _unit(v: tuple[float, float, float]) -> tuple[float, float, float]:
     scale = 1.0 / math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return v[0] * scale, v[1] * scale, v[2] * scale
 
 
 @njit(cache=True, error_model="numpy")
-def quaternion_near(matrix, qx, qy, qz, qw):
+def quaternion_near(
+    matrix: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+    qx: float,
+    qy: float,
+    qz: float,
+    qw: float,
+) -> tuple[float, float, float, float]:
     """Unit quaternion of a rotation matrix, of the two signs the one nearer to q (Shepperd 1978)."""
     a, b, c = matrix
     xx, yy, zz = a[0], b[1], c[2]

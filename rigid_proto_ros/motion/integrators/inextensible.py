@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""A step with a string so stiff that nothing of its swing is resolved, as if it were inextensible; it always has a solution.
+"""A step with a string so stiff that nothing of its swing is resolved, as if it were inextensible; it always has a
+solution.
 
-The body flies freely for the step (exactly, but for half kicks of the loads at both ends). A string that is stretched then is brought
-back to its rest length by moving the body along it, and an impulse J along it at the knot gives the body what the string's
-potential and the loads' work on that way make of its kinetic energy: with r the rate of the string's length and 1/m_eff what the knot yields,
+The body flies freely for the step (exactly, but for half kicks of the loads at both ends). A string that is stretched
+then is brought back to its rest length by moving the body along it, and an impulse J along it at the knot gives the
+body what the string's potential and the loads' work on that way make of its kinetic energy: with r the rate of the
+string's length and 1/m_eff what the knot yields,
 
     r' = r + J/m_eff,    ½ m_eff r'² = ½ m_eff r² + V − V⁺ + m g·δ,
 
-the root that turns the knot back, as a stiff spring does within half a swing; a string that doesn't push turns it inwards.
-The damper takes the part 1 − exp(−ch/m_eff) of that energy. So there is a solution whatever the step, and kinetic and potential
-energy are kept to rounding; phase and direction of a motion that the step doesn't resolve are not, nor is angular momentum on the way back.
+the root that turns the knot back, as a stiff spring does within half a swing; a string that doesn't push turns it
+inwards. The damper takes the part 1 − exp(−ch/m_eff) of that energy. So there is a solution whatever the step, and
+kinetic and potential energy are kept to rounding; phase and direction of a motion that the step doesn't resolve are
+not, nor is angular momentum on the way back.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, rotate, rotate_inverse
@@ -41,7 +46,7 @@ _CORRECTIONS = 3
 
 
 @njit(cache=True, error_model="numpy")
-def kinetic_energy(y, p):
+def kinetic_energy(y: np.ndarray, p: np.ndarray) -> float:
     """As seen from the free end [J]."""
     energy = 0.0
     for k in range(3):
@@ -50,7 +55,7 @@ def kinetic_energy(y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def yield_along(y, p, nx, ny, nz):
+def yield_along(y: np.ndarray, p: np.ndarray, nx: float, ny: float, nz: float) -> tuple[float, float, float, float]:
     """1/m_eff = 1/m + (r × n)ᵀ I⁻¹ (r × n) along the world direction n, and r × n in principal axes."""
     nx, ny, nz = rotate_inverse(y[0], y[1], y[2], y[3], nx, ny, nz)
     rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
@@ -60,7 +65,7 @@ def yield_along(y, p, nx, ny, nz):
 
 
 @njit(cache=True, error_model="numpy")
-def _rate(y, p, n):
+def _rate(y: np.ndarray, p: np.ndarray, n: tuple[float, float, float]) -> float:
     """Of the knot along n, from the free end."""
     rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
     wx, wy, wz = y[4], y[5], y[6]
@@ -69,7 +74,7 @@ def _rate(y, p, n):
 
 
 @njit(cache=True, error_model="numpy")
-def _strike(y, p, n, impulse):
+def _strike(y: np.ndarray, p: np.ndarray, n: tuple[float, float, float], impulse: float) -> None:
     """An impulse along n at the knot, in place."""
     _, a, b, c = yield_along(y, p, n[0], n[1], n[2])
     y[4] += impulse * a / p[MOMENTS]
@@ -81,7 +86,7 @@ def _strike(y, p, n, impulse):
 
 
 @njit(cache=True, error_model="numpy")
-def _fly(y, p, h):
+def _fly(y: np.ndarray, p: np.ndarray, h: float) -> None:
     """Free motion for h seconds between half kicks of the loads, in place."""
     kick(y, p, 0.5 * h, push(y, p))
     if p[GYROSCOPIC] != 0.0:
@@ -100,7 +105,7 @@ def _fly(y, p, h):
 
 
 @njit(cache=True, error_model="numpy")
-def potential_energy(x, p):
+def potential_energy(x: float, p: np.ndarray) -> float:
     """Of the string stretched by x [J]."""
     if x < 0.0 and p[BILATERAL] == 0.0:
         return 0.0
@@ -108,7 +113,7 @@ def potential_energy(x, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _direction(ax, ay, az, length):
+def _direction(ax: float, ay: float, az: float, length: float) -> tuple[float, float, float]:
     """From the free end to the knot; some direction where they are one."""
     if length > 0.0:
         return ax / length, ay / length, az / length
@@ -116,7 +121,7 @@ def _direction(ax, ay, az, length):
 
 
 @njit(cache=True, error_model="numpy")
-def inextensible_step(y, p, h, out):
+def inextensible_step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> None:
     """A step of h seconds from y into out (STORED,), of a problem with a string."""
     out[:] = y
     _, _, _, _, before = knot_and_stretch(y, p)
@@ -145,8 +150,10 @@ def inextensible_step(y, p, h, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _turn_back(y, p, n, gained, h):
-    """Let the string turn the knot back with ``gained`` joules more of kinetic energy, and its damper work for h seconds, in place."""
+def _turn_back(y: np.ndarray, p: np.ndarray, n: tuple[float, float, float], gained: float, h: float) -> None:
+    """Let the string turn the knot back with ``gained`` joules more of kinetic energy, and its damper
+    work for h seconds, in place.
+    """
     one_sided = p[BILATERAL] == 0.0
     lightness = yield_along(y, p, n[0], n[1], n[2])[0]
     rate = _rate(y, p, n)

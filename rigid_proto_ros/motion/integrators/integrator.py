@@ -40,12 +40,13 @@ def needs_of_load(load: Load) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Integrator:
-    """order: global order of accuracy, None when exact. evaluations: of the equations of motion per step. source: where it
-    is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h of a
-    string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
-    kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result isn't
-    finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another. stiff: bounded at any ω_s h. make_methods:
-    the ways in which segments are stepped; chooses: by what a segment holds (auto), else by whether a string is tied.
+    """order: global order of accuracy, None when exact. evaluations: of the equations of motion per step. source: where
+    it is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h
+    of a string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
+    kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result
+    isn't finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another.
+    stiff: bounded at any ω_s h. make_methods: the ways in which segments are stepped; chooses: by what a segment holds
+    (auto), else by whether a string is tied.
     """
 
     name: str
@@ -71,7 +72,7 @@ class Integrator:
         """Whether it carries every wrench and poke."""
         return self.carries >= LOADS
 
-    def kernel_for(self, problem: np.ndarray):
+    def kernel_for(self, problem: np.ndarray) -> Callable[[np.ndarray, np.ndarray, float, int], int] | None:
         """The kernel that steps this problem; only the ones used are ever compiled."""
         return self.string_kernel if problem[HAS_STRING] != 0.0 and self.string_kernel else self.kernel
 

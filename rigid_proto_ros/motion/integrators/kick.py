@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...base.compilation import njit
 from ...base.rotation import rotate
 from ..problem import (
@@ -18,7 +20,7 @@ from .equations import undamped_torque
 
 
 @njit(cache=True, error_model="numpy")
-def push(y, p):
+def push(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
     if p[TRANSLATES] == 0.0:
@@ -29,7 +31,7 @@ def push(y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def kick(y, p, h, pushed):
+def kick(y: np.ndarray, p: np.ndarray, h: float, pushed: tuple[float, ...]) -> None:
     """Let ``push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
     angular, linear = p[DAMPING_ANGULAR], p[DAMPING_LINEAR]
     for k in range(3):
@@ -45,7 +47,7 @@ def kick(y, p, h, pushed):
 
 
 @njit(cache=True, error_model="numpy")
-def drift_freely(y, p, h):
+def drift_freely(y: np.ndarray, h: float) -> None:
     """Move the added displacement on with its velocity for h seconds, in place."""
     for k in range(3):
         y[7 + k] += h * y[10 + k]

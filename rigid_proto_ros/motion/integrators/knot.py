@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Attitude, displacement and the string's stretch to more digits than a double has.
 
-A stiff string weighs a rounding δ of its knot's place by its tension, ΔE = T δ, at every step, and these add up. So where a
-string is tied, attitude and displacement are kept as unevaluated sums of two doubles (the low words of motion/variables.py), and
-what is small, the stretch l − rest length, is taken from them with errors far below one rounding of l.
+A stiff string weighs a rounding δ of its knot's place by its tension, ΔE = T δ, at every step, and these add up. So
+where a string is tied, attitude and displacement are kept as unevaluated sums of two doubles (the low words of
+motion/variables.py), and what is small, the stretch l − rest length, is taken from them with errors far below one
+rounding of l.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.exact_arithmetic import fast_two_sum, two_product, two_sum
@@ -17,7 +20,7 @@ from ..variables import LOW
 
 
 @njit(cache=True, error_model="numpy")
-def _difference(a, a_low, b, c, c_low, d):
+def _difference(a: float, a_low: float, b: float, c: float, c_low: float, d: float) -> tuple[float, float]:
     """a b − c d as a pair, b and d doubles."""
     x, e = two_product(a, b)
     y, f = two_product(c, d)
@@ -26,8 +29,10 @@ def _difference(a, a_low, b, c, c_low, d):
 
 
 @njit(cache=True, error_model="numpy")
-def knot_and_stretch(y, p):
-    """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m and not of 1e-16 m."""
+def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
+    """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m
+    and not of 1e-16 m.
+    """
     r1, r2, r3 = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
     qx, qy, qz, qw = y[0], y[1], y[2], y[3]
     lx, ly, lz, lw = y[LOW], y[LOW + 1], y[LOW + 2], y[LOW + 3]
@@ -53,7 +58,24 @@ def knot_and_stretch(y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _moved(y, p, k, r, w, w_low, t, t_low, ua, ua_low, ta, ta_low, ub, ub_low, tb, tb_low):
+def _moved(  # noqa: PLR0913
+    y: np.ndarray,
+    p: np.ndarray,
+    k: int,
+    r: float,
+    w: float,
+    w_low: float,
+    t: float,
+    t_low: float,
+    ua: float,
+    ua_low: float,
+    ta: float,
+    ta_low: float,
+    ub: float,
+    ub_low: float,
+    tb: float,
+    tb_low: float,
+) -> tuple[float, float]:
     """Component k of start + d + r + 2 (w t + ua ta − ub tb) as a pair."""
     x1, e1 = two_product(w, t)
     x2, e2 = two_product(ua, ta)
@@ -69,13 +91,13 @@ def _moved(y, p, k, r, w, w_low, t, t_low, ua, ua_low, ta, ta_low, ub, ub_low, t
 
 
 @njit(cache=True, error_model="numpy")
-def moved_pair(y, out, at, low, change):
+def moved_pair(y: np.ndarray, out: np.ndarray, at: int, low: int, change: float) -> None:
     """out = y + change for the variable ``at`` with its low word."""
     out[at], out[low] = two_sum(y[at], change + y[low])
 
 
 @njit(cache=True, error_model="numpy")
-def unit_attitude(out):
+def unit_attitude(out: np.ndarray) -> None:
     """Attitude and low words scaled to unit length."""
     excess, low = -1.0, 0.0
     for k in range(4):

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """lie_midpoint: the implicit midpoint rule on the rotation group, which keeps energy and angular momentum to rounding.
 
-Order 2, implicit: Newton's method evaluates the loads 3 to 6 times a step. Sources: integrators/midpoint_spin.py. Stable at
-any |ω|h at which the iteration finds a solution (about 2); attitude still errs with h², so a bounded energy is no
-proof of a right motion.
+Order 2, implicit: Newton's method evaluates the loads 3 to 6 times a step. Sources: integrators/midpoint_spin.py.
+Stable at any |ω|h at which the iteration finds a solution (about 2); attitude still errs with h², so a bounded energy
+is no proof of a right motion.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate
@@ -33,7 +35,9 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def _change_of_momentum(y, ox, oy, oz, p, h):
+def _change_of_momentum(
+    y: np.ndarray, ox: float, oy: float, oz: float, p: np.ndarray, h: float
+) -> tuple[float, float, float]:
     """I(ω⁺ − ω) that follows from the mean spin."""
     mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
     tx, ty, tz = torque(mx, my, mz, mw, ox, oy, oz, p)
@@ -43,7 +47,7 @@ def _change_of_momentum(y, ox, oy, oz, p, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y, p, h, out):
+def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> bool:
     """One step from y into out; returns whether the iteration converged."""
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     wx, wy, wz = y[4], y[5], y[6]
@@ -77,7 +81,7 @@ def _step(y, p, h, out):
 
 
 @njit(cache=True, error_model="numpy")
-def lie_midpoint_steps(y, p, h, n):
+def lie_midpoint_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
     for done in range(n):

@@ -6,14 +6,17 @@ R⁺Iω⁺ = R(Iω + h t), t the torque in the axes of the step's start, is
 
     I(ω⁺ − ω) = h (t − ½h ω̄ × t − ω̄ × Iω̄):
 
-angular momentum changes by h t exactly and energy by h ω̄·t. Source: Simo and Wong, Int. J. Numer. Meth. Engng 31 (1991) 19;
-Lewis and Simo, J. Nonlinear Sci. 4 (1994) 253; with the Cayley map, Austin, Krishnaprasad and Wang, J. Comput. Phys. 107 (1993) 105.
-A torque τ given in the body's axes at the mean attitude enters as t − ½h ω̄ × t = sτ − ¼h²/(1 + s)(ω̄·τ) ω̄, s² = 1 + ¼h²|ω̄|².
+angular momentum changes by h t exactly and energy by h ω̄·t. Source: Simo and Wong, Int. J. Numer. Meth. Engng 31
+(1991) 19; Lewis and Simo, J. Nonlinear Sci. 4 (1994) 253; with the Cayley map, Austin, Krishnaprasad and Wang, J.
+Comput. Phys. 107 (1993) 105. A torque τ given in the body's axes at the mean attitude enters as t − ½h ω̄ × t = sτ −
+¼h²/(1 + s)(ω̄·τ) ω̄, s² = 1 + ¼h²|ω̄|².
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize
@@ -26,7 +29,9 @@ ROUNDING = 2.0**-52
 
 
 @njit(cache=True, error_model="numpy")
-def half_turned(qx, qy, qz, qw, ox, oy, oz, h):
+def half_turned(
+    qx: float, qy: float, qz: float, qw: float, ox: float, oy: float, oz: float, h: float
+) -> tuple[float, float, float, float]:
     """The mean attitude: half of the Cayley turn of ω̄ after q."""
     a, b, c = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
     w = math.sqrt(1.0 + a * a + b * b + c * c)
@@ -35,14 +40,18 @@ def half_turned(qx, qy, qz, qw, ox, oy, oz, h):
 
 
 @njit(cache=True, error_model="numpy")
-def cayley_turned(qx, qy, qz, qw, ox, oy, oz, h):
+def cayley_turned(
+    qx: float, qy: float, qz: float, qw: float, ox: float, oy: float, oz: float, h: float
+) -> tuple[float, float, float, float]:
     """The attitude after the whole turn: q ⊗ (½hω̄, 1), normalized."""
     qx, qy, qz, qw = multiply(qx, qy, qz, qw, 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz, 1.0)
     return normalize(qx, qy, qz, qw)
 
 
 @njit(cache=True, error_model="numpy")
-def mean_torque(ox, oy, oz, tx, ty, tz, h):
+def mean_torque(
+    ox: float, oy: float, oz: float, tx: float, ty: float, tz: float, h: float
+) -> tuple[float, float, float]:
     """t − ½h ω̄ × t for a torque (tx, ty, tz) in the axes of the mean attitude."""
     s = math.sqrt(1.0 + 0.25 * h * h * (ox * ox + oy * oy + oz * oz))
     along = -0.25 * h * h / (1.0 + s) * (ox * tx + oy * ty + oz * tz)
@@ -50,18 +59,31 @@ def mean_torque(ox, oy, oz, tx, ty, tz, h):
 
 
 @njit(cache=True, error_model="numpy")
-def gyroscopic_torque(ox, oy, oz, p):
+def gyroscopic_torque(ox: float, oy: float, oz: float, p: np.ndarray) -> tuple[float, float, float]:
     """−ω̄ × Iω̄."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     return (b - c) * oy * oz, (c - a) * oz * ox, (a - b) * ox * oy
 
 
 @njit(cache=True, error_model="numpy")
-def newton_correction(ox, oy, oz, rx, ry, rz, h, p, extra, ax, ay, az):
+def newton_correction(  # noqa: PLR0913
+    ox: float,
+    oy: float,
+    oz: float,
+    rx: float,
+    ry: float,
+    rz: float,
+    h: float,
+    p: np.ndarray,
+    extra: float,
+    ax: float,
+    ay: float,
+    az: float,
+) -> tuple[float, float, float]:
     """δ with J δ = −residual r of 2I(ω̄ − ω) − h(...) = 0.
 
-    J = 2I + h([ω̄]× I − [Iω̄]× + c) + ``extra`` (|a|² 1 − a aᵀ): gyroscopic term and damping exactly (its torque is −c ω̄ in the
-    axes of the start too), a string at arm a as a spring.
+    J = 2I + h([ω̄]× I − [Iω̄]× + c) + ``extra`` (|a|² 1 − a aᵀ): gyroscopic term and damping exactly (its torque is −c
+    ω̄ in the axes of the start too), a string at arm a as a spring.
     """
     damping = h * p[DAMPING_ANGULAR]
     A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]

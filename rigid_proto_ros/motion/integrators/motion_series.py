@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: MIT
 """Power series of the motion under any loads the simulation knows, a string included.
 
-All of the equations of motion are made of products, quotients and one square root, so every coefficient follows from those
-before it by Cauchy products: q' = ½ q ⊗ ω, R from the products of q, the knot's a = d + R r, its distance l from l² = a·a, its
-direction n from n l = a, the tension T = k(l − rest) + c l', the force −T n and its torque r × RᵀF. Source: Jorba and Zou,
-Experimental Mathematics 14 (2005) 99, section 2; Moore, Methods and Applications of Interval Analysis (1979), chapter 3.
+All of the equations of motion are made of products, quotients and one square root, so every coefficient follows from
+those before it by Cauchy products: q' = ½ q ⊗ ω, R from the products of q, the knot's a = d + R r, its distance l from
+l² = a·a, its direction n from n l = a, the tension T = k(l − rest) + c l', the force −T n and its torque r × RᵀF.
+Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 2; Moore, Methods and Applications of Interval
+Analysis (1979), chapter 3.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...base.compilation import njit
-from ...base.simd import arranged, component, filled, joined, load, number, store
+from ...base.simd import Vector, arranged, component, filled, joined, load, number, store
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
@@ -40,26 +43,27 @@ from .knot import knot_and_stretch, moved_pair, unit_attitude
 # Columns of the coefficient array c (degree + 2, COLUMNS); the first 15 are the variables of motion/variables.py.
 _Q, _W, _D, _U, _WORK, _HEAT, _R, A_KNOT, _N, _L, _T, _F, _STRETCH = 0, 4, 7, 10, 13, 14, 15, 24, 27, 30, 31, 32, 35
 DISTANCE, TENSION, STRETCH = _L, _T, _STRETCH
-# What products take, four numbers and more at once: as in taylor.py, then R's rows, (a, l) and n, each with a fourth number.
+# What products take, four numbers and more at once: as in taylor.py, then R's rows, (a, l) and n, each with a fourth
+# number.
 _LEFT, _RIGHT, _ROWS, _SPAN, _ALONG = 40, 56, 72, 84, 88
 COLUMNS = 96
 
 
 @njit(cache=True, error_model="numpy")
-def _four(c, at):
+def _four(c: np.ndarray, at: int) -> Vector:
     """Four times the number ``at`` of c."""
     x = load(c, at, filled(0.0, 1))
     return joined(x, x, x, x)
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(v):
+def _spread(v: Vector) -> tuple[Vector, Vector, Vector]:
     x, y, z = component(v, 0), component(v, 1), component(v, 2)
     return joined(x, x, x, x), joined(y, y, y, y), joined(z, z, z, z)
 
 
 @njit(cache=True, error_model="numpy")
-def _rotation(c, k, xs, ys, zs):
+def _rotation(c: np.ndarray, k: int, xs: Vector, ys: Vector, zs: Vector) -> Vector:
     """Coefficient k of R from the products x q, y q and z q."""
     xx, xy, xz, xw = number(xs, 0), number(xs, 1), number(xs, 2), number(xs, 3)
     yy, yz, yw = number(ys, 1), number(ys, 2), number(ys, 3)
@@ -78,13 +82,13 @@ def _rotation(c, k, xs, ys, zs):
 
 
 @njit(cache=True, error_model="numpy")
-def _vector(a, b, c, d):
+def _vector(a: float, b: float, c: float, d: float) -> Vector:
     """Four numbers side by side. What was stored one by one and is loaded together has to wait until it is written."""
     return joined(filled(a, 1), filled(b, 1), filled(c, 1), filled(d, 1))
 
 
 @njit(cache=True, error_model="numpy")
-def _keep(c, k, q, w):
+def _keep(c: np.ndarray, k: int, q: Vector, w: Vector) -> None:
     """Coefficient k of q and ω, and what the products of q' and ω' take of it."""
     at = k * COLUMNS
     store(c, at + _Q, q)
@@ -96,7 +100,7 @@ def _keep(c, k, q, w):
 
 
 @njit(cache=True, error_model="numpy")
-def _knot(c, p, k):
+def _knot(c: np.ndarray, p: np.ndarray, k: int) -> None:
     """Coefficient k > 0 of the vector from free end to knot."""
     r = ATTACH
     for j in range(3):
@@ -105,12 +109,12 @@ def _knot(c, p, k):
 
 
 @njit(cache=True, error_model="numpy")
-def _span(c, k):
+def _span(c: np.ndarray, k: int) -> None:
     store(c, k * COLUMNS + _SPAN, _vector(c[k, 24], c[k, 25], c[k, 26], c[k, _L]))
 
 
 @njit(cache=True, error_model="numpy")
-def _length(c, k, squares, inverse):
+def _length(c: np.ndarray, k: int, squares: Vector, inverse: float) -> Vector:
     """Coefficient k > 0 of the knot's distance from the free end; squares: products of (a, l) without the first
     and the last; inverse: 1/l now."""
     ends = c[0, 24] * c[k, 24] + c[0, 25] * c[k, 25] + c[0, 26] * c[k, 26]
@@ -120,7 +124,7 @@ def _length(c, k, squares, inverse):
 
 
 @njit(cache=True, error_model="numpy")
-def distance_series(c, degree):
+def distance_series(c: np.ndarray, degree: int) -> None:
     """Fill in the knot's distance for a string that doesn't pull, whose motion needs it not."""
     for k in range(1, degree + 1):
         squares = filled(0.0, 4)
@@ -133,7 +137,7 @@ def distance_series(c, degree):
 
 
 @njit(cache=True, error_model="numpy")
-def _pull_to_the_end(c, p, k):
+def _pull_to_the_end(c: np.ndarray, p: np.ndarray, k: int) -> float:
     """Coefficient k of the force on the knot by a string without length, from a up to k + 1; and of the heat's rate."""
     stiffness, damping = p[STIFFNESS], p[STRING_DAMPING]
     heat = 0.0
@@ -146,8 +150,10 @@ def _pull_to_the_end(c, p, k):
 
 
 @njit(cache=True, error_model="numpy")
-def _pull(c, p, k, along, pull, heat, inverse):
-    """The same for a string with a length, from a and l up to k + 1 and from sums of older products: l n, T n and l'²."""
+def _pull(c: np.ndarray, p: np.ndarray, k: int, along: Vector, pull: Vector, heat: float, inverse: float) -> float:
+    """The same for a string with a length, from a and l up to k + 1 and from sums of older products: l n,
+    T n and l'².
+    """
     damping = p[STRING_DAMPING]
     at = k * COLUMNS
     if k > 0:
@@ -165,7 +171,7 @@ def _pull(c, p, k, along, pull, heat, inverse):
 
 
 @njit(cache=True, error_model="numpy")
-def _back(c, i, j):
+def _back(c: np.ndarray, i: int, j: int) -> Vector:
     """A product's share in Rᵀ F: R from the row that begins at i, F from that at j."""
     at = i + _ROWS
     x, y, z = load(c, at, filled(0.0, 4)), load(c, at + 4, filled(0.0, 4)), load(c, at + 8, filled(0.0, 4))
@@ -173,7 +179,7 @@ def _back(c, i, j):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_series(y, p, degree, taut, c):
+def motion_series(y: np.ndarray, p: np.ndarray, degree: int, taut: bool, c: np.ndarray) -> None:
     """Fill c with the coefficients of the motion from variables y up to ``degree``; taut: the string's law."""
     i1, i2, i3 = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     gyro, cw, cv, mass = p[GYROSCOPIC], p[DAMPING_ANGULAR], p[DAMPING_LINEAR], p[MASS]
@@ -270,7 +276,7 @@ def motion_series(y, p, degree, taut, c):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_at(c, p, degree, h, y):
+def motion_at(c: np.ndarray, p: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
     """Take the variables y, those that c is the series of, h seconds on; summed from the smallest term (Horner)."""
     columns = 15 if p[HAS_STRING] != 0.0 else 13 if p[TRANSLATES] != 0.0 else 7
     at = degree * COLUMNS
@@ -293,7 +299,7 @@ def motion_at(c, p, degree, h, y):
 
 
 @njit(cache=True, error_model="numpy")
-def stretch_at(c, p, degree, h):
+def stretch_at(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> tuple[float, float]:
     """x = l − rest length, and its rate, h seconds on."""
     a, b = filled(0.0, 4), filled(0.0, 4)
     at = degree * COLUMNS + A_KNOT

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """One step of Radau IIA with five stages: order 9, implicit, L-stable and stiffly accurate, on the rotation group.
 
-The unknowns are the velocities V = (ω, u) at the stages; displacements follow from them by the same quadrature, dᵢ = d + h Σ aᵢⱼ uⱼ,
-and attitudes by the rotation vector θ of q ⊗ exp θ, θᵢ = h Σ aᵢⱼ g(θⱼ, ωⱼ), g = ω + ½ θ × ω + κ θ × (θ × ω). Newton's iteration uses the
-exact derivatives at every stage: with a frozen one it would stall where a stiff string turns. A turn ξ of stage j in world axes obeys ξ' = δW with
-W = R ω, so the unknown changes are those of W and u, and turns and displacements are hA times them.
+The unknowns are the velocities V = (ω, u) at the stages; displacements follow from them by the same quadrature, dᵢ = d
++ h Σ aᵢⱼ uⱼ, and attitudes by the rotation vector θ of q ⊗ exp θ, θᵢ = h Σ aᵢⱼ g(θⱼ, ωⱼ), g = ω + ½ θ × ω + κ θ × (θ ×
+ω). Newton's iteration uses the exact derivatives at every stage: with a frozen one it would stall where a stiff string
+turns. A turn ξ of stage j in world axes obeys ξ' = δW with W = R ω, so the unknown changes are those of W and u, and
+turns and displacements are hA times them.
 
-Source: Hairer and Wanner, Solving Ordinary Differential Equations II (1996), sections IV.5 and IV.8; θ' from Munthe-Kaas, BIT 38 (1998) 92.
+Source: Hairer and Wanner, Solving Ordinary Differential Equations II (1996), sections IV.5 and IV.8; θ' from
+Munthe-Kaas, BIT 38 (1998) 92.
 """
 
 from __future__ import annotations
@@ -47,7 +49,9 @@ NODES = (0.05710419611451768, 0.27684301363812383, 0.5835904323689168, 0.8602401
 
 
 def _lagrange(j: int) -> list[Fraction]:
-    """Coefficients, constant first, of the polynomial that is 1 at node j and 0 at the others: exact for the nodes as doubles."""
+    """Coefficients, constant first, of the polynomial that is 1 at node j and 0 at the others: exact for
+    the nodes as doubles.
+    """
     c = [Fraction(x) for x in NODES]
     poly = [Fraction(1)]
     for i in range(STAGES):
@@ -84,7 +88,7 @@ _N = 6
 
 
 @njit(cache=True, error_model="numpy")
-def _rates_of_turn(tx, ty, tz, wx, wy, wz):
+def _rates_of_turn(tx: float, ty: float, tz: float, wx: float, wy: float, wz: float) -> tuple[float, float, float]:
     """θ' = ω + ½ θ × ω + κ θ × (θ × ω) with κ = (1 − ½θ cot ½θ)/θ²."""
     x = tx * tx + ty * ty + tz * tz
     if x < 0.25:
@@ -104,8 +108,10 @@ def _rates_of_turn(tx, ty, tz, wx, wy, wz):
 
 
 @njit(cache=True, error_model="numpy")
-def _turns(V, h, theta, rates):
-    """Rotation vectors theta (5, 3) of the stages from their spins V[:, :3], from the guess there; whether they were found."""
+def _turns(V: np.ndarray, h: float, theta: np.ndarray, rates: np.ndarray) -> bool:
+    """Rotation vectors theta (5, 3) of the stages from their spins V[:, :3], from the guess there;
+    whether they were found.
+    """
     for _ in range(_MOST_SWEEPS):
         for j in range(STAGES):
             rates[j, 0], rates[j, 1], rates[j, 2] = _rates_of_turn(
@@ -129,7 +135,7 @@ def _turns(V, h, theta, rates):
 
 
 @njit(cache=True, error_model="numpy")
-def _half_turn(tx, ty, tz):
+def _half_turn(tx: float, ty: float, tz: float) -> tuple[float, float, float, float]:
     """exp θ as quaternion, its scalar part less 1 without cancellation."""
     angle = math.sqrt(tx * tx + ty * ty + tz * tz)
     s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
@@ -138,7 +144,7 @@ def _half_turn(tx, ty, tz):
 
 
 @njit(cache=True, error_model="numpy")
-def _cross_into(M, scale, x, y, z, row, column):
+def _cross_into(M: np.ndarray, scale: float, x: float, y: float, z: float, row: int, column: int) -> None:
     """Add scale [v]× to the 3 × 3 block of M at row, column."""
     M[row, column + 1] -= scale * z
     M[row, column + 2] += scale * y
@@ -149,8 +155,20 @@ def _cross_into(M, scale, x, y, z, row, column):
 
 
 @njit(cache=True, error_model="numpy")
-def _derivatives(q, w, d, u, p, taut, R, Jv, Jx, K):
-    """Derivatives (6, 6) of (ω' in principal axes, u') by velocities (W, u) and by turn and displacement (ξ, d), all in world axes.
+def _derivatives(  # noqa: PLR0913
+    q: np.ndarray,
+    w: np.ndarray,
+    d: np.ndarray,
+    u: np.ndarray,
+    p: np.ndarray,
+    taut: bool,
+    R: np.ndarray,
+    Jv: np.ndarray,
+    Jx: np.ndarray,
+    K: np.ndarray,
+) -> None:
+    """Derivatives (6, 6) of (ω' in principal axes, u') by velocities (W, u) and by turn and displacement (ξ, d), all in
+    world axes.
 
     R (3, 3) is filled with the attitude's matrix; K (2, 3, 3) is scratch.
     """
@@ -206,7 +224,18 @@ def _derivatives(q, w, d, u, p, taut, R, Jv, Jx, K):
 
 
 @njit(cache=True, error_model="numpy")
-def _string_derivatives(q, w, d, u, p, taut, R, Jv, Jx, K):
+def _string_derivatives(  # noqa: PLR0913
+    q: np.ndarray,
+    w: np.ndarray,
+    d: np.ndarray,
+    u: np.ndarray,
+    p: np.ndarray,
+    taut: bool,
+    R: np.ndarray,
+    Jv: np.ndarray,
+    Jx: np.ndarray,
+    K: np.ndarray,
+) -> None:
     """Add the string's part, its torque not yet divided by the moments: δF = K₀ δa' + K₁ δa with δa = δd + ξ × ρ and
     δa' = δu + δW × ρ + ξ × (W × ρ), torque Rᵀ(ρ × (δF − ξ × F))."""
     k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
@@ -268,7 +297,7 @@ def _string_derivatives(q, w, d, u, p, taut, R, Jv, Jx, K):
 
 
 @njit(cache=True, error_model="numpy")
-def _solve(M, x, size):
+def _solve(M: np.ndarray, x: np.ndarray, size: int) -> bool:
     """Solve M z = x in place, by elimination with the largest pivot of each column; whether there is a solution."""
     for k in range(size):
         pivot, largest = k, abs(M[k, k])
@@ -297,7 +326,7 @@ def _solve(M, x, size):
 
 
 @njit(cache=True, error_model="numpy")
-def radau_step(y, p, h, taut, V, out):
+def radau_step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.ndarray, out: np.ndarray) -> int:
     """One step of h seconds from y into out (STORED,). V (5, 6): velocities at the stages, a guess, then the solution.
 
     Returns how often the equations of motion were evaluated, 0 when no solution was found: the step is too long then.
@@ -359,7 +388,8 @@ def radau_step(y, p, h, taut, V, out):
         if not _solve(M, x, size):
             return 0
         change = 0.0
-        # Changes are measured as errors are (error_measure.scales): a speed that a medium stops is beside the spin's but rounding.
+        # Changes are measured as errors are (error_measure.scales): a speed that a medium stops is beside the spin's
+        # but rounding.
         spin, speed = max(spin, 1.0), max(speed, p[LENGTH])
         for i in range(STAGES):
             for a in range(3):
@@ -409,13 +439,15 @@ def radau_step(y, p, h, taut, V, out):
 
 
 @njit(cache=True, error_model="numpy")
-def stage_rates(V, h, rates):
-    """Rates (5, 3) of the rotation vector at the stages of a step of h seconds with velocities V there, for ``within``."""
+def stage_rates(V: np.ndarray, h: float, rates: np.ndarray) -> None:
+    """Rates (5, 3) of the rotation vector at the stages of a step of h seconds with velocities V there,
+    for ``within``.
+    """
     _turns(V, h, np.zeros((STAGES, 3)), rates)
 
 
 @njit(cache=True, error_model="numpy")
-def within(y, h, V, rates, s, out):
+def within(y: np.ndarray, h: float, V: np.ndarray, rates: np.ndarray, s: float, out: np.ndarray) -> None:
     """Variables at the part s of a step of h seconds from y, by its own polynomials, into out: order 5, at its end 9.
 
     V (5, 6): velocities at the stages; rates: ``stage_rates``. Work and heat are left out.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Classical Runge-Kutta of order 4 on the quaternion, normalized after each step.
 
-Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1; Euler's equations with
-the gyroscopic term, Goldstein, Classical Mechanics (2002), section 5.5. Order 4, 4 evaluations a step. Explicit: it loses
-accuracy as |ω|h nears 1 and diverges beyond about 2.8. Not conservative: energy drifts with h⁵ per step.
+Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1; Euler's equations
+with the gyroscopic term, Goldstein, Classical Mechanics (2002), section 5.5. Order 4, 4 evaluations a step. Explicit:
+it loses accuracy as |ω|h nears 1 and diverges beyond about 2.8. Not conservative: energy drifts with h⁵ per step.
 """
 
 from __future__ import annotations
@@ -39,8 +39,25 @@ TABLEAU = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 
 WEIGHTS = np.array([1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0])
 
 
+_Seven = tuple[float, float, float, float, float, float, float]
+_Ten = tuple[float, float, float, float, float, float, float, float, float, float]
+
+
 @njit(cache=True, error_model="numpy")
-def _rates(qx, qy, qz, qw, wx, wy, wz, ux, uy, uz, p, translate):
+def _rates(  # noqa: PLR0913
+    qx: float,
+    qy: float,
+    qz: float,
+    qw: float,
+    wx: float,
+    wy: float,
+    wz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    p: np.ndarray,
+    translate: bool,
+) -> _Ten:
     """Time derivatives of q, ω and the added velocity u."""
     nx, ny, nz, nw = qx, qy, qz, qw
     if translate or p[HAS_WORLD_TORQUE] != 0.0:
@@ -59,7 +76,7 @@ def _rates(qx, qy, qz, qw, wx, wy, wz, ux, uy, uz, p, translate):
 
 
 @njit(cache=True, error_model="numpy")
-def _sum(y, k, c):
+def _sum(y: _Ten, k: _Ten, c: float) -> _Ten:
     """y + c k over q, ω and u."""
     return (
         y[0] + c * k[0],
@@ -76,14 +93,14 @@ def _sum(y, k, c):
 
 
 @njit(cache=True, error_model="numpy")
-def rk4_steps(y, p, h, n):
+def rk4_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     if p[TRANSLATES] == 0.0 and p[HAS_WORLD_TORQUE] == 0.0:
         return _turning_steps(y, p, h, n)
     translate = p[TRANSLATES] != 0.0
     half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
     # Variables stay out of the array, so that what p holds is read once and not in every step.
-    u0 = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12])
+    u0: _Ten = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12])
     dx, dy, dz = y[7], y[8], y[9]
     good = n
     for done in range(n):
@@ -114,7 +131,7 @@ def rk4_steps(y, p, h, n):
 
 
 @njit(cache=True, error_model="numpy")
-def _turn(qx, qy, qz, qw, wx, wy, wz, k):
+def _turn(qx: float, qy: float, qz: float, qw: float, wx: float, wy: float, wz: float, k: tuple[float, ...]) -> _Seven:
     """Rates of q and ω where the load turns along; k: τ/I (3,), c_ω/I (3,) and the gyroscopic factors (3,)."""
     tx, ty, tz, cx, cy, cz, gx, gy, gz = k
     return (
@@ -129,7 +146,7 @@ def _turn(qx, qy, qz, qw, wx, wy, wz, k):
 
 
 @njit(cache=True, error_model="numpy")
-def _moved(u, k, c):
+def _moved(u: _Seven, k: _Seven, c: float) -> _Seven:
     """u + c k over q and ω."""
     return (
         u[0] + c * k[0],
@@ -143,7 +160,7 @@ def _moved(u, k, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _turning_steps(y, p, h, n):
+def _turning_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same where translation is closed form and no load hangs on the attitude: a fifth of the time."""
     a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
     T, g, d = TORQUE_BODY, p[GYROSCOPIC], p[DAMPING_ANGULAR]
@@ -153,7 +170,7 @@ def _turning_steps(y, p, h, n):
         *(g * (b - c) / a, g * (c - a) / b, g * (a - b) / c),
     )
     half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
-    u0 = (y[0], y[1], y[2], y[3], y[4], y[5], y[6])
+    u0: _Seven = (y[0], y[1], y[2], y[3], y[4], y[5], y[6])
     good = n
     for done in range(n):
         k1 = _turn(*u0, k)
@@ -172,7 +189,7 @@ def _turning_steps(y, p, h, n):
 
 
 @njit(cache=True, error_model="numpy")
-def rk4_string_steps(y, p, h, n):
+def rk4_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same by the tableau, each step cut where the string turns slack or taut."""
     k, z, new, trial = np.zeros((4, 15)), np.empty(15), y.copy(), y.copy()
     search = slack.new_search()

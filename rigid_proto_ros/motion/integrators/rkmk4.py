@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """rkmk4: Runge-Kutta-Munthe-Kaas of order 4 on the rotation group, the attitude by the exponential map.
 
-Order 4, four evaluations a step. Source: Munthe-Kaas, BIT 38 (1998) 92; Iserles, Munthe-Kaas, Nørsett and Zanna, Acta Numerica 9
-(2000) 215. With R = R₀ exp(σ), σ' = ω + ½ σ × ω + 1/12 σ × (σ × ω) to the order needed. Unlike rk4 it keeps the unit length of
-the attitude by construction; energy still drifts with h⁵ per step.
+Order 4, four evaluations a step. Source: Munthe-Kaas, BIT 38 (1998) 92; Iserles, Munthe-Kaas, Nørsett and Zanna, Acta
+Numerica 9 (2000) 215. With R = R₀ exp(σ), σ' = ω + ½ σ × ω + 1/12 σ × (σ × ω) to the order needed. Unlike rk4 it keeps
+the unit length of the attitude by construction; energy still drifts with h⁵ per step.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize
@@ -19,7 +21,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def _stage(y, p, h, taut, k):
+def _stage(y: np.ndarray, p: np.ndarray, h: float, taut: bool, k: tuple[float, ...]) -> tuple[float, ...]:
     """Rates (14) of σ, ω, d, u, work and heat at the variables that the rates k lead to in h seconds."""
     sx, sy, sz = h * k[0], h * k[1], h * k[2]
     rx, ry, rz, rw = exponential(sx, sy, sz)
@@ -36,7 +38,7 @@ def _stage(y, p, h, taut, k):
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y, p, h, taut, out):
+def _step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, out: np.ndarray) -> None:
     """One step of h seconds from y into out, the string's law given."""
     k1 = _stage(y, p, 0.0, taut, (0.0,) * 14)
     k2 = _stage(y, p, 0.5 * h, taut, k1)
@@ -54,7 +56,7 @@ def _step(y, p, h, taut, out):
 
 
 @njit(cache=True, error_model="numpy")
-def rkmk4_steps(y, p, h, n):
+def rkmk4_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
     for done in range(n):
@@ -66,7 +68,7 @@ def rkmk4_steps(y, p, h, n):
 
 
 @njit(cache=True, error_model="numpy")
-def rkmk4_string_steps(y, p, h, n):
+def rkmk4_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
     new, trial = y.copy(), y.copy()
     search = slack.new_search()

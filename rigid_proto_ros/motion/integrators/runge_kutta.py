@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...base.compilation import njit
 from ...base.rotation import normalize
 from ..problem import HAS_STRING, HAS_WORLD_TORQUE, TRANSLATES
@@ -18,15 +20,17 @@ from .integrator import MAX_SPEED
 
 
 @njit(cache=True, error_model="numpy")
-def integrated(p):
-    """How many of the variables change: attitude and spin; with added motion also that; with a string also its energies."""
+def integrated(p: np.ndarray) -> int:
+    """How many of the variables change: attitude and spin; with added motion also that; with a string
+    also its energies.
+    """
     if p[HAS_STRING] != 0.0:
         return VARIABLES
     return 13 if p[TRANSLATES] != 0.0 else 7
 
 
 @njit(cache=True, error_model="numpy")
-def rates(z, p, taut, k):
+def rates(z: np.ndarray, p: np.ndarray, taut: bool, k: np.ndarray) -> None:
     """Time derivatives k of variables z, both (15,)."""
     qx, qy, qz, qw = z[0], z[1], z[2], z[3]
     wx, wy, wz = z[4], z[5], z[6]
@@ -43,7 +47,9 @@ def rates(z, p, taut, k):
 
 
 @njit(cache=True, error_model="numpy")
-def stages(y, p, h, taut, A, count, k, z):
+def stages(
+    y: np.ndarray, p: np.ndarray, h: float, taut: bool, A: np.ndarray, count: int, k: np.ndarray, z: np.ndarray
+) -> None:
     """Fill the stage derivatives k (count, 15); k[0] must hold the rates at y. z (15,) is scratch."""
     size = integrated(p)
     for i in range(1, count):
@@ -60,7 +66,7 @@ def stages(y, p, h, taut, A, count, k, z):
 
 
 @njit(cache=True, error_model="numpy")
-def advance(y, p, h, B, count, k, out):
+def advance(y: np.ndarray, p: np.ndarray, h: float, B: np.ndarray, count: int, k: np.ndarray, out: np.ndarray) -> None:
     """The new variables from the stages: out = y + h Σ bᵢ kᵢ with a unit quaternion."""
     size = integrated(p)
     for j in range(size):
@@ -74,7 +80,7 @@ def advance(y, p, h, B, count, k, out):
 
 
 @njit(cache=True, error_model="numpy")
-def is_good(y):
+def is_good(y: np.ndarray) -> bool:
     """Finite and no runaway."""
     size = 0.0
     for j in range(4, 13):

@@ -2,11 +2,13 @@
 """semi_implicit_euler: velocities first, then positions with the new velocities, as game engines step.
 
 Order 1, one evaluation a step; the attitude moves by the exponential map. Source: Hairer, Lubich and Wanner, Geometric
-Numerical Integration (2006), section I.1 (symplectic Euler). Symplectic only where velocities do not act on velocities: the
-gyroscopic term is taken explicitly, so a spinning body gains energy.
+Numerical Integration (2006), section I.1 (symplectic Euler). Symplectic only where velocities do not act on velocities:
+the gyroscopic term is taken explicitly, so a spinning body gains energy.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize
@@ -19,7 +21,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y, p, h, taut, out):
+def _step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, out: np.ndarray) -> None:
     """One step of h seconds from y into out, the string's law given."""
     qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     ex, ey, ez, ax, ay, az, work, heat = accelerations(
@@ -36,7 +38,7 @@ def _step(y, p, h, taut, out):
 
 
 @njit(cache=True, error_model="numpy")
-def semi_implicit_euler_steps(y, p, h, n):
+def semi_implicit_euler_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
     for done in range(n):
@@ -48,7 +50,7 @@ def semi_implicit_euler_steps(y, p, h, n):
 
 
 @njit(cache=True, error_model="numpy")
-def semi_implicit_euler_string_steps(y, p, h, n):
+def semi_implicit_euler_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
     new, trial = y.copy(), y.copy()
     search = slack.new_search()
@@ -70,7 +72,8 @@ SEMI_IMPLICIT_EULER = Integrator(
     order=1,
     evaluations=1,
     source="Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), section I.1",
-    limits="First order; a string stays bounded up to ω_s h of about 2, a spinning body gains energy beyond |ω|h of 0.1.",
+    limits="First order; a string stays bounded up to ω_s h of about 2, "
+    "a spinning body gains energy beyond |ω|h of 0.1.",
     stability_limit=0.1,
     carries=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=semi_implicit_euler_steps,

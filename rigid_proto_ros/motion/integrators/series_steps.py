@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Steps by the power series of the whole motion, as long as the accuracy allows, with slack and taut found on the series.
+"""Steps by the power series of the whole motion, as long as the accuracy allows, with slack and taut found on the
+series.
 
-The length of a step is read off the coefficients (integrators/taylor_adaptive.py), so none is rejected. Where a pull-only string
-turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law, begun. A step is laid out at
-its full length first: a series from its start, and where the law changes within it a last one from that time on. It ends at
-a whole nanosecond, so that times of commands stay integers. Committing it and looking within it evaluate those same series.
+The length of a step is read off the coefficients (integrators/taylor_adaptive.py), so none is rejected. Where a
+pull-only string turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law,
+begun. A step is laid out at its full length first: a series from its start, and where the law changes within it a last
+one from that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and looking
+within it evaluate those same series.
 """
 
 from __future__ import annotations
@@ -32,16 +34,21 @@ from .string_law import PULLS, SHORTENS, is_one_sided, law_of, next_law
 from .taylor_adaptive import PART, step_length
 
 PART_ON_A_STRING = 0.1
-"""The same as taylor_adaptive.PART for a string, whose coefficients fall less evenly: the nearer the knot to its free end, the
-nearer the poles."""
+"""The same as taylor_adaptive.PART for a string, whose coefficients fall less evenly: the nearer the knot to its free
+end, the nearer the poles.
+"""
 
 _MAX_PARTS = 200
-"""In one step, all but the first and last within one nanosecond; more is chatter, and the rest of the step is taken with one law."""
+"""In one step, all but the first and last within one nanosecond; more is chatter, and the rest of the
+step is taken with one law.
+"""
 
 
 @njit(cache=True, error_model="numpy")
-def rows(degree):
-    """Of a workspace: coefficients from the step's start, those of its last series, and the variables that one starts from."""
+def rows(degree: int) -> int:
+    """Of a workspace: coefficients from the step's start, those of its last series, and the variables
+    that one starts from.
+    """
     return 2 * (degree + 2) + 1
 
 
@@ -51,7 +58,7 @@ def workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def growth_of(c, degree, weights):
+def growth_of(c: np.ndarray, degree: int, weights: tuple[float, float, float, float]) -> float:
     """σ from the last three coefficients: the largest k-th root of their measure."""
     attitude, spin, place, speed = weights
     growth = 0.0
@@ -63,8 +70,12 @@ def growth_of(c, degree, weights):
 
 
 @njit(cache=True, error_model="numpy")
-def _lay_out(y, p, control, weights, c):
-    """Series of one step from y into c and control; returns its length [ns], 0 when there is none. weights: of errors."""
+def _lay_out(
+    y: np.ndarray, p: np.ndarray, control: np.ndarray, weights: tuple[float, float, float, float], c: np.ndarray
+) -> int:
+    """Series of one step from y into c and control; returns its length [ns], 0 when there is none.
+    weights: of errors.
+    """
     degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
     part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
@@ -80,7 +91,8 @@ def _lay_out(y, p, control, weights, c):
             control[ctl.PENDING] += 1.0
         control[ctl.SERIES] = 1.0
         parts += 1
-        # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much better.
+        # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much
+        # better.
         allowance = part if law == PULLS else part / (1.0 + jerk_of_place)
         h = step_length(growth_of(series, degree, weights), accuracy, degree, allowance)
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
@@ -107,7 +119,7 @@ def _lay_out(y, p, control, weights, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _reach(y, p, control, c, time_ns, out):
+def _reach(y: np.ndarray, p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
     """The variables ``time_ns`` into the step that is laid out from y."""
     degree, t = int(control[ctl.DEGREE]), time_ns * 1e-9
     if t <= control[ctl.SWITCH]:
@@ -119,7 +131,7 @@ def _reach(y, p, control, c, time_ns, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _move(c, p, degree, h, law, out):
+def _move(c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, out: np.ndarray) -> None:
     motion_at(c, p, degree, h, out)
     if law == SHORTENS:
         # Stretched but not pulling: the damper takes what is left of ½ k x².
@@ -128,7 +140,7 @@ def _move(c, p, degree, h, law, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _accept(y, p, control, following, c):
+def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray) -> bool:
     """Lay out the next step and take it into ``following``; returns whether there is one."""
     elapsed = control[ctl.ELAPSED_NS]
     weights = scales(y, p, elapsed * 1e-9)
@@ -150,8 +162,11 @@ def _accept(y, p, control, following, c):
 
 
 @njit(cache=True, error_model="numpy")
-def steps(y, p, control, following, c, span_ns, look):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
+def steps(
+    y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray, span_ns: int, look: bool
+) -> int:
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c:
+    workspace.
 
     look: go span_ns into the step that waits instead, which is longer; returns 0 if that failed.
     """

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Where a pull-only string turns slack or taut inside a step, located in double precision.
 
-The law of tension has a kink (a jump, with a damper) where min(k x, k x + c x') changes sign, and a step across it loses its
-order. So a step is cut there. An integrator asks in turn: ``begin`` says with which law and how long to step, the integrator
-takes that trial step, ``judge`` accepts it or asks for another. The root is bracketed and found by regula falsi (Illinois
-variant: Dowell and Jarratt, BIT 11, 1971). Which spell is the first is told beforehand, by the first time (integrators/first_root.py)
-at which |a|² − rest² changes sign on the cubic through the knot's place and velocity at both ends; a trial step to the middle of it
-confirms it.
+The law of tension has a kink (a jump, with a damper) where min(k x, k x + c x') changes sign, and a step across it
+loses its order. So a step is cut there. An integrator asks in turn: ``begin`` says with which law and how long to step,
+the integrator takes that trial step, ``judge`` accepts it or asks for another. The root is bracketed and found by
+regula falsi (Illinois variant: Dowell and Jarratt, BIT 11, 1971). Which spell is the first is told beforehand, by the
+first time (integrators/first_root.py) at which |a|² − rest² changes sign on the cubic through the knot's place and
+velocity at both ends; a trial step to the middle of it confirms it.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ _MAX_SWITCHES = 1000
 
 
 @njit(cache=True, error_model="numpy")
-def new_search():
+def new_search() -> np.ndarray:
     """The search's own numbers, to be kept by the integrator."""
     return np.zeros(_SIZE)
 
 
 @njit(cache=True, error_model="numpy")
-def begin(s, y, p, h):
+def begin(s: np.ndarray, y: np.ndarray, p: np.ndarray, h: float) -> None:
     """Start a step of h seconds from variables y."""
     x, rate = stretch(y, p)
     margin = tension_margin(x, rate, p)
@@ -63,7 +63,7 @@ def begin(s, y, p, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _begin_part(s, x, margin, y, p):
+def _begin_part(s: np.ndarray, x: float, margin: float, y: np.ndarray, p: np.ndarray) -> None:
     s[_PHASE] = _WHOLE
     s[TRIAL] = s[REMAINING]
     s[_X], s[_MARGIN_LOW] = x, margin
@@ -75,8 +75,10 @@ def _begin_part(s, x, margin, y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def judge(s, trial, p):
-    """Whether the trial step is accepted (its heat then completed); s says what is to be done next until nothing remains."""
+def judge(s: np.ndarray, trial: np.ndarray, p: np.ndarray) -> bool:
+    """Whether the trial step is accepted (its heat then completed); s says what is to be done next until
+    nothing remains.
+    """
     x, rate = stretch(trial, p)
     margin = tension_margin(x, rate, p)
     right = (margin > 0.0) == (s[TAUT] != 0.0)
@@ -123,7 +125,7 @@ def judge(s, trial, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _next_trial(s):
+def _next_trial(s: np.ndarray) -> None:
     low, high, resolution = s[_LOW], s[_HIGH], s[_RESOLUTION]
     s[_TRIALS] += 1.0
     if high - low <= 2.0 * resolution:
@@ -142,7 +144,7 @@ def _next_trial(s):
 
 
 @njit(cache=True, error_model="numpy")
-def _accept(s, trial, p, x, margin, switches):
+def _accept(s: np.ndarray, trial: np.ndarray, p: np.ndarray, x: float, margin: float, switches: bool) -> bool:
     if s[TAUT] == 0.0:
         # Stretched but not pulling, because it shortens faster than its damper lets it: the damper takes all of ½ k x².
         before, after = max(s[_X], 0.0), max(x, 0.0)
@@ -161,15 +163,18 @@ def _accept(s, trial, p, x, margin, switches):
 
 
 @njit(cache=True, error_model="numpy")
-def knot_of(y, p):
+def knot_of(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
     """From the free end to the knot, and its rate, at variables y: six numbers."""
     return knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
 
 
 @njit(cache=True, error_model="numpy")
-def first_spell(start, end, h, x0, p, taut):
-    """Middle of the first spell within h seconds, 0 for none, that the string is stretched (slack for a taut one) on the cubic through the
-    knot's place and velocity at both ends (6,), and whether it ends before h. x0: stretch at the start.
+def first_spell(
+    start: np.ndarray, end: tuple[float, ...], h: float, x0: float, p: np.ndarray, taut: bool
+) -> tuple[float, bool]:
+    """Middle of the first spell within h seconds, 0 for none, that the string is stretched (slack for a taut one) on
+    the cubic through the knot's place and velocity at both ends (6,), and whether it ends before h. x0: stretch at the
+    start.
     """
     rest = p[REST_LENGTH]
     if p[BILATERAL] != 0.0 or rest == 0.0 or (x0 > 0.0) != taut:

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""free_body_strang with steps as long as the accuracy allows, for a fast spin under weak loads: up to thousands of turns in one.
+"""free_body_strang with steps as long as the accuracy allows, for a fast spin under weak loads: up to thousands of
+turns in one.
 
-Where |ω|h is large, half kicks at a step's ends sample the loads at phases that have nothing to do with their mean, and no
-comparison of steps could tell: at other lengths the phases may agree. So the error is bounded beforehand. The loads turn the
-body by at most κ, kicks as well, and what is lost after h is what a change of κh in the spin does in free motion:
+Where |ω|h is large, half kicks at a step's ends sample the loads at phases that have nothing to do with their mean, and
+no comparison of steps could tell: at other lengths the phases may agree. So the error is bounded beforehand. The loads
+turn the body by at most κ, kicks as well, and what is lost after h is what a change of κh in the spin does in free
+motion:
 
     attitude angle and |Δω|/|ω| ≤ (1 + s) κ h²,
 
-where s says how fast free motions from neighbouring spins part: s = 2.5 while they have no time to part exponentially near
-the middle axis, ω_p h ≤ 1, and s = 4 + 0.3/m₁ for any time, with ω_p and m₁ of free_body_step.py: m₁ is 0 on the separatrix.
-Measured over 400 000 random bodies, spins and times, |ω|t from 0.1 to 1e4: at most 2.4, and 4.3, 20, 62, 330 for m₁ down to
-1e-1, 1e-2, 1e-3, 1e-4. Steps of at most 2 rad resolve the turn, and err at most ½ κ h² min(1, |ω|h): measured 0.38 and 0.34.
-A force that turns with the body, g in acceleration, adds at most 2gh to the velocity and gh² to the place.
+where s says how fast free motions from neighbouring spins part: s = 2.5 while they have no time to part exponentially
+near the middle axis, ω_p h ≤ 1, and s = 4 + 0.3/m₁ for any time, with ω_p and m₁ of free_body_step.py: m₁ is 0 on the
+separatrix. Measured over 400 000 random bodies, spins and times, |ω|t from 0.1 to 1e4: at most 2.4, and 4.3, 20, 62,
+330 for m₁ down to 1e-1, 1e-2, 1e-3, 1e-4. Steps of at most 2 rad resolve the turn, and err at most ½ κ h² min(1, |ω|h):
+measured 0.38 and 0.34. A force that turns with the body, g in acceleration, adds at most 2gh to the velocity and gh² to
+the place.
 """
 
 from __future__ import annotations
@@ -50,8 +53,8 @@ RESOLVED = 2.0
 """|ω|h [rad] up to which a step resolves the turn."""
 
 TURN_THAT_PAYS, TURN_THAT_PAYS_IN_WORLD = 2.0, 0.5
-"""|ω|h [rad] from which on steps are cheaper than a Taylor series, of the spin alone or of the whole motion: measured, the
-series cost 0.4 to 2 and 4 to 8 µs a radian, a step 0.5 to 2 µs.
+"""|ω|h [rad] from which on steps are cheaper than a Taylor series, of the spin alone or of the whole motion: measured,
+the series cost 0.4 to 2 and 4 to 8 µs a radian, a step 0.5 to 2 µs.
 """
 
 ROUNDING = 64.0 * 2.0**-52
@@ -59,7 +62,7 @@ ROUNDING = 64.0 * 2.0**-52
 
 
 @njit(cache=True, error_model="numpy")
-def _length(p, at, count):
+def _length(p: np.ndarray, at: int, count: int) -> float:
     square = 0.0
     for k in range(at, at + count):
         square += p[k] * p[k]
@@ -67,7 +70,7 @@ def _length(p, at, count):
 
 
 @njit(cache=True, error_model="numpy")
-def _strongest(p):
+def _strongest(p: np.ndarray) -> float:
     """κ [rad/s²]: no attitude gives the loads a larger angular acceleration."""
     x, y, z = p[TORQUE_BODY] / p[MOMENTS], p[TORQUE_BODY + 1] / p[MOMENTS + 1], p[TORQUE_BODY + 2] / p[MOMENTS + 2]
     turning = _length(p, TORQUE_WORLD, 3) + math.sqrt(2.0) * _length(p, MOMENT, 9)
@@ -75,7 +78,7 @@ def _strongest(p):
 
 
 @njit(cache=True, error_model="numpy")
-def step_length(y, p, accuracy):
+def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
     """The longest step [s] whose error is bounded by the accuracy times itself."""
     strongest, spin = _strongest(p), _length(y, SPIN, 3)
     h = ctl.LONGEST
@@ -93,7 +96,7 @@ def step_length(y, p, accuracy):
 
 
 @njit(cache=True, error_model="numpy")
-def splitting_pays(p, y, accuracy):
+def splitting_pays(p: np.ndarray, y: np.ndarray, accuracy: float) -> bool:
     """Whether loads are so weak against the spin that steps are cheaper than those of a series."""
     spin = _length(y, SPIN, 3)
     if p[GYROSCOPIC] == 0.0 or p[DAMPING_ANGULAR] != 0.0 or accuracy < ROUNDING * spin:
@@ -106,16 +109,25 @@ def splitting_pays(p, y, accuracy):
     return spin * step_length(y, p, accuracy) >= least
 
 
-def workspace(degree: int) -> np.ndarray:
+def workspace(_degree: int) -> np.ndarray:
     """None is needed; a table of methods wants a shape."""
     return np.empty((1, 1))
 
 
 @njit(cache=True, error_model="numpy")
-def steps(y, p, control, following, room, span_ns, look):
+def steps(
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    following: np.ndarray,
+    _room: np.ndarray,
+    span_ns: int,
+    look: bool,
+) -> int:
     """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays.
 
-    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
+    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
+    failed.
     """
     if look:
         return span_ns if free_body_strang_steps(y, p, span_ns * 1e-9, 1) == 1 else 0

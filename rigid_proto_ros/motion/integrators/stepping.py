@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """How a segment is stepped: fixed steps, one exact step, nothing at all, or steps whose length follows from the error.
 
-All keep the same promise. ``commit`` commits only steps that are functions of the variables they start from; ``reach`` takes
-one shorter step from there on a copy. So neither depends on when anybody asked.
+All keep the same promise. ``commit`` commits only steps that are functions of the variables they start from; ``reach``
+takes one shorter step from there on a copy. So neither depends on when anybody asked.
 """
 
 from __future__ import annotations
@@ -25,17 +25,20 @@ from . import control as ctl
 from .integrator import Integrator
 
 NOTHING, ONE_STEP, FIXED_STEPS, ADAPTIVE = range(4)
-"""Ways to step. ONE_STEP: a single one from the segment's start, however far: for exact maps. NOTHING: the variables stay."""
+"""Ways to step. ONE_STEP: a single one from the segment's start, however far: for exact maps. NOTHING:
+the variables stay.
+"""
 
 
 @dataclass(frozen=True)
 class Method:
     """A way to step, and the kernel that does it.
 
-    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, look), which commits steps, or looks;
-    control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of the equations
-    of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel. sleeps: nothing moves.
-    floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments with a string alone.
+    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, look), which commits steps, or
+    looks; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of
+    the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
+    sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
+    with a string alone.
     """
 
     way: int
@@ -51,7 +54,7 @@ class Method:
 def fixed_steps(integrator: Integrator) -> tuple[Method, ...]:
     """Steps of one length, counted from the segment's start; the second method is for a segment with a string."""
 
-    def choice(p: np.ndarray, step_s: float, accuracy: float) -> str:
+    def choice(_p: np.ndarray, step_s: float, _accuracy: float) -> str:
         return f"{integrator.name}: fixed steps of {step_s:g} s"
 
     without = Method(FIXED_STEPS, integrator.kernel, choice, integrator.evaluations)
@@ -65,7 +68,9 @@ WAY, ADDRESS, EVALUATIONS, SLEEPS, ROWS, COLUMNS, METHOD = range(7)
 
 @functools.lru_cache(maxsize=256)
 def method_table(integrator: Integrator, degree: int) -> np.ndarray:
-    """The integrator's methods as compiled loops read them (n, METHOD); kernels have no address until they are wanted."""
+    """The integrator's methods as compiled loops read them (n, METHOD); kernels have no address until
+    they are wanted.
+    """
     table = np.zeros((len(integrator.methods), METHOD), np.int64)
     for row, method in zip(table, integrator.methods, strict=True):
         rows, columns = method.workspace(degree).shape if method.workspace else (0, 0)
@@ -81,15 +86,24 @@ def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def is_provided(table, number):
+def is_provided(table: np.ndarray, number: int) -> bool:
     """Whether the method's kernel can be called."""
     return table[number, WAY] == NOTHING or table[number, ADDRESS] != 0
 
 
 @njit(cache=True, error_model="numpy")
-def commit(method, y, p, control, following, room, step_ns, span_ns):
-    """Commit steps in y that fit into ``span_ns``; returns how far it came [ns], how many were counted here, and whether
-    all were good. room: for the workspace, of any size that is enough.
+def commit(
+    method: np.ndarray,
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    following: np.ndarray,
+    room: np.ndarray,
+    step_ns: int,
+    span_ns: int,
+) -> tuple[int, int, bool]:
+    """Commit steps in y that fit into ``span_ns``; returns how far it came [ns], how many were counted here, and
+    whether all were good. room: for the workspace, of any size that is enough.
     """
     if method[WAY] == FIXED_STEPS:
         wanted = span_ns // step_ns
@@ -105,7 +119,15 @@ def commit(method, y, p, control, following, room, step_ns, span_ns):
 
 
 @njit(cache=True, error_model="numpy")
-def reach(method, y, p, control, following, room, rest_ns):
+def reach(
+    method: np.ndarray,
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    following: np.ndarray,
+    room: np.ndarray,
+    rest_ns: int,
+) -> bool:
     """One step of ``rest_ns`` in y, a copy; whether it was good."""
     if method[WAY] == NOTHING:
         return True

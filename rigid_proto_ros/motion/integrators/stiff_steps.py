@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Steps where damping is stiff: Radau IIA of order 9 (integrators/radau.py), as long as the accuracy allows.
 
-Damping of rate λ bounds an explicit series to steps of about 1/λ though nothing moves that fast once the first transient has gone. Here a
-step is taken whole and in two halves, the halves are kept, and their difference, which the whole step's error dominates, must stay below the
-accuracy. A step is accepted or rejected at full length; one in which a pull-only string's law ends is shortened to the last whole
-nanosecond before that, and the nanosecond with the switch in it is walked through in parts that may be of any length. While the string
-doesn't pull and no other damping is stiff, the steps are those of the motion's series.
+Damping of rate λ bounds an explicit series to steps of about 1/λ though nothing moves that fast once the first
+transient has gone. Here a step is taken whole and in two halves, the halves are kept, and their difference, which the
+whole step's error dominates, must stay below the accuracy. A step is accepted or rejected at full length; one in which
+a pull-only string's law ends is shortened to the last whole nanosecond before that, and the nanosecond with the switch
+in it is walked through in parts that may be of any length. While the string doesn't pull and no other damping is stiff,
+the steps are those of the motion's series.
 """
 
 from __future__ import annotations
@@ -62,13 +63,17 @@ STIFF_RATE = 2e4
 """/s; slower damping leaves explicit steps of 75 µs and more, so that even they are far faster than the clock."""
 
 STIFF_RATIO = 100.0
-"""Of a damping's rate to those of the motion beside it: the cost of an implicit step over an explicit one's, by their lengths."""
+"""Of a damping's rate to those of the motion beside it: the cost of an implicit step over an explicit
+one's, by their lengths.
+"""
 
 OVERDAMPED = 4.0
 """Of a string's damping rate c/m to its swing √(k/m): twice the damping ratio, 2 being critical."""
 
 SERIES_ROW = STAGE_ROWS = 3 * STAGES + 2
-"""Of the workspace: velocities at the stages of a whole step and of its halves, and variables between; then a series."""
+"""Of the workspace: velocities at the stages of a whole step and of its halves, and variables between;
+then a series.
+"""
 
 _LOOKS = 8
 """At the string's law within half a step."""
@@ -81,11 +86,12 @@ _SHORTEST = 1e-24
 
 
 @njit(cache=True, error_model="numpy")
-def damping_is_stiff(p, y, taut):
-    """Whether some damping of a segment with problem p from variables y on is so much faster than the motion beside it that it, and
-    not the motion, would set the length of explicit steps. taut: the string counts.
+def damping_is_stiff(p: np.ndarray, y: np.ndarray, taut: bool) -> bool:
+    """Whether some damping of a segment with problem p from variables y on is so much faster than the motion beside it
+    that it, and not the motion, would set the length of explicit steps. taut: the string counts.
 
-    An explicit step is about 1.5/λ long; an implicit one is some tenths of a radian of the motion, and costs some hundred times as much.
+    An explicit step is about 1.5/λ long; an implicit one is some tenths of a radian of the motion, and costs some
+    hundred times as much.
     """
     spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
     smallest = p[MOMENTS]
@@ -115,15 +121,26 @@ def damping_is_stiff(p, y, taut):
 
 
 @njit(cache=True, error_model="numpy")
-def _guess(y, V):
+def _guess(y: np.ndarray, V: np.ndarray) -> None:
     for i in range(STAGES):
         for k in range(3):
             V[i, k], V[i, 3 + k] = y[4 + k], y[10 + k]
 
 
 @njit(cache=True, error_model="numpy")
-def _halves(y, p, h, taut, first, second, middle, out):
-    """Two steps of h/2 from y into out, by guesses in first and second (5, 6); evaluations, 0 when there is no solution."""
+def _halves(
+    y: np.ndarray,
+    p: np.ndarray,
+    h: float,
+    taut: bool,
+    first: np.ndarray,
+    second: np.ndarray,
+    middle: np.ndarray,
+    out: np.ndarray,
+) -> int:
+    """Two steps of h/2 from y into out, by guesses in first and second (5, 6); evaluations, 0 when there
+    is no solution.
+    """
     spent = radau_step(y, p, 0.5 * h, taut, first, middle)
     if spent == 0:
         return 0
@@ -132,7 +149,16 @@ def _halves(y, p, h, taut, first, second, middle, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _plain(y, p, h, taut, first, second, middle, out):
+def _plain(
+    y: np.ndarray,
+    p: np.ndarray,
+    h: float,
+    taut: bool,
+    first: np.ndarray,
+    second: np.ndarray,
+    middle: np.ndarray,
+    out: np.ndarray,
+) -> int:
     """``_halves`` without a whole step before them."""
     _guess(y, first)
     spent = radau_step(y, p, 0.5 * h, taut, first, middle)
@@ -144,7 +170,18 @@ def _plain(y, p, h, taut, first, second, middle, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _judged(y, p, h, taut, elapsed, whole, first, second, middle, out):
+def _judged(  # noqa: PLR0913
+    y: np.ndarray,
+    p: np.ndarray,
+    h: float,
+    taut: bool,
+    elapsed: float,
+    whole: np.ndarray,
+    first: np.ndarray,
+    second: np.ndarray,
+    middle: np.ndarray,
+    out: np.ndarray,
+) -> tuple[int, float]:
     """Two halves into out; evaluations and the error estimated, infinite when there is no solution."""
     _guess(y, whole)
     spent = radau_step(y, p, h, taut, whole, out)
@@ -169,7 +206,7 @@ def _judged(y, p, h, taut, elapsed, whole, first, second, middle, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _margin(y, p, taut):
+def _margin(y: np.ndarray, p: np.ndarray, taut: bool) -> tuple[float, float]:
     """What changes its sign where the string's law ends: positive while it pulls; and the stretch."""
     x, rate = stretch(y, p)
     # A string that has just come taut has no stretch but for rounding: only its tension says whether it still pulls.
@@ -177,7 +214,7 @@ def _margin(y, p, taut):
 
 
 @njit(cache=True, error_model="numpy")
-def _switch_in_half(y, p, h, taut, V, at):
+def _switch_in_half(y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.ndarray, at: np.ndarray) -> float:
     """Time in (0, h] at which the law ends along one step's polynomials, NONE for never. at: scratch (STORED,)."""
     rates = np.zeros((STAGES, 3))
     stage_rates(V, h, rates)
@@ -213,7 +250,7 @@ def _switch_in_half(y, p, h, taut, V, at):
 
 
 @njit(cache=True, error_model="numpy")
-def _heat_of_slack(y, p, one_sided, taut, out):
+def _heat_of_slack(y: np.ndarray, p: np.ndarray, one_sided: bool, taut: bool, out: np.ndarray) -> None:
     if one_sided and not taut:
         # Stretched but not pulling: the damper takes what is left of ½ k x² (see slack.py).
         before, after = max(stretch(y, p)[0], 0.0), max(stretch(out, p)[0], 0.0)
@@ -221,9 +258,20 @@ def _heat_of_slack(y, p, one_sided, taut, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _implicit(y, p, control, h, whole_ns, taut, elapsed, room, out):
-    """The longest step of at most h seconds from y into out that the accuracy allows, 0 when none was found, and the time within it at which
-    the string's law ends, or NONE. Leaves in control what the next step may be, and what this one errs above its share.
+def _implicit(  # noqa: PLR0913
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    h: float,
+    whole_ns: int,
+    taut: bool,
+    elapsed: float,
+    room: np.ndarray,
+    out: np.ndarray,
+) -> tuple[float, float]:
+    """The longest step of at most h seconds from y into out that the accuracy allows, 0 when none was found, and the
+    time within it at which the string's law ends, or NONE. Leaves in control what the next step may be, and what this
+    one errs above its share.
 
     whole_ns: of a whole number of nanoseconds.
     """
@@ -261,8 +309,12 @@ def _implicit(y, p, control, h, whole_ns, taut, elapsed, room, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _explicit(y, p, control, h, law, elapsed, c):
-    """Series c of a string that doesn't pull; how far it may be followed, at most h, when the law ends within that, or NONE, and which follows."""
+def _explicit(
+    y: np.ndarray, p: np.ndarray, control: np.ndarray, h: float, law: float, elapsed: float, c: np.ndarray
+) -> tuple[float, float, float]:
+    """Series c of a string that doesn't pull; how far it may be followed, at most h, when the law ends
+    within that, or NONE, and which follows.
+    """
     degree = int(control[ctl.DEGREE])
     weights = scales(y, p, elapsed)
     motion_series(y, p, degree, False, c)
@@ -273,7 +325,9 @@ def _explicit(y, p, control, h, law, elapsed, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _through_nanosecond(y, p, control, span, elapsed, room, out):
+def _through_nanosecond(
+    y: np.ndarray, p: np.ndarray, control: np.ndarray, span: float, elapsed: float, room: np.ndarray, out: np.ndarray
+) -> bool:
     """From y ``span`` seconds on into out, in as many parts as it takes; whether that was possible."""
     one_sided, degree = is_one_sided(p), int(control[ctl.DEGREE])
     law = law_of(y, p)
@@ -307,7 +361,7 @@ def _through_nanosecond(y, p, control, span, elapsed, room, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _accept(y, p, control, room, out):
+def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray, out: np.ndarray) -> float:
     """One step from y into out; its length [ns], 0 when there is none."""
     elapsed = control[ctl.ELAPSED_NS] * 1e-9
     control[ctl.PENDING_EXCESS] = 0.0
@@ -317,7 +371,7 @@ def _accept(y, p, control, room, out):
     if law != PULLS and not damping_is_stiff(p, y, False):
         h, switch, _ = _explicit(y, p, control, ctl.LONGEST, law, elapsed, room[SERIES_ROW:])
         length = math.floor((h if switch == NONE else switch) * 1e9)
-        control[ctl.NEXT] = first_length(y, p)
+        control[ctl.NEXT] = first_length(y)
         if length >= 1.0:
             control[ctl.SERIES] = 1.0
             out[:] = y
@@ -325,7 +379,7 @@ def _accept(y, p, control, room, out):
             _heat_of_slack(y, p, True, False, out)
             return length if is_good(out) else 0.0
     else:
-        h = control[ctl.NEXT] if control[ctl.NEXT] > 0.0 else first_length(y, p)
+        h = control[ctl.NEXT] if control[ctl.NEXT] > 0.0 else first_length(y)
         length = math.floor(h * 1e9)
         while length >= 1.0:
             step, switch = _implicit(y, p, control, length * 1e-9, True, law == PULLS, elapsed, room, out)
@@ -341,7 +395,7 @@ def _accept(y, p, control, room, out):
 
 
 @njit(cache=True, error_model="numpy")
-def first_length(y, p):
+def first_length(y: np.ndarray) -> float:
     """Length of a segment's first trial step [s]: the error decides about those after it."""
     spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
     return 0.01 / max(spin, 1.0)
@@ -353,8 +407,10 @@ def workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def _look(y, p, control, room, span):
-    """Take y ``span`` seconds on, less than the step that waits: one step mostly, but judged as that was; whether it was possible."""
+def _look(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray, span: float) -> bool:
+    """Take y ``span`` seconds on, less than the step that waits: one step mostly, but judged as that was;
+    whether it was possible.
+    """
     law, one_sided, out = control[ctl.LAW], is_one_sided(p), np.empty(STORED)
     if control[ctl.SERIES] != 0.0:
         out[:] = y
@@ -377,10 +433,14 @@ def _look(y, p, control, room, span):
 
 
 @njit(cache=True, error_model="numpy")
-def steps(y, p, control, following, c, span_ns, look):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
+def steps(
+    y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray, span_ns: int, look: bool
+) -> int:
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c:
+    workspace.
 
-    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
+    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
+    failed.
     """
     if look:
         return span_ns if _look(y, p, control, c, span_ns * 1e-9) else 0

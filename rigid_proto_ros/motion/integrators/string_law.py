@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Which law a pull-only string obeys, and the first time at which it changes along a power series of the motion.
 
-It is slack while x = l − rest length ≤ 0; else it pulls while k x + c l' > 0; else it is stretched but shortens faster than its damper
-lets it pull. Each law ends where a polynomial rises above zero, and the first such time is found (integrators/first_root.py):
-slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial however near the knot passes its free end;
-the other two where the tension, or the stretch, changes sign, whose series are at hand.
+It is slack while x = l − rest length ≤ 0; else it pulls while k x + c l' > 0; else it is stretched but shortens faster
+than its damper lets it pull. Each law ends where a polynomial rises above zero, and the first such time is found
+(integrators/first_root.py): slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial however
+near the knot passes its free end; the other two where the tension, or the stretch, changes sign, whose series are at
+hand.
 """
 
 from __future__ import annotations
@@ -37,22 +38,24 @@ SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
 
 _AGREEMENT = 0.03
 _AGREEMENT_SLACK = 1e-3
-"""Times the root of the accuracy, of the tension's terms: by so much the series of the distance may differ from what the motion's
-series give, which converge where it may not. The law changes where the tension is zero, so that a tension of the
-wrong sign counts by its square. Less where the string doesn't pull: there the length of the step knows nothing of it."""
+"""Times the root of the accuracy, of the tension's terms: by so much the series of the distance may differ from what
+the motion's series give, which converge where it may not. The law changes where the tension is zero, so that a tension
+of the wrong sign counts by its square. Less where the string doesn't pull: there the length of the step knows nothing
+of it.
+"""
 
 _NEGLIGIBLE = 1e-19
 """Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
 
 
 @njit(cache=True, error_model="numpy")
-def is_one_sided(p):
+def is_one_sided(p: np.ndarray) -> bool:
     """Whether the string's law may change at all."""
     return p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def law_of(y, p):
+def law_of(y: np.ndarray, p: np.ndarray) -> float:
     """The law at variables y."""
     if not is_one_sided(p):
         return PULLS
@@ -65,8 +68,12 @@ def law_of(y, p):
 
 
 @njit(cache=True, error_model="numpy")
-def next_law(c, p, degree, h, law, accuracy):
-    """When within h seconds the law first changes, NONE for never; the one that follows; and how far of h that is known."""
+def next_law(
+    c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, accuracy: float
+) -> tuple[float, float, float]:
+    """When within h seconds the law first changes, NONE for never; the one that follows; and how far of h
+    that is known.
+    """
     if law == SLACK:
         return _tautens(c, p, degree, h), PULLS, h
     g = np.empty(degree + 1)
@@ -91,7 +98,7 @@ def next_law(c, p, degree, h, law, accuracy):
 
 
 @njit(cache=True, error_model="numpy")
-def _tautens(c, p, degree, h):
+def _tautens(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> float:
     """When |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
     rest = p[REST_LENGTH]
     reach, power, last = c[0, DISTANCE], 1.0, 0
@@ -128,8 +135,10 @@ def _tautens(c, p, degree, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _stops_shortening(c, p, degree, h, g):
-    """At which part of h the string's stretch is gone or it begins to pull, whichever is first, and the law after that."""
+def _stops_shortening(c: np.ndarray, p: np.ndarray, degree: int, h: float, g: np.ndarray) -> tuple[float, float]:
+    """At which part of h the string's stretch is gone or it begins to pull, whichever is first, and the
+    law after that.
+    """
     power = 1.0
     for k in range(1, degree + 1):
         power *= h
@@ -151,7 +160,7 @@ def _stops_shortening(c, p, degree, h, g):
 
 
 @njit(cache=True, error_model="numpy")
-def _converges(c, p, degree, t, tolerance):
+def _converges(c: np.ndarray, p: np.ndarray, degree: int, t: float, tolerance: float) -> bool:
     """Whether the series of the knot's distance gives the tension that the motion's series give."""
     stiffness, damping = p[STIFFNESS], p[STRING_DAMPING]
     tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0

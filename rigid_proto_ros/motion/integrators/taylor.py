@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """taylor: power series of the motion under a wrench that turns with the body.
 
-With the wrench fixed in body axes, Euler's equations, q' = ½ q ⊗ ω and u' = R g_b + a are polynomial, so the coefficients
-follow from each other by Cauchy products, to any degree. Order 18 by default. Source: Jorba and Zou, Experimental Mathematics 14
-(2005) 99. Within its disc of convergence (|ω|h of about 1 to 3) the best there is for a held body-axes wrench; beyond it
-the series diverges.
+With the wrench fixed in body axes, Euler's equations, q' = ½ q ⊗ ω and u' = R g_b + a are polynomial, so the
+coefficients follow from each other by Cauchy products, to any degree. Order 18 by default. Source: Jorba and Zou,
+Experimental Mathematics 14 (2005) 99. Within its disc of convergence (|ω|h of about 1 to 3) the best there is for a
+held body-axes wrench; beyond it the series diverges.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import (
+    Vector,
     arranged,
     component,
     filled,
@@ -38,42 +39,44 @@ from .stepping import fixed_steps
 
 DEGREE = 18
 
-# Where the parts of a coefficient stand in its row, four components each, of which the fourth counts for q alone: ω, then q
-# times the unit vectors and q itself, so that one vector holds what a product takes of a row.
+# Where the parts of a coefficient stand in its row, four components each, of which the fourth counts for q alone: ω,
+# then q times the unit vectors and q itself, so that one vector holds what a product takes of a row.
 _YZX, _QX, _Q = 0, 4, 16
 _W, _D, _U = 20, 24, 28
-# The other factors: ω in another order and each of its components four times, and those of g_b ⊗ q* with the real part negated.
+# The other factors: ω in another order and each of its components four times, and those of g_b ⊗ q* with the real part
+# negated.
 _ZXY, _G = 32, 48
 COLUMNS = 64
 
 
 @njit(cache=True, error_model="numpy")
-def _four(x):
+def _four(x: Vector) -> Vector:
     return joined(x, x, x, x)
 
 
 @njit(cache=True, error_model="numpy")
-def _triple(array, at, last):
+def _triple(array: np.ndarray, at: int, last: Vector) -> Vector:
     """Three numbers of an array and ``last``; where flights go side by side each number has one for every flight."""
     n = width(last)
     return joined(load(array, at * n, last), load(array, (at + 1) * n, last), load(array, (at + 2) * n, last), last)
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(v):
+def _spread(v: Vector) -> tuple[Vector, Vector, Vector]:
     return _four(component(v, 0)), _four(component(v, 1)), _four(component(v, 2))
 
 
 @njit(cache=True, error_model="numpy")
-def _axes(q):
+def _axes(q: Vector) -> tuple[Vector, Vector, Vector]:
     """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighed by the components of v is q ⊗ v."""
     return arranged(q, (3, 2, 5, 4)), arranged(q, (6, 3, 0, 5)), arranged(q, (1, 4, 3, 6))
 
 
 @njit(cache=True, error_model="numpy")
-def series_beside(y, p, degree, c, translates, zero):
-    """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u. zero: one number, or one for every flight that goes
-    beside others; then y (≥ 13, n), p (SIZE, n) and c (degree + 1, COLUMNS n) hold the flights' numbers next to each other.
+def series_beside(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray, translates: bool, zero: Vector) -> None:
+    """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u. zero: one number, or one for every flight
+    that goes beside others; then y (≥ 13, n), p (SIZE, n) and c (degree + 1, COLUMNS n) hold the flights' numbers next
+    to each other.
     """
     n, zeros = width(zero), _four(zero)
     one, many = zero + 1.0, _four(_four(zero))
@@ -141,15 +144,15 @@ def series_beside(y, p, degree, c, translates, zero):
 
 
 @njit(cache=True, error_model="numpy")
-def series(y, p, degree, c):
+def series(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray) -> None:
     """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u."""
     series_beside(y, p, degree, c, p[TRANSLATES] != 0.0, filled(0.0, 1))
 
 
 @njit(cache=True, error_model="numpy")
-def _sum(c, at, degree, length, h, zeros):
-    """Of the part that begins at the number ``at`` of each row, h seconds on: even and odd powers by themselves, each from the
-    smallest term (Horner), so that neither waits for the other.
+def _sum(c: np.ndarray, at: int, degree: int, length: int, h: Vector, zeros: Vector) -> Vector:
+    """Of the part that begins at the number ``at`` of each row, h seconds on: even and odd powers by themselves, each
+    from the smallest term (Horner), so that neither waits for the other.
     """
     square = h * h
     even, odd = at + (degree - degree % 2) * length, at + (degree - 1 + degree % 2) * length
@@ -165,15 +168,17 @@ def _sum(c, at, degree, length, h, zeros):
 
 
 @njit(cache=True, error_model="numpy")
-def _put_triple(array, at, vector, n):
+def _put_triple(array: np.ndarray, at: int, vector: Vector, n: int) -> None:
     store(array, at * n, component(vector, 0))
     store(array, (at + 1) * n, component(vector, 1))
     store(array, (at + 2) * n, component(vector, 2))
 
 
 @njit(cache=True, error_model="numpy")
-def sum_beside(c, translates, degree, h, out, zero):
-    """The variables out (≥ 13, n), h seconds on, with unit quaternions; h as ``zero`` one number or one for every flight."""
+def sum_beside(c: np.ndarray, translates: bool, degree: int, h: Vector, out: np.ndarray, zero: Vector) -> None:
+    """The variables out (≥ 13, n), h seconds on, with unit quaternions; h as ``zero`` one number or one
+    for every flight.
+    """
     n, zeros, hs = width(zero), _four(zero), _four(h)
     length = COLUMNS * n
     q = _sum(c, _Q * n, degree, length, hs, zeros)
@@ -186,13 +191,13 @@ def sum_beside(c, translates, degree, h, out, zero):
 
 
 @njit(cache=True, error_model="numpy")
-def sum_series(c, p, degree, h, out):
+def sum_series(c: np.ndarray, p: np.ndarray, degree: int, h: float, out: np.ndarray) -> None:
     """The variables h seconds on, with a unit quaternion."""
     sum_beside(c, p[TRANSLATES] != 0.0, degree, filled(h, 1), out, filled(0.0, 1))
 
 
 @njit(cache=True, error_model="numpy")
-def taylor_steps_of_degree(y, p, h, n, degree):
+def taylor_steps_of_degree(y: np.ndarray, p: np.ndarray, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
     c, new = np.zeros((degree + 1, COLUMNS)), y.copy()
     for done in range(n):
@@ -205,7 +210,7 @@ def taylor_steps_of_degree(y, p, h, n, degree):
 
 
 @njit(cache=True, error_model="numpy")
-def taylor_steps(y, p, h, n):
+def taylor_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return taylor_steps_of_degree(y, p, h, n, DEGREE)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Taylor series with steps as long as the accuracy allows, read off the coefficients: no step is ever rejected.
 
-Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 3. With the coefficients' size σᵏ the remainder after
-degree N is (σh)^(N+1)/(1 − σh); h is where that is the accuracy times h.
+Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 3. With the coefficients' size σᵏ the remainder
+after degree N is (σh)^(N+1)/(1 − σh); h is where that is the accuracy times h.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from .runge_kutta import is_good
 from .taylor import _D, _Q, _U, _W, COLUMNS, series, sum_series
 
 PART = 0.5
-"""Of what is allowed, a remainder gets this part: the last coefficients are no bound on those to come. Measured over random
-scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed."""
+"""Of what is allowed, a remainder gets this part: the last coefficients are no bound on those to come. Measured over
+random scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed.
+"""
 
 
 _LOG2_START, _LOG2_REST, _LOG2_MOST = math.log2(0.4), math.log2(0.6), math.log2(0.9)
@@ -32,12 +33,14 @@ MAX_DEGREE = 26
 
 @functools.cache
 def degree_for(accuracy: float) -> int:
-    """The degree at which work per time is smallest for this accuracy: measured, a flat minimum (12 at 1e-3, 19 at 1e-9)."""
+    """The degree at which work per time is smallest for this accuracy: measured, a flat minimum (12 at
+    1e-3, 19 at 1e-9).
+    """
     return min(max(round(8.5 - 1.15 * math.log10(accuracy)), 6), MAX_DEGREE)
 
 
 @njit(cache=True, error_model="numpy")
-def _log2_growth(c, degree, weights):
+def _log2_growth(c: np.ndarray, degree: int, weights: tuple[float, float, float, float]) -> float:
     """log₂ σ from the last three coefficients: of the largest k-th root of their measure. −∞ where all are zero."""
     attitude, spin, place, speed = weights
     growth = -math.inf
@@ -54,7 +57,7 @@ def _log2_growth(c, degree, weights):
 
 
 @njit(cache=True, error_model="numpy")
-def length_for(log2_growth, accuracy, degree, part):
+def length_for(log2_growth: float, accuracy: float, degree: int, part: float) -> float:
     """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``."""
     inverse = 1.0 / (degree + 1.0)
     share, least = rough_log2(part * accuracy) - log2_growth, rough_log2(part * FLOOR)
@@ -65,21 +68,27 @@ def length_for(log2_growth, accuracy, degree, part):
 
 
 @njit(cache=True, error_model="numpy")
-def step_length(growth, accuracy, degree, part):
+def step_length(growth: float, accuracy: float, degree: int, part: float) -> float:
     """``length_for`` of σ itself, 0 where nothing grows."""
     return ctl.LONGEST if growth == 0.0 else length_for(rough_log2(growth), accuracy, degree, part)
 
 
 def workspace(degree: int) -> np.ndarray:
-    """Room for the coefficients, which stay there until the step is committed: every look before sums them once more."""
+    """Room for the coefficients, which stay there until the step is committed: every look before sums
+    them once more.
+    """
     return aligned((degree + 1, COLUMNS))
 
 
 @njit(cache=True, error_model="numpy")
-def steps(y, p, control, following, c, span_ns, look):
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c: workspace.
+def steps(
+    y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray, span_ns: int, look: bool
+) -> int:
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c:
+    workspace.
 
-    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it failed.
+    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
+    failed.
     """
     degree = int(control[ctl.DEGREE])
     advanced = 0
