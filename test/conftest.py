@@ -15,7 +15,7 @@ settings.register_profile("the same examples every time", derandomize=True)
 settings.register_profile("new examples every time")
 settings.load_profile(f"{os.environ.get('RIGID_PROTO_EXAMPLES', 'the same')} examples every time")
 
-NEEDED = {"rerun": ["test_demo.py", "test_rerun_*.py", "test_snapshot.py"]}
+NEEDED = {"rerun": ["cli/test_demo.py", "rerun_view/test_*.py"]}
 """Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""
 
 MISSING = {package: files for package, files in NEEDED.items() if importlib.util.find_spec(package) is None}
