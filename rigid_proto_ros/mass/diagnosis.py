@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mesh.hull import convex_hull
-from ..mesh.reading import load_mesh
+from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .from_mesh import MeshBody, mesh_body
 from .moments import referenced_vertices, solid_moments
 from .properties import MassProperties
@@ -326,8 +326,8 @@ def _find_mesh(name: str, robot: Path) -> str:
 
 
 def compare_robot(
-    robot: Path, *, mesh: str | None = None, scale=None, mass: float = 0.0, density: float = 0.0,
-    repair: bool = False, fallback: str = "", max_triangles: int | None = None,
+    robot: Path, *, mesh: str | None = None, scale: np.ndarray | None = None, mass: float = 0.0, density: float = 0.0,
+    repair: bool = False, fallback: str = "", max_triangles: int = MAX_TRIANGLES,
 ) -> list[LinkDiagnosis]:  # fmt: skip
     """Diagnoses of a file's links that show a mesh; with ``mesh`` of the one link it belongs to.
 
@@ -335,10 +335,12 @@ def compare_robot(
     the file, or nothing in it, can be judged.
     """
     links = read_robot(robot)
-    limit = {} if max_triangles is None else {"max_triangles": max_triangles}
-    options = {"repair": repair, "fallback": fallback}
+
+    def load(name: str) -> MeshBody:
+        return mesh_body(load_mesh(name, max_triangles=max_triangles), repair=repair, fallback=fallback)
+
     if mesh is not None:
-        body = mesh_body(load_mesh(mesh, **limit), **options)
+        body = load(mesh)
         fitting = [link for link in links if any(Path(use.file).stem == body.mesh.name for use in link.meshes)]
         if not fitting:
             fitting = [link for link in links if not link.problem]
@@ -367,7 +369,7 @@ def compare_robot(
             continue
         use = next(iter(uses.values()))
         try:
-            body = mesh_body(load_mesh(_find_mesh(name, robot), **limit), **options)
+            body = load(_find_mesh(name, robot))
         except InputError as error:
             diagnoses.append(
                 LinkDiagnosis(link.link, name, "unknown", link.mass, None, None, None, (), None, str(error))

@@ -26,13 +26,14 @@ class ExactMoments:
     centroid: tuple[Fraction, Fraction, Fraction]
     second: tuple[Fraction, ...]
 
-    def scaled(self, scale) -> ExactMoments:
+    def scaled(self, scale: np.ndarray) -> ExactMoments:
         """The moments after mesh coordinates are multiplied by ``scale`` (3 doubles, taken exactly), kept outward."""
         s = [Fraction(float(value)) for value in scale]
         stretch = abs(s[0] * s[1] * s[2])
         pairs = [(i, j) for i in range(3) for j in range(i, 3)]
         second = tuple(stretch * s[i] * s[j] * value for (i, j), value in zip(pairs, self.second, strict=True))
-        return ExactMoments(self.volume * stretch, tuple(a * c for a, c in zip(s, self.centroid, strict=True)), second)
+        x, y, z = self.centroid
+        return ExactMoments(self.volume * stretch, (s[0] * x, s[1] * y, s[2] * z), second)
 
     def outward(self) -> ExactMoments:
         """The same solid wound outward."""

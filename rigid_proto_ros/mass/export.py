@@ -2,10 +2,13 @@
 """Mass properties as text to paste: URDF, SDF and MJCF inertials, every number with 17 digits.
 
 ``frame`` says where the link's frame is: "mesh" at the mesh file's origin, so that the inertial carries the COM's
-position; "com" at the COM, so that the mesh itself has to be moved by the offset the comment names. Axes are the mesh's.
+position; "com" at the COM, so that the mesh itself has to be moved by the offset the comment names. Axes are the
+mesh's.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -21,7 +24,7 @@ def _number(value: float) -> str:
     return f"{value + 0.0:.17g}"
 
 
-def _numbers(values) -> str:
+def _numbers(values: Iterable[float]) -> str:
     return " ".join(_number(float(value)) for value in values)
 
 
@@ -101,4 +104,5 @@ def quaternion_wxyz(rotation: np.ndarray) -> tuple[float, float, float, float]:
         ]
     )
     row = products[int(np.argmax(squares))]
-    return tuple(float(value) for value in row / np.linalg.norm(row))
+    w, x, y, z = (row / np.linalg.norm(row)).tolist()
+    return w, x, y, z

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,32 +57,28 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> 
         mesh = load_mesh(mesh)
     verdict, known = _judged(mesh)
     vertices, triangles, polygon_starts = mesh.vertices, mesh.triangles, mesh.polygon_starts
+    remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, verdict)
     if repair and verdict.usable and _wants_repair(verdict):
         triangles, polygon_starts, done = repair_surface(vertices, triangles, polygon_starts)
         known, remember = {}, None
         if done:
             verdict, _ = judge_surface(vertices, triangles, polygon_starts)
             verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
-    else:
-
-        def remember(moments: dict[str, Moments]) -> None:
-            _keep(mesh, verdict, moments)
-
     stand_in = None
     if fallback and verdict.usable and not verdict.closed:
         stand_in = _stand_in(vertices, triangles, fallback)
         shape = "convex hull" if fallback == "hull" else "bounding box"
         message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))
+    remedies = ("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)"
+    no_solid = "" if verdict.closed else f"{verdict.reason}; use {remedies}"
     moments = MeshMoments(
         vertices,
         triangles,
         polygon_starts,
-        closed=verdict.closed,
-        closed_reason=verdict.reason,
+        no_solid=no_solid,
         name=mesh.name,
         stand_in=stand_in,
-        remedy=("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)",
         known=known,
         remember=remember,
     )

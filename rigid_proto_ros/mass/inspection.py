@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
 from .exact_moments import exact_solid_moments, relative_errors
@@ -28,7 +29,8 @@ JSON_KEYS = (
 @dataclass(frozen=True)
 class Inspection:
     """All that is known of a mesh at one scale, mass and model. ``refusal`` is the error that stands in the way of the
-    chosen model, ``models`` the mass properties of those that can be had."""
+    chosen model, ``models`` the mass properties of those that can be had. lower and upper (3,): the scaled mesh's
+    box, NaN when its coordinates aren't finite."""
 
     body: MeshBody
     scale: np.ndarray
@@ -38,8 +40,8 @@ class Inspection:
     refusal: InputError | None
     volume: float | None
     area: float | None
-    lower: np.ndarray | None
-    upper: np.ndarray | None
+    lower: np.ndarray
+    upper: np.ndarray
     density: float | None
 
     @property
@@ -53,14 +55,21 @@ class Inspection:
 
 
 def inspect_mesh(
-    body: MeshBody, *, model: str = "solid", scale=1.0, mass: float = 0.0, density: float = 1000.0, ballast=()
+    body: MeshBody,
+    *,
+    model: str = "solid",
+    scale: ArrayLike = 1.0,
+    mass: float = 0.0,
+    density: float = 1000.0,
+    ballast: Iterable = (),
 ) -> Inspection:
     """Mass properties of every model that ``body`` can have, and the remarks that belong to them."""
     s = scale_vector(scale)
     findings = list(body.verdict.findings)
     if not body.verdict.usable:
         refusal = InputError(body.mesh.name, body.verdict.reason)
-        return Inspection(body, s, model, {}, findings, refusal, None, None, None, None, None)
+        nowhere = np.full(3, np.nan)
+        return Inspection(body, s, model, {}, findings, refusal, None, None, nowhere, nowhere, None)
     moments = body.moments
     points = referenced_vertices(body.vertices, body.moments.triangles) * s
     lower, upper = points.min(axis=0), points.max(axis=0)

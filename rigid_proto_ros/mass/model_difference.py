@@ -15,9 +15,9 @@ from .tensor import degenerate_pairs, principal_axes
 
 @dataclass(frozen=True)
 class ModelDifference:
-    """principal_moments (3,): relative errors of the moments, in ascending order, each by its own. axes_turned [rad]: the
-    smallest turn that brings the principal axes onto the true ones. center_of_mass (3,): offset from the true one [m]. tensor:
-    max|ΔI|/max|I| of the entries.
+    """principal_moments (3,): relative errors of the moments, in ascending order, each by its own. axes_turned [rad]:
+    the smallest turn that brings the principal axes onto the true ones. center_of_mass (3,): offset from the true one
+    [m]. tensor: max|ΔI|/max|I| of the entries.
     """
 
     principal_moments: np.ndarray
@@ -55,8 +55,8 @@ def model_difference(properties: MassProperties, true: MassProperties) -> ModelD
 def axes_turned(axes: np.ndarray, equal: tuple, others: np.ndarray, others_equal: tuple) -> float:
     """The smallest angle [rad] of a rotation that takes one set of principal axes (3, 3), columns, to another.
 
-    An axis has no sign. ``equal`` says that the first and the second moment are the same, or the second and the third: axes
-    within their span are arbitrary, and what turns within it is no difference.
+    An axis has no sign. ``equal`` says that the first and the second moment are the same, or the second and the third:
+    axes within their span are arbitrary, and what turns within it is no difference.
     """
     mine, theirs = _symmetry_axis(equal), _symmetry_axis(others_equal)
     if mine is ANY or theirs is ANY:

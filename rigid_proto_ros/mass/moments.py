@@ -30,6 +30,8 @@ MAX_WORKERS = 8
 """Beyond this many threads the memory is the limit."""
 _UNIT_ROUNDOFF = 2.0**-53
 
+_Bounds = tuple[float, float, float, float, float, float]
+
 
 @dataclass(frozen=True)
 class Moments:
@@ -68,7 +70,7 @@ class Moments:
 
 # Without NaN in mind a minimum vectorises; the sum of v·0 in the other function is what finds NaN and infinities.
 @njit(cache=True, nogil=True, fastmath={"nnan", "nsz", "reassoc"})
-def _bounds_of_finite(points, first, last, bounds):
+def _bounds_of_finite(points: np.ndarray, first: int, last: int, bounds: _Bounds) -> _Bounds:
     x0, y0, z0, x1, y1, z1 = bounds
     for i in range(first, last):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
@@ -78,7 +80,7 @@ def _bounds_of_finite(points, first, last, bounds):
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc"})
-def _zero_if_finite(points, first, last):
+def _zero_if_finite(points: np.ndarray, first: int, last: int) -> float:
     total = 0.0
     for i in range(first, last):
         total += points[i, 0] * 0.0 + points[i, 1] * 0.0 + points[i, 2] * 0.0
@@ -86,7 +88,7 @@ def _zero_if_finite(points, first, last):
 
 
 @njit(cache=True, nogil=True)
-def _bounds(points):
+def _bounds(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
     """Lower and upper corner (3,) and whether all coordinates are finite; the corners mean nothing otherwise."""
     bounds = (np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf)
     zero = 0.0
@@ -97,7 +99,7 @@ def _bounds(points):
     return np.array(bounds[:3]), np.array(bounds[3:]), zero == 0.0
 
 
-def as_arrays(vertices, triangles, *, check: bool = True) -> tuple[np.ndarray, np.ndarray]:
+def as_arrays(vertices: np.ndarray, triangles: np.ndarray, *, check: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for what is no mesh."""
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
@@ -113,7 +115,7 @@ def _out_of_range(vertices: np.ndarray) -> MeshError:
 
 
 @njit(cache=True, nogil=True)
-def _reference(lower, upper):
+def _reference(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, float, float]:
     """As ``exact_reference``: (reference (3,), factor, size); size 0 when the box is a point."""
     reference = np.zeros(3)
     size = 0.0
@@ -147,7 +149,14 @@ def exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 @njit(cache=True, nogil=True)
-def _central(sums, low, factor, measure_divisor, first_divisor, second_divisor):
+def _central(
+    sums: np.ndarray,
+    low: np.ndarray,
+    factor: float,
+    measure_divisor: float,
+    first_divisor: float,
+    second_divisor: float,
+) -> np.ndarray:
     """Measure, centroid from the reference with its low part, and second moments about it, from raw sums: (13,).
 
     The subtraction that cancels is done in pair arithmetic. A measure of 0 leaves the rest undefined.
@@ -176,7 +185,14 @@ def _central(sums, low, factor, measure_divisor, first_divisor, second_divisor):
     return out
 
 
-def central_moments(sums, low, reference, factor, divisors: tuple[float, float, float], path: str) -> Moments:
+def central_moments(
+    sums: np.ndarray,
+    low: np.ndarray,
+    reference: np.ndarray,
+    factor: float,
+    divisors: tuple[float, float, float],
+    path: str,
+) -> Moments:
     """Moments about the centroid from raw sums of 1, x and x xᵀ, taken as (v − reference)·factor, each to be divided by
     its divisor. Raises MeshError when the measure is zero."""
     return _moments(_central(sums, low, factor, *divisors), reference, path)
@@ -192,13 +208,13 @@ _DONE, _NOT_FINITE, _ONE_POINT, _NO_SUCH_VERTEX = 0, 1, 2, 3
 
 
 @njit(cache=True, nogil=True)
-def _is_good(total, factor, size):
+def _is_good(total: np.ndarray, factor: float, size: float) -> bool:
     """Whether the blocked sums' volume is within ROUNDING_LIMIT by the estimate ε·size·Σ|edge|²/V."""
     return _UNIT_ROUNDOFF * (size * factor) * 0.5 * total[10] <= ROUNDING_LIMIT * abs(total[0])
 
 
 @njit(cache=True, nogil=True)
-def _prepared(vertices):
+def _prepared(vertices: np.ndarray) -> tuple[int, np.ndarray, float, float]:
     """(status, reference (3,), factor, size) of the vertices."""
     lower, upper, finite = _bounds(vertices)
     reference, factor, size = _reference(lower, upper)
@@ -207,7 +223,9 @@ def _prepared(vertices):
 
 
 @njit(cache=True, nogil=True)
-def _solid(vertices, triangles, try_blocked, only_blocked):
+def _solid(
+    vertices: np.ndarray, triangles: np.ndarray, try_blocked: bool, only_blocked: bool
+) -> tuple[int, bool, np.ndarray, np.ndarray]:
     """Returns (status, whether the compensated sums were taken, reference (3,), numbers (13,) as ``_central``)."""
     status, reference, factor, size = _prepared(vertices)
     if status != _DONE:
@@ -222,14 +240,18 @@ def _solid(vertices, triangles, try_blocked, only_blocked):
 
 
 @njit(cache=True, nogil=True)
-def _compensated(vertices, triangles, reference, factor):
+def _compensated(
+    vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
+) -> tuple[int, bool, np.ndarray, np.ndarray]:
     sums, low, there = compensated_sums(vertices, triangles, reference, factor)
     if not there:
         return _NO_SUCH_VERTEX, True, reference, np.zeros(13)
     return _DONE, True, reference, _central(sums, low, factor, 6.0, 24.0, 120.0)
 
 
-def _large_solid(vertices, triangles, only_blocked):
+def _large_solid(
+    vertices: np.ndarray, triangles: np.ndarray, only_blocked: bool
+) -> tuple[int, bool, np.ndarray, np.ndarray]:
     """As ``_solid``, its parts of PART triangles summed by as many threads as there are processors.
 
     Parts and the order in which they are joined depend on the mesh alone, so the result is the same on any number.
@@ -240,7 +262,7 @@ def _large_solid(vertices, triangles, only_blocked):
     count = len(triangles)
     workers = min(os.cpu_count() or 1, MAX_WORKERS)
 
-    def part(first: int):
+    def part(first: int) -> tuple[np.ndarray, np.ndarray]:
         return blocked_sums(vertices, triangles, first, min(first + PART, count), reference, factor)
 
     with ThreadPoolExecutor(workers) as pool:
@@ -254,7 +276,7 @@ def _large_solid(vertices, triangles, only_blocked):
     return _compensated(vertices, triangles, reference, factor)
 
 
-def solid_moments(vertices, triangles, *, path: str = "auto") -> Moments:
+def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
     """Moments of the solid that ``triangles`` (m, 3) over ``vertices`` (n, 3) bound, exact to about 1e-14.
 
     Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles;
@@ -285,7 +307,7 @@ def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarr
 
 
 @njit(cache=True, nogil=True)
-def _point_sums(points, reference, factor):
+def _point_sums(points: np.ndarray, reference: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
     total = np.zeros(10)
     low = np.zeros(10)
     for i in range(points.shape[0]):
@@ -304,7 +326,7 @@ def _point_sums(points, reference, factor):
     return total, low
 
 
-def point_moments(vertices, triangles) -> Moments:
+def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
     vertices, triangles = as_arrays(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
@@ -321,7 +343,7 @@ def point_moments(vertices, triangles) -> Moments:
     )
 
 
-def box_moments(vertices, triangles) -> Moments:
+def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
     vertices, triangles = as_arrays(vertices, triangles)
     lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))

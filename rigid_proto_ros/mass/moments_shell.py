@@ -18,55 +18,68 @@ from .moments import Moments, as_arrays, central_moments, exact_reference
 
 
 @njit(cache=True, nogil=True)
-def _shell_sums(vertices, triangles, starts, reference, factor):
+def _triangle(
+    vertices: np.ndarray, corners: np.ndarray, reference: np.ndarray, factor: float, out: np.ndarray
+) -> tuple[float, float, float]:
+    """The triangle's corners as out (3, 3), from the reference times factor, and its normal of twice its area."""
+    for i in range(3):
+        for k in range(3):
+            out[i, k] = (vertices[corners[i], k] - reference[k]) * factor
+    ux, uy, uz = out[1, 0] - out[0, 0], out[1, 1] - out[0, 1], out[1, 2] - out[0, 2]
+    wx, wy, wz = out[2, 0] - out[0, 0], out[2, 1] - out[0, 1], out[2, 2] - out[0, 2]
+    return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+
+
+@njit(cache=True, nogil=True)
+def _add_triangle(corner: np.ndarray, area: float, total: np.ndarray, low: np.ndarray) -> None:
+    """Add the integrals of 1, x and x xᵀ over the triangle ``corner`` (3, 3) of signed ``area`` to pairs (10,)."""
+    s = (
+        corner[0, 0] + corner[1, 0] + corner[2, 0],
+        corner[0, 1] + corner[1, 1] + corner[2, 1],
+        corner[0, 2] + corner[1, 2] + corner[2, 2],
+    )
+    total[0], low[0] = pair_add(total[0], low[0], area, 0.0)
+    slot = 4
+    for row in range(3):
+        total[1 + row], low[1 + row] = pair_add(total[1 + row], low[1 + row], area * s[row], 0.0)
+        for column in range(row, 3):
+            term = area * (
+                s[row] * s[column]
+                + corner[0, row] * corner[0, column]
+                + corner[1, row] * corner[1, column]
+                + corner[2, row] * corner[2, column]
+            )
+            total[slot], low[slot] = pair_add(total[slot], low[slot], term, 0.0)
+            slot += 1
+
+
+@njit(cache=True, nogil=True)
+def _shell_sums(
+    vertices: np.ndarray, triangles: np.ndarray, starts: np.ndarray, reference: np.ndarray, factor: float
+) -> tuple[np.ndarray, np.ndarray]:
     total = np.zeros(10)
     low = np.zeros(10)
-    term = np.empty(10)
     corner = np.empty((3, 3))
-    s = np.empty(3)
     polygons = triangles.shape[0] if starts.shape[0] == 0 else starts.shape[0] - 1
     for polygon in range(polygons):
         first, last = polygon, polygon + 1
         if starts.shape[0]:
             first, last = starts[polygon], starts[polygon + 1]
         mx = my = mz = 0.0  # twice the Newell normal: the fan triangles' normals add up to it
-        for again in range(2 if last > first + 1 else 1):
+        if last > first + 1:
             for t in range(first, last):
-                for i in range(3):
-                    v = triangles[t, i]
-                    for k in range(3):
-                        corner[i, k] = (vertices[v, k] - reference[k]) * factor
-                ux, uy, uz = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1], corner[1, 2] - corner[0, 2]
-                wx, wy, wz = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1], corner[2, 2] - corner[0, 2]
-                nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-                if last > first + 1 and again == 0:
-                    mx += nx
-                    my += ny
-                    mz += nz
-                    continue
-                area = 0.5 * math.sqrt(nx * nx + ny * ny + nz * nz)
-                if mx * nx + my * ny + mz * nz < 0.0:
-                    area = -area
-                for k in range(3):
-                    s[k] = corner[0, k] + corner[1, k] + corner[2, k]
-                term[0] = area
-                slot = 4
-                for row in range(3):
-                    term[1 + row] = area * s[row]
-                    for column in range(row, 3):
-                        term[slot] = area * (
-                            s[row] * s[column]
-                            + corner[0, row] * corner[0, column]
-                            + corner[1, row] * corner[1, column]
-                            + corner[2, row] * corner[2, column]
-                        )
-                        slot += 1
-                for k in range(10):
-                    total[k], low[k] = pair_add(total[k], low[k], term[k], 0.0)
+                nx, ny, nz = _triangle(vertices, triangles[t], reference, factor, corner)
+                mx += nx
+                my += ny
+                mz += nz
+        for t in range(first, last):
+            nx, ny, nz = _triangle(vertices, triangles[t], reference, factor, corner)
+            area = 0.5 * math.sqrt(nx * nx + ny * ny + nz * nz)
+            _add_triangle(corner, -area if mx * nx + my * ny + mz * nz < 0.0 else area, total, low)
     return total, low
 
 
-def shell_moments(vertices, triangles, polygon_starts=None) -> Moments:
+def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None) -> Moments:
     """Moments of the uniform surface; the measure is its area.
 
     vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles make up a polygon, None that

@@ -21,6 +21,8 @@ from ..base.exact_arithmetic import pair_add, pair_multiply, two_product, two_su
 BLOCK = 256
 """Triangles a block: its corners (18 KB) stay in the first-level cache, and its plain sum rounds at most 256 times."""
 
+_Pair = tuple[float, float]  # the nearest double, and what it lacks
+
 
 @njit(cache=True, nogil=True)
 def _accumulate(total: np.ndarray, carry: np.ndarray, k: int, value: float) -> None:
@@ -76,12 +78,14 @@ def _block_sums(w: np.ndarray, count: int, total: np.ndarray, carry: np.ndarray)
 
 
 @njit(cache=True, nogil=True)
-def blocked_sums(vertices, triangles, first, last, reference, factor):
+def blocked_sums(
+    vertices: np.ndarray, triangles: np.ndarray, first: int, last: int, reference: np.ndarray, factor: float
+) -> tuple[np.ndarray, np.ndarray]:
     """The ten sums over triangles first to last in plain doubles, block by block; blocks are combined without error.
 
     vertices (n, 3), triangles (m, 3), reference (3,), factor a power of two: corners enter as (v − reference)·factor.
-    Returns (sums (11,), their low parts (11,)), the eleventh being Σ(|b − a|² + |c − a|²), which measures how much d can
-    round; it is −1 when a triangle names a vertex that isn't there.
+    Returns (sums (11,), their low parts (11,)), the eleventh being Σ(|b − a|² + |c − a|²), which measures how much d
+    can round; it is −1 when a triangle names a vertex that isn't there.
     """
     known = np.uint64(vertices.shape[0])
     rx, ry, rz = reference[0], reference[1], reference[2]
@@ -105,7 +109,7 @@ def blocked_sums(vertices, triangles, first, last, reference, factor):
 
 
 @njit(cache=True, nogil=True)
-def joined_sums(total, carry, more, more_carry):
+def joined_sums(total: np.ndarray, carry: np.ndarray, more: np.ndarray, more_carry: np.ndarray) -> None:
     """Add the sums of further triangles to ``total`` and ``carry`` (11,), in place, without error; −1 stays −1."""
     missing = total[10] < 0.0 or more[10] < 0.0
     for k in range(11):
@@ -116,7 +120,7 @@ def joined_sums(total, carry, more, more_carry):
 
 
 @njit(cache=True, nogil=True)
-def _pair_difference_product(p, q, r, s):
+def _pair_difference_product(p: _Pair, q: _Pair, r: _Pair, s: _Pair) -> _Pair:
     """p q − r s of pairs given as (high, low) tuples."""
     a, a_low = pair_multiply(p[0], p[1], q[0], q[1])
     b, b_low = pair_multiply(r[0], r[1], s[0], s[1])
@@ -124,7 +128,14 @@ def _pair_difference_product(p, q, r, s):
 
 
 @njit(cache=True, nogil=True)
-def _pair_second(a, b, c, s, i, j):
+def _pair_second(
+    a: tuple[float, float, float],
+    b: tuple[float, float, float],
+    c: tuple[float, float, float],
+    s: tuple[_Pair, _Pair, _Pair],
+    i: int,
+    j: int,
+) -> _Pair:
     """s_i s_j + a_i a_j + b_i b_j + c_i c_j as a pair; a, b, c doubles, s pairs."""
     h, low = pair_multiply(s[i][0], s[i][1], s[j][0], s[j][1])
     p, e = two_product(a[i], a[j])
@@ -136,13 +147,15 @@ def _pair_second(a, b, c, s, i, j):
 
 
 @njit(cache=True, nogil=True)
-def _pair_sum3(a, b, c):
+def _pair_sum3(a: float, b: float, c: float) -> _Pair:
     h, low = two_sum(a, b)
     return pair_add(h, low, c, 0.0)
 
 
 @njit(cache=True, nogil=True)
-def compensated_sums(vertices, triangles, reference, factor):
+def compensated_sums(
+    vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
+) -> tuple[np.ndarray, np.ndarray, bool]:
     """The ten sums in pair arithmetic (about 104 bits), for bodies so thin that a double's products round too much.
 
     Arguments as for ``blocked_sums``; (v − reference) must be exact. Returns (sums (10,), low parts (10,),

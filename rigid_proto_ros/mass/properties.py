@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.compilation import njit
 from ..base.errors import InputError, MeshError, TensorError
@@ -25,7 +26,9 @@ INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
 """How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
 box's cuboid, or given numbers."""
 MODEL_COMS = ("model", "solid")
-"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can be compared alone."""
+"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can
+be compared alone.
+"""
 SCALE_LIMITS = (1e-9, 1e9)
 
 
@@ -45,7 +48,7 @@ class MassProperties:
     center_from_reference: np.ndarray | None = None
 
 
-def scale_vector(scale) -> np.ndarray:
+def scale_vector(scale: ArrayLike) -> np.ndarray:
     """One or three numbers as (3,); raises InputError unless each is nonzero with 1e-9 ≤ |s| ≤ 1e9."""
     try:
         s = [float(value) for value in np.ravel(scale).tolist()]
@@ -78,7 +81,9 @@ _NO_BALLAST = np.empty((0, 4))
 
 
 @njit(cache=True, nogil=True)
-def loaded(mass, center, second, stretch, reference, points):
+def loaded(
+    mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
 
     mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
@@ -116,7 +121,14 @@ def loaded(mass, center, second, stretch, reference, points):
 
 
 @njit(cache=True, nogil=True)
-def stretched(left, center, center_low, reference, second, per_measure):
+def stretched(
+    left: np.ndarray,
+    center: np.ndarray,
+    center_low: np.ndarray,
+    reference: np.ndarray,
+    second: np.ndarray,
+    per_measure: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
     a unit of measure."""
     place = np.empty(3)
@@ -137,11 +149,11 @@ def stretched(left, center, center_low, reference, second, per_measure):
 class MeshMoments:
     """A mesh's moments at unit density, each model's computed when first asked for and never again.
 
-    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``closed``
-    False says that the surface bounds no solid: the solid model, and a density, are then refused with
-    ``closed_reason`` and ``remedy``, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is
-    then taken instead. A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed earlier, by
-    model; ``remember`` is called with all of them whenever another one has been computed.
+    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``no_solid``
+    says why the surface bounds no solid and what helps, "" that it bounds one: the solid model, and a density, are then
+    refused with it, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is then taken instead.
+    A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed
+    earlier, by model; ``remember`` is called with all of them whenever another one has been computed.
     """
 
     def __init__(
@@ -150,9 +162,7 @@ class MeshMoments:
         triangles: np.ndarray,
         polygon_starts: np.ndarray | None = None,
         *,
-        closed: bool = True,
-        closed_reason: str = "the surface is open",
-        remedy: str = "--repair (mesh_repair), --fallback hull|box (mesh_fallback)",
+        no_solid: str = "",
         name: str = "mesh",
         stand_in: tuple[np.ndarray, np.ndarray] | None = None,
         known: dict[str, Moments] | None = None,
@@ -161,9 +171,7 @@ class MeshMoments:
         self.vertices = vertices
         self.triangles = triangles
         self.polygon_starts = polygon_starts
-        self.closed = closed
-        self.closed_reason = closed_reason
-        self.remedy = remedy
+        self.no_solid = no_solid
         self.name = name
         self.stand_in = stand_in
         self._remember = remember
@@ -177,9 +185,10 @@ class MeshMoments:
     def solid_raw(self) -> Moments:
         """The solid's signed moments as the file winds it; raises MeshError when the surface isn't closed."""
         if self.stand_in is not None:
-            return self._get(("stand-in",), lambda: solid_moments(*self.stand_in))
-        if not self.closed:
-            raise MeshError(self.name, f"{self.closed_reason}; use {self.remedy}, or another model with --mass (mass)")
+            vertices, triangles = self.stand_in
+            return self._get(("stand-in",), lambda: solid_moments(vertices, triangles))
+        if self.no_solid:
+            raise MeshError(self.name, f"{self.no_solid}, or another model with --mass (mass)")
         return self._get("solid", lambda: solid_moments(self.vertices, self.triangles))
 
     def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:
@@ -189,7 +198,7 @@ class MeshMoments:
                 self._remember({name: known for name, known in self._moments.items() if isinstance(name, str)})
         return self._moments[key]
 
-    def moments(self, model: str, scale=(1.0, 1.0, 1.0)) -> Moments:
+    def moments(self, model: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> Moments:
         """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for the shell alone.
 
         A shell's area elements stretch by direction, so a non-uniform scale takes a new pass over the surface; it is
@@ -210,7 +219,7 @@ class MeshMoments:
             return self._get(key, lambda: shell_moments(self.vertices * stretch, self.triangles, self.polygon_starts))
         raise InputError("inertia_model", model, ", ".join(INERTIA_MODELS))
 
-    def body_mass(self, *, scale=(1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:
+    def body_mass(self, *, scale: ArrayLike = (1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:
         """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models."""
         if not (0.0 <= mass < math.inf):
             raise InputError("mass", mass, "a finite number >= 0 (0: density decides) [kg]")
@@ -227,7 +236,7 @@ class MeshMoments:
         self,
         model: str = "solid",
         *,
-        scale=(1.0, 1.0, 1.0),
+        scale: ArrayLike = (1.0, 1.0, 1.0),
         mass: float = 0.0,
         density: float = 1000.0,
         ballast: Iterable = (),
@@ -235,9 +244,10 @@ class MeshMoments:
     ) -> MassProperties:
         """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form on its ten numbers.
 
-        com: one of MODEL_COMS; "solid" carries the model's tensor, as it is about its own centre, to the solid's. scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries
-        (m [kg], x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's.
-        Raises InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
+        com: one of MODEL_COMS; "solid" carries the model's tensor, as it is about its own centre, to the solid's.
+        scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries (m [kg],
+        x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's. Raises
+        InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
         """
         if model not in INERTIA_MODELS or model == "explicit":
             raise InputError("inertia_model", model, ", ".join(m for m in INERTIA_MODELS if m != "explicit"))
@@ -276,7 +286,11 @@ def _plainly_good(moments: np.ndarray) -> bool:
 
 
 def explicit_mass_properties(
-    mass: float, center_of_mass, tensor6, ballast: Iterable = (), scale=(1.0, 1.0, 1.0)
+    mass: float,
+    center_of_mass: ArrayLike,
+    tensor6: Sequence[float],
+    ballast: Iterable = (),
+    scale: ArrayLike = (1.0, 1.0, 1.0),
 ) -> MassProperties:
     """Given numbers as they are: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz, iyy, iyz,
     izz) [kg m², about the COM]. ``scale`` moves the COM and the ballast with the picture; mass and tensor are final.

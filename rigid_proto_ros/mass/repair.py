@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..mesh.nesting import component_nesting
-from ..mesh.topology import Topology, component_volumes, mesh_topology
+from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent
 from .verdict import MAX_NESTED_COMPONENTS
 
 WELD = 1e-5
@@ -91,7 +91,7 @@ def _drop_copies(surface: Surface) -> list[str]:
 
 
 @njit(cache=True, nogil=True)
-def _near_pairs(points, order, tolerance, target):
+def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target: np.ndarray) -> None:
     """For points (k, 3), visited by ascending x, the first point within ``tolerance`` as target (k,)."""
     for i in range(order.shape[0]):
         a = order[i]
@@ -130,7 +130,7 @@ def _weld_rims(surface: Surface) -> list[str]:
 
 
 @njit(cache=True, nogil=True)
-def _parities(edges, count):
+def _parities(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, int]:
     """Whether to turn each triangle (m,) so that neighbours agree, its patch (m,), and the number of contradictions.
 
     A union-find whose links carry a parity; edges (e, 6) as in Topology, those of two triangles alone.
@@ -228,14 +228,13 @@ def _turn_outward(surface: Surface) -> list[str]:
     topology = surface.topology()
     if topology.unbalanced or topology.components > MAX_NESTED_COMPONENTS:
         return []
-    volume, _, lower, upper = component_volumes(
-        surface.vertices, surface.triangles, topology.component, topology.components
-    )
-    wrong = volume < 0.0
+    extent = referenced_extent(surface.vertices, surface.triangles)
+    sums = component_sums(surface.vertices, surface.triangles, topology, 0.5 * extent.lower + 0.5 * extent.upper)
+    wrong = sums.volume < 0.0
     if topology.components > 1:
-        nesting = component_nesting(surface.vertices, surface.triangles, topology.component, lower, upper)
+        nesting = component_nesting(surface.vertices, surface.triangles, topology.component, sums.lower, sums.upper)
         # A component of which it is unknown where it lies stays as it is.
-        wrong = (np.sign(volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.decided
+        wrong = (np.sign(sums.volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.decided
     if not wrong.any():
         return []
     surface.turn(wrong[topology.component])

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
 
 MAX_BYTES = 50_000_000
@@ -50,7 +52,7 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     )
 
 
-def rotation_from_wxyz(quaternion) -> np.ndarray:
+def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
     """Rotation (3, 3) of a quaternion (w, x, y, z), MuJoCo's order, of any length but 0."""
     w, x, y, z = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
     return np.array(
@@ -64,12 +66,7 @@ def rotation_from_wxyz(quaternion) -> np.ndarray:
 
 def read_robot(path: Path) -> list[LinkInertial]:
     """The links of a robot file that have an inertial or a mesh; raises InputError when the file can't be read."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError("compare", path.name, f"a file of at most {MAX_BYTES} bytes")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError("compare", str(path), f"a readable URDF, SDF or MJCF file ({error.strerror})") from None
+    data = read_bounded(path, MAX_BYTES, "compare", "a URDF, SDF or MJCF file")
     if b"<!ENTITY" in data:
         raise InputError("compare", path.name, "a file without XML entities")
     if b"xacro:" in data:
@@ -100,11 +97,11 @@ def _about(inertia: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     return rotation @ inertia @ rotation.T
 
 
-def _symmetric(ixx, ixy, ixz, iyy, iyz, izz) -> np.ndarray:
+def _symmetric(ixx: float, ixy: float, ixz: float, iyy: float, iyz: float, izz: float) -> np.ndarray:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
-def _urdf(root) -> list[LinkInertial]:
+def _urdf(root: ElementTree.Element) -> list[LinkInertial]:
     links = []
     for link in root.iter("link"):
         meshes = []
@@ -115,7 +112,9 @@ def _urdf(root) -> list[LinkInertial]:
                 get = origin.get if origin is not None else (lambda _: None)
                 rotation = rotation_from_rpy(*_floats(get("rpy"), "0 0 0", 3))
                 position = _floats(get("xyz"), "0 0 0", 3)
-                meshes.append(MeshUse(mesh.get("filename"), _floats(mesh.get("scale"), "1 1 1", 3), rotation, position))
+                meshes.append(
+                    MeshUse(mesh.get("filename", ""), _floats(mesh.get("scale"), "1 1 1", 3), rotation, position)
+                )
         inertial = link.find("inertial")
         if inertial is None:
             if meshes:
@@ -140,11 +139,11 @@ def _urdf(root) -> list[LinkInertial]:
     return links
 
 
-def _without(name: str, meshes, problem: str) -> LinkInertial:
+def _without(name: str, meshes: list[MeshUse], problem: str) -> LinkInertial:
     return LinkInertial(name, math.nan, np.full(3, math.nan), np.full((3, 3), math.nan), tuple(meshes), problem)
 
 
-def _sdf_pose(element) -> tuple[np.ndarray, np.ndarray]:
+def _sdf_pose(element: ElementTree.Element | None) -> tuple[np.ndarray, np.ndarray]:
     pose = element.find("pose") if element is not None else None
     values = _floats(pose.text if pose is not None else None, "0 0 0 0 0 0", 6)
     if pose is not None and pose.get("degrees", "false") in ("true", "1"):
@@ -152,7 +151,7 @@ def _sdf_pose(element) -> tuple[np.ndarray, np.ndarray]:
     return rotation_from_rpy(*values[3:]), values[:3]
 
 
-def _sdf(root) -> list[LinkInertial]:
+def _sdf(root: ElementTree.Element) -> list[LinkInertial]:
     links = []
     for link in root.iter("link"):
         meshes = []
@@ -161,7 +160,7 @@ def _sdf(root) -> list[LinkInertial]:
             if mesh is not None and mesh.findtext("uri"):
                 rotation, position = _sdf_pose(shape)
                 scale = _floats(mesh.findtext("scale"), "1 1 1", 3)
-                meshes.append(MeshUse(mesh.findtext("uri").strip(), scale, rotation, position))
+                meshes.append(MeshUse(mesh.findtext("uri", "").strip(), scale, rotation, position))
         inertial = link.find("inertial")
         name = link.get("name", "?")
         if inertial is None:
@@ -178,11 +177,11 @@ def _sdf(root) -> list[LinkInertial]:
             for tag in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         ]
         inertia = _about(_symmetric(*six), rotation)
-        links.append(LinkInertial(name, float(inertial.findtext("mass")), position, inertia, tuple(meshes)))
+        links.append(LinkInertial(name, float(inertial.findtext("mass", "")), position, inertia, tuple(meshes)))
     return links
 
 
-def _mjcf_rotation(element, degrees: bool, sequence: str) -> np.ndarray:
+def _mjcf_rotation(element: ElementTree.Element, degrees: bool, sequence: str) -> np.ndarray:
     """Orientation of an MJCF element: quat, axisangle, xyaxes, zaxis or euler."""
     turn = math.pi / 180.0 if degrees else 1.0
     if element.get("axisangle"):
@@ -210,24 +209,24 @@ def _mjcf_rotation(element, degrees: bool, sequence: str) -> np.ndarray:
     return rotation_from_wxyz(_floats(element.get("quat"), "1 0 0 0", 4))
 
 
-def _mjcf(root) -> list[LinkInertial]:
+def _mjcf(root: ElementTree.Element) -> list[LinkInertial]:
     compiler = root.find("compiler")
     get = compiler.get if compiler is not None else (lambda _name, default=None: default)
     degrees = get("angle", "degree") != "radian"
     sequence = get("eulerseq", "xyz")
-    folder = get("meshdir", get("assetdir", ""))
+    folder = get("meshdir") or get("assetdir") or ""
     assets = {}
     for mesh in root.iter("mesh"):
         if mesh.get("file"):
-            file = mesh.get("file")
+            file = mesh.get("file", "")
             name = mesh.get("name", Path(file).stem)
             assets[name] = (str(Path(folder) / file) if folder else file, _floats(mesh.get("scale"), "1 1 1", 3))
     links = []
     for body in root.iter("body"):
         meshes = []
         for geom in body.findall("geom"):
-            if geom.get("mesh") in assets:
-                file, scale = assets[geom.get("mesh")]
+            if geom.get("mesh", "") in assets:
+                file, scale = assets[geom.get("mesh", "")]
                 rotation = _mjcf_rotation(geom, degrees, sequence)
                 meshes.append(MeshUse(file, scale, rotation, _floats(geom.get("pos"), "0 0 0", 3)))
         inertial = body.find("inertial")

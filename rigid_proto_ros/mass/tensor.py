@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,6 +21,56 @@ _EQUAL_COMPONENT = 1e-9  # components closer than this tie; the first one then d
 
 
 @njit(cache=True)
+def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
+    """Turn a (3, 3) so that a[p, q] vanishes, and v (3, 3) along, in place; False when it is below rounding already."""
+    g = a[p, q]
+    if abs(g) <= 1e-17 * math.sqrt(abs(a[p, p]) * abs(a[q, q])) or g == 0.0:
+        return False
+    theta = (a[q, q] - a[p, p]) / (2.0 * g)
+    t = 1.0 / (abs(theta) + math.sqrt(1.0 + theta * theta))
+    if theta < 0.0:
+        t = -t
+    c = 1.0 / math.sqrt(1.0 + t * t)
+    s = t * c
+    a[p, p] -= t * g
+    a[q, q] += t * g
+    a[p, q] = 0.0
+    a[q, p] = 0.0
+    r = 3 - p - q
+    arp, arq = a[r, p], a[r, q]
+    a[r, p] = c * arp - s * arq
+    a[p, r] = a[r, p]
+    a[r, q] = s * arp + c * arq
+    a[q, r] = a[r, q]
+    for k in range(3):
+        vkp, vkq = v[k, p], v[k, q]
+        v[k, p] = c * vkp - s * vkq
+        v[k, q] = s * vkp + c * vkq
+    return True
+
+
+@njit(cache=True)
+def _sign_columns(axes: np.ndarray) -> None:
+    """Sign the columns of axes (3, 3), in place: the largest component of the first two positive, a right hand."""
+    for column in range(2):
+        largest = max(abs(axes[0, column]), abs(axes[1, column]), abs(axes[2, column]))
+        k = 0
+        while abs(axes[k, column]) < (1.0 - _EQUAL_COMPONENT) * largest:
+            k += 1
+        if axes[k, column] < 0.0:
+            for row in range(3):
+                axes[row, column] = -axes[row, column]
+    determinant = (
+        axes[0, 2] * (axes[1, 0] * axes[2, 1] - axes[2, 0] * axes[1, 1])
+        + axes[1, 2] * (axes[2, 0] * axes[0, 1] - axes[0, 0] * axes[2, 1])
+        + axes[2, 2] * (axes[0, 0] * axes[1, 1] - axes[1, 0] * axes[0, 1])
+    )
+    if determinant < 0.0:
+        for row in range(3):
+            axes[row, 2] = -axes[row, 2]
+
+
+@njit(cache=True)
 def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Principal moments (3,) ascending and axes (3, 3), columns, of a symmetric ``inertia`` (3, 3).
 
@@ -31,34 +82,11 @@ def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     a = inertia.copy()
     v = np.eye(3)
     for _ in range(30):
-        done = True
+        turned = False
         for p in range(2):
             for q in range(p + 1, 3):
-                g = a[p, q]
-                if abs(g) <= 1e-17 * math.sqrt(abs(a[p, p]) * abs(a[q, q])) or g == 0.0:
-                    continue
-                done = False
-                theta = (a[q, q] - a[p, p]) / (2.0 * g)
-                t = 1.0 / (abs(theta) + math.sqrt(1.0 + theta * theta))
-                if theta < 0.0:
-                    t = -t
-                c = 1.0 / math.sqrt(1.0 + t * t)
-                s = t * c
-                a[p, p] -= t * g
-                a[q, q] += t * g
-                a[p, q] = 0.0
-                a[q, p] = 0.0
-                r = 3 - p - q
-                arp, arq = a[r, p], a[r, q]
-                a[r, p] = c * arp - s * arq
-                a[p, r] = a[r, p]
-                a[r, q] = s * arp + c * arq
-                a[q, r] = a[r, q]
-                for k in range(3):
-                    vkp, vkq = v[k, p], v[k, q]
-                    v[k, p] = c * vkp - s * vkq
-                    v[k, q] = s * vkp + c * vkq
-        if done:
+                turned = _rotate(a, v, p, q) or turned
+        if not turned:
             break
     order = np.array([0, 1, 2])
     for p in range(2):  # three numbers: a selection sort
@@ -71,22 +99,7 @@ def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         moments[column] = a[order[column], order[column]]
         for k in range(3):
             axes[k, column] = v[k, order[column]]
-    for column in range(2):
-        largest = max(abs(axes[0, column]), abs(axes[1, column]), abs(axes[2, column]))
-        for k in range(3):
-            if abs(axes[k, column]) >= (1.0 - _EQUAL_COMPONENT) * largest:
-                if axes[k, column] < 0.0:
-                    for row in range(3):
-                        axes[row, column] = -axes[row, column]
-                break
-    determinant = (
-        axes[0, 2] * (axes[1, 0] * axes[2, 1] - axes[2, 0] * axes[1, 1])
-        + axes[1, 2] * (axes[2, 0] * axes[0, 1] - axes[0, 0] * axes[2, 1])
-        + axes[2, 2] * (axes[0, 0] * axes[1, 1] - axes[1, 0] * axes[0, 1])
-    )
-    if determinant < 0.0:
-        for row in range(3):
-            axes[row, 2] = -axes[row, 2]
+    _sign_columns(axes)
     return moments, axes
 
 
@@ -95,7 +108,7 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return principal_axes_kernel(np.ascontiguousarray(inertia, dtype=np.float64))
 
 
-def tensor_from_six(six) -> np.ndarray:
+def tensor_from_six(six: Sequence[float]) -> np.ndarray:
     """(ixx, ixy, ixz, iyy, iyz, izz) as a symmetric (3, 3) matrix; off-diagonals carry the tensor's sign."""
     ixx, ixy, ixz, iyy, iyz, izz = (float(value) for value in six)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
@@ -103,7 +116,8 @@ def tensor_from_six(six) -> np.ndarray:
 
 def six_from_tensor(inertia: np.ndarray) -> tuple[float, float, float, float, float, float]:
     """A symmetric (3, 3) matrix as (ixx, ixy, ixz, iyy, iyz, izz)."""
-    return tuple(float(inertia[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(inertia, dtype=np.float64).tolist()
+    return xx, xy, xz, yy, yz, zz
 
 
 def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tuple[str, ...]:

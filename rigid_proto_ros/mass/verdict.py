@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.compilation import njit
-from ..mesh.nesting import component_nesting
-from ..mesh.topology import Topology, component_volumes, mesh_topology
+from ..base.errors import MeshError
+from ..mesh.nesting import Nesting, component_nesting
+from ..mesh.planarity import polygon_planarity
+from ..mesh.topology import Components, Topology, component_sums, joined_sets, mesh_topology, referenced_extent
+from .moments import solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
 MAX_NESTED_COMPONENTS = 2000
@@ -76,171 +78,125 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-@njit(cache=True, nogil=True)
-def _polygon_planarity(vertices, triangles, starts, reference):
-    """(non-planar polygons' largest distance from the Newell plane, spread of the volume over their fans).
-
-    The spread sums, over polygons of up to 64 corners, the range of the signed volume between the fans from each of
-    its corners; larger polygons are compared from the first and the middle corner.
-    """
-    deviation = 0.0
-    spread = 0.0
-    for polygon in range(starts.shape[0] - 1):
-        first, last = starts[polygon], starts[polygon + 1]
-        n = last - first + 2
-        if n < 4:
-            continue
-        p = np.empty((n, 3))
-        for k in range(n):
-            if k == 0:
-                v = triangles[first, 0]
-            elif k == 1:
-                v = triangles[first, 1]
-            else:
-                v = triangles[first + k - 2, 2]
-            for a in range(3):
-                p[k, a] = vertices[v, a] - reference[a]
-        center = np.zeros(3)
-        normal = np.zeros(3)
-        for k in range(n):
-            m = (k + 1) % n
-            for a in range(3):
-                b, c = (a + 1) % 3, (a + 2) % 3
-                center[a] += p[k, a] / n
-                normal[a] += (p[k, b] - p[0, b]) * (p[m, c] - p[0, c]) - (p[k, c] - p[0, c]) * (p[m, b] - p[0, b])
-        size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-        if size > 0.0:
-            for k in range(n):
-                height = 0.0
-                for a in range(3):
-                    height += (p[k, a] - center[a]) * normal[a] / size
-                deviation = max(deviation, abs(height))
-        low, high = np.inf, -np.inf
-        step = 1 if n <= 64 else n // 2
-        for base in range(0, n, step):
-            volume = 0.0
-            for k in range(1, n - 1):
-                i, j = (base + k) % n, (base + k + 1) % n
-                for a in range(3):
-                    b, c = (a + 1) % 3, (a + 2) % 3
-                    cross = (p[i, b] - p[base, b]) * (p[j, c] - p[base, c]) - (p[i, c] - p[base, c]) * (
-                        p[j, b] - p[base, b]
-                    )
-                    volume += (p[base, a] - center[a]) * cross / 6.0
-            low, high = min(low, volume), max(high, volume)
-        spread += high - low
-    return deviation, spread
-
-
-def _judge_edges(verdict: Verdict, topology: Topology, vertices, triangles, half: np.ndarray) -> None:
-    """Open, inconsistently wound, duplicated: each with how much the volume would depend on the origin."""
+def _judge_edges(
+    verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray, half: np.ndarray
+) -> None:
+    """Open, inconsistently wound, duplicated: each with what is known of the volume."""
     verdict.watertight = topology.watertight
     verdict.winding_consistent = topology.flipped == 0
     copies = int(np.count_nonzero(topology.duplicates))
     if copies:
-        verdict.add(
-            "duplicate_faces",
-            ERROR,
-            f"{_count(copies, 'duplicate face')}, which would count twice",
-            "--repair (mesh_repair) removes the copies",
-        )
-    if topology.unbalanced:
-        volume, area, _, _ = component_volumes(vertices, triangles, np.zeros(len(triangles), np.int64), 1)
-        swing = float(np.sum(np.abs(area[0]) * half)) / 3.0
-        ambiguous = f"volume ambiguous: {volume[0] - swing:.3g} to {volume[0] + swing:.3g}, depending on how"
-        if not topology.watertight:
-            uses = topology.edges[:, 2] + topology.edges[:, 3]
-            odd = int(np.count_nonzero(uses % 2))
-            edges = _count(len(topology.boundary), "boundary edge")
-            if odd > len(topology.boundary):
-                edges += f" and {_count(odd - len(topology.boundary), 'edge')} of 3 or more faces"
-            verdict.add(
-                "open",
-                ERROR,
-                f"open surface with {edges}; {ambiguous} holes are closed",
-                "--repair (mesh_repair) welds edges and caps holes",
-            )
-        if topology.flipped:
-            verdict.add(
-                "inconsistent_winding",
-                ERROR,
-                f"inconsistent winding: {_count(topology.flipped, 'edge')} used twice in the same direction; {ambiguous} faces are turned",
-                "--repair (mesh_repair) turns faces",
-            )
+        message = f"{_count(copies, 'duplicate face')}, which would count twice"
+        verdict.add("duplicate_faces", ERROR, message, "--repair (mesh_repair) removes the copies")
+    if topology.unbalanced and not topology.watertight:
+        uses = topology.edges[:, 2] + topology.edges[:, 3]
+        odd = int(np.count_nonzero(uses % 2))
+        edges = _count(len(topology.boundary), "boundary edge")
+        if odd > len(topology.boundary):
+            edges += f" and {_count(odd - len(topology.boundary), 'edge')} of 3 or more faces"
+        known = _known_volume(sums, half, "how holes are closed")
+        capped = _capped_volume(topology, sums, vertices)
+        if capped is not None:
+            known += f"; flat caps over the holes give {capped:.3g}"
+        remedy = "--repair (mesh_repair) welds edges and caps holes"
+        verdict.add("open", ERROR, f"open surface with {edges}; {known}", remedy)
+    if topology.flipped:
+        edges = f"{_count(topology.flipped, 'edge')} used twice in the same direction"
+        known = _known_volume(sums, half, "how faces are turned")
+        remedy = "--repair (mesh_repair) turns faces"
+        verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}; {known}", remedy)
     if topology.nonmanifold and not topology.unbalanced and not copies:
-        verdict.add(
-            "non_manifold",
-            INFO,
-            f"{_count(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently",
-        )
+        message = f"{_count(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently"
+        verdict.add("non_manifold", INFO, message)
     if topology.opposites:
-        verdict.add(
-            "opposite_faces",
-            WARNING,
-            f"{_count(topology.opposites, 'face')} coinciding with another one that is wound the other way",
-        )
+        message = f"{_count(topology.opposites, 'face')} coinciding with another one that is wound the other way"
+        verdict.add("opposite_faces", WARNING, message)
     if topology.degenerate:
-        verdict.add(
-            "degenerate_faces", INFO, f"{_count(topology.degenerate, 'triangle')} without area, which have no effect"
-        )
+        message = f"{_count(topology.degenerate, 'triangle')} without area, which have no effect"
+        verdict.add("degenerate_faces", INFO, message)
 
 
-def _judge_components(verdict: Verdict, topology: Topology, vertices, triangles) -> None:
+def _known_volume(sums: Components, half: np.ndarray, choice: str) -> str:
+    """What can be said of the volume of a surface that bounds none: half (3,) is half its box.
+
+    The faces' sum moves with the origin by a third of the surface's vector area times the distance.
+    """
+    volume = float(np.sum(sums.volume))
+    swing = float(np.sum(np.abs(sums.area.sum(axis=0)) * half)) / 3.0
+    low, high = f"{volume - swing:.3g}", f"{volume + swing:.3g}"
+    if low == high:
+        return f"volume unknown: it depends on {choice}, and the faces' own sum of {low} leaves that out"
+    return f"volume ambiguous: {low} to {high}, depending on {choice}"
+
+
+def _capped_volume(topology: Topology, sums: Components, vertices: np.ndarray) -> float | None:
+    """The volume with a cap over each hole, from the rim to its middle; None where the rims aren't closed loops."""
+    rim = topology.boundary
+    forward = rim[:, 2] == 1
+    tails, heads = np.where(forward, rim[:, 0], rim[:, 1]), np.where(forward, rim[:, 1], rim[:, 0])
+    if topology.unbalanced != len(rim) or not np.array_equal(np.sort(tails), np.sort(heads)):
+        return None
+    numbers, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
+    tail, head = ends[: len(rim)], ends[len(rim) :]
+    hole = joined_sets(tail, head, len(numbers))
+    holes, hole = np.unique(hole, return_inverse=True)
+    points = vertices[numbers] - sums.middle
+    size = np.bincount(hole, minlength=len(holes))
+    centers = np.stack([np.bincount(hole, points[:, k], len(holes)) for k in range(3)], axis=1) / size[:, None]
+    a, b, c = points[head], points[tail], centers[hole[tail]]
+    return float(np.sum(sums.volume) + np.sum(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6.0)
+
+
+def _judge_components(
+    verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray, triangles: np.ndarray
+) -> None:
     """Outward or inward, cavities, parts that count twice; for a surface whose edges are balanced."""
-    count = topology.components
-    volume, _, lower, upper = component_volumes(vertices, triangles, topology.component, count)
+    count, volume = topology.components, sums.volume
     if count == 1:
         verdict.inward = bool(volume[0] < 0.0)
     elif count > MAX_NESTED_COMPONENTS:
         verdict.inward = bool(np.sum(volume) < 0.0)
-        verdict.add(
-            "components_unchecked",
-            WARNING,
-            f"{count} components are too many to check whether some overlap or lie inside others",
-        )
+        message = f"{count} components are too many to check whether some overlap or lie inside others"
+        verdict.add("components_unchecked", WARNING, message)
         inward = int(np.count_nonzero(volume < 0.0))
         if 0 < inward < count:
             verdict.add("component_inward", WARNING, f"{inward} of {count} components subtract from the volume")
     else:
-        nesting = component_nesting(vertices, triangles, topology.component, lower, upper)
-        expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
-        # What is undecided accuses no component.
-        matters = (volume != 0.0) & nesting.decided
-        wrong = matters & (np.sign(volume) != expected)
-        verdict.inward = bool(np.all(wrong[matters]) and matters.any() and nesting.decided.all())
-        if not verdict.inward:
-            disjoint = int(np.count_nonzero(wrong & (expected > 0.0)))
-            nested = int(np.count_nonzero(wrong & (expected < 0.0)))
-            if disjoint:
-                verdict.winding_consistent = False
-                verdict.add(
-                    "component_inward",
-                    ERROR,
-                    f"inconsistent winding: {disjoint} of {count} components wound inward, so that they would subtract",
-                    "--repair (mesh_repair) turns them",
-                )
-            if nested:
-                verdict.add(
-                    "nested_components",
-                    WARNING,
-                    f"{_count(nested, 'component')} inside another and wound outward, so that their volume counts twice; "
-                    "--repair (mesh_repair) makes cavities of them",
-                )
-        cavities = int(np.count_nonzero((expected < 0.0) & ~wrong)) if not verdict.inward else 0
-        if verdict.inward:
-            cavities = int(np.count_nonzero(expected < 0.0))
-        if cavities:
-            verdict.add("cavities", INFO, f"{_count(cavities, 'closed inner surface')} wound inward, taken as cavities")
-        if nesting.crossing:
-            verdict.add(
-                "overlapping_components",
-                WARNING,
-                f"{_count(len(nesting.crossing), 'pair')} of components overlap; the volume that they share counts twice",
-            )
-        if not nesting.complete:
-            verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
+        nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
+        _judge_nesting(verdict, nesting, volume)
     if verdict.inward:
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
+
+
+def _judge_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
+    """Which of the components, of signed volume (k,), count with the wrong sign, and which overlap."""
+    count = len(volume)
+    expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
+    # What is undecided accuses no component.
+    matters = (volume != 0.0) & nesting.decided
+    wrong = matters & (np.sign(volume) != expected)
+    verdict.inward = bool(np.all(wrong[matters]) and matters.any() and nesting.decided.all())
+    cavities = int(np.count_nonzero((expected < 0.0) & (~wrong | verdict.inward)))
+    if not verdict.inward:
+        disjoint = int(np.count_nonzero(wrong & (expected > 0.0)))
+        nested = int(np.count_nonzero(wrong & (expected < 0.0)))
+        if disjoint:
+            verdict.winding_consistent = False
+            subtract = f"{disjoint} of {count} components wound inward, so that they would subtract"
+            message = f"inconsistent winding: {subtract}"
+            verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
+        if nested:
+            message = (
+                f"{_count(nested, 'component')} inside another and wound outward, so that their volume counts twice"
+            )
+            verdict.add("nested_components", WARNING, message, "--repair (mesh_repair) makes cavities of them")
+    if cavities:
+        verdict.add("cavities", INFO, f"{_count(cavities, 'closed inner surface')} wound inward, taken as cavities")
+    if nesting.crossing:
+        pairs = f"{_count(len(nesting.crossing), 'pair')} of components overlap"
+        verdict.add("overlapping_components", WARNING, f"{pairs}; the volume that they share counts twice")
+    if not nesting.complete:
+        verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
 
 
 def judge_surface(
@@ -251,61 +207,51 @@ def judge_surface(
     polygon_starts (p + 1,) as in a mesh: which fan triangles make up a polygon; None when each is its own.
     """
     verdict = Verdict()
-    bad = ~np.isfinite(vertices)
-    if bad.any():
-        rows = int(np.count_nonzero(bad.any(axis=1)))
-        where = int(np.argmax(bad.any(axis=1)))
+    extent = referenced_extent(vertices, triangles)
+    if len(triangles) == 0 or extent.not_finite:
         verdict.usable = verdict.watertight = verdict.winding_consistent = False
-        verdict.add(
-            "nonfinite", ERROR, f"{rows} of {len(vertices)} vertices are not finite; the first is vertex {where}"
-        )
-        return verdict, None
-    if len(triangles) == 0:
-        verdict.usable = verdict.watertight = verdict.winding_consistent = False
-        verdict.add("no_faces", ERROR, "the mesh has no faces")
+        if extent.not_finite:
+            rows = f"{extent.not_finite} of {len(vertices)} vertices are not finite"
+            verdict.add("nonfinite", ERROR, f"{rows}; the first is vertex {extent.first_not_finite}")
+        else:
+            verdict.add("no_faces", ERROR, "the mesh has no faces")
         return verdict, None
     topology = mesh_topology(vertices, triangles)
     verdict.components = topology.components
-    used = np.zeros(len(vertices), dtype=bool)
-    used[triangles.ravel()] = True
-    points = vertices[used]
-    lower, upper = points.min(axis=0), points.max(axis=0)
+    lower, upper = extent.lower, extent.upper
     half = 0.5 * upper - 0.5 * lower
+    middle = 0.5 * lower + 0.5 * upper
     diagonal = 2.0 * float(np.linalg.norm(half))
-    if not used.all():
-        spare = int(len(used) - np.count_nonzero(used))
-        verdict.add("unreferenced_vertices", INFO, f"{spare} vertices belong to no face; they carry no mass")
+    if extent.unused:
+        spare = "1 vertex belongs" if extent.unused == 1 else f"{extent.unused} vertices belong"
+        verdict.add("unreferenced_vertices", INFO, f"{spare} to no face; that carries no mass")
     if diagonal == 0.0:
         verdict.usable = False
         verdict.add("zero_volume", ERROR, "all vertices lie in one point")
         return verdict, topology
-    _judge_edges(verdict, topology, vertices, triangles, half)
+    sums = component_sums(vertices, triangles, topology, middle)
+    _judge_edges(verdict, topology, sums, vertices, half)
     if topology.unbalanced == 0:
-        volume = component_volumes(vertices, triangles, np.zeros(len(triangles), np.int64), 1)[0][0]
+        volume = float(np.sum(sums.volume))
         empty = abs(volume) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
         if topology.components > 1 or not empty:
-            _judge_components(verdict, topology, vertices, triangles)
+            _judge_components(verdict, topology, sums, vertices, triangles)
         if empty and verdict.closed:
             verdict.add("zero_volume", ERROR, "the surface encloses no volume: it is flat, or folded onto itself")
         elif not empty and abs(volume) < THIN * diagonal**3:
             verdict.add("thin", INFO, f"thin body: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
     if polygon_starts is not None:
-        deviation, spread = _polygon_planarity(vertices, triangles, polygon_starts, 0.5 * lower + 0.5 * upper)
+        deviation, spread = polygon_planarity(vertices, triangles, polygon_starts, middle)
         if deviation > NONPLANAR * diagonal:
-            verdict.add(
-                "nonplanar_polygons",
-                INFO,
-                f"non-planar polygons, triangulated from their first corner: corners lie up to {deviation:.2g} off the plane; "
-                f"other triangulations would change the volume by up to {spread:.2g}",
-            )
+            off = f"corners lie up to {deviation:.2g} off the plane"
+            other = f"other triangulations would change the volume by up to {spread:.2g}"
+            message = f"non-planar polygons, triangulated from their first corner: {off}; {other}"
+            verdict.add("nonplanar_polygons", INFO, message)
     return verdict, topology
 
 
-def _no_volume(vertices, triangles, diagonal: float) -> bool:
+def _no_volume(vertices: np.ndarray, triangles: np.ndarray, diagonal: float) -> bool:
     """Whether the volume, taken in pair arithmetic, is below rounding of area × diagonal."""
-    from ..base.errors import MeshError
-    from .moments import solid_moments
-
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = 0.5 * float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
     try:

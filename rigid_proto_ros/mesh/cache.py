@@ -13,7 +13,9 @@ import json
 import os
 import tempfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -61,7 +63,7 @@ def _path(key: str, kind: str) -> Path | None:
     return base / f"{key}-{code_tag()}.{kind}" if base else None
 
 
-def _write(path: Path, save) -> None:
+def _write(path: Path, save: Callable[[IO[bytes]], object]) -> None:
     """Write to a file beside ``path`` and move it there, so that a reader never sees half an entry."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,12 +92,14 @@ def _prune(base: Path) -> None:
 def load_arrays(key: str) -> dict[str, np.ndarray] | None:
     """The arrays kept under ``key``, or None."""
     path = _path(key, "npz")
+    if path is None:
+        return None
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         os.utime(path)
         return arrays
-    except (OSError, ValueError, TypeError, EOFError, KeyError, zipfile.BadZipFile):
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
         return None
 
 
@@ -103,16 +107,18 @@ def store_arrays(key: str, **arrays: np.ndarray) -> None:
     """Keep arrays under ``key``."""
     path = _path(key, "npz")
     if path:
-        _write(path, lambda stream: np.savez(stream, **arrays))
+        _write(path, lambda stream: np.savez(stream, allow_pickle=False, **arrays))
 
 
 def load_json(key: str) -> dict | None:
     """The JSON object kept under ``key``, or None."""
     path = _path(key, "json")
+    if path is None:
+        return None
     try:
         value = json.loads(path.read_bytes())
         return value if isinstance(value, dict) else None
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError):
         return None
 
 

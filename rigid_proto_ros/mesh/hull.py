@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Convex hull of a point set, by Qhull (Barber, Dobkin, Huhdanpaa, ACM TOMS 22, 1996) through SciPy, and the bounding box, as
-meshes."""
+"""Convex hull of a point set, by Qhull (Barber, Dobkin, Huhdanpaa, ACM TOMS 22, 1996) through SciPy, and the bounding
+box, as meshes.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +27,9 @@ def box_surface(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _round_shape(points: np.ndarray) -> np.ndarray:
-    """The points (n, 3) stretched until all directions spread alike, which leaves the hull's faces as they are: Qhull would
-    take a thin slab at an angle for flat."""
+    """The points (n, 3) stretched until all directions spread alike, which leaves the hull's faces as they are: Qhull
+    would take a thin slab at an angle for flat.
+    """
     points = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
     extent = float(np.max(np.abs(points)))
     if not extent > 0.0:
@@ -54,8 +56,8 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
         raise MeshError("mesh_fallback", f"{len(points)} points have no hull with a volume; box may do")
     shape = _round_shape(points)
     try:
-        # Points that lie in one plane but for rounding can leave cracks between Qhull's triangles; moved by 1e-11 of the
-        # extent ("joggled") they can't.
+        # Points that lie in one plane but for rounding can leave cracks between Qhull's triangles; moved by 1e-11 of
+        # the extent ("joggled") they can't.
         for options in ("Qt", "QJ"):
             hull = ConvexHull(shape, qhull_options=options)
             triangles = hull.simplices.astype(np.int64)

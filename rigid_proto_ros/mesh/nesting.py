@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Which closed components lie inside which others, and which cross.
 
-A point lies inside a closed component when a ray from it leaves the component more often than it enters it. The ray's hits are
-found with the watertight test of Woop, Benthin and Wald (Journal of Computer Graphics Techniques 2, 2013); one that comes too
-near an edge to be sure is shot again in another direction, and a point on the other surface decides nothing.
+A point lies inside a closed component when a ray from it leaves the component more often than it enters it. The ray's
+hits are found with the watertight test of Woop, Benthin and Wald (Journal of Computer Graphics Techniques 2, 2013); one
+that comes too near an edge to be sure is shot again in another direction, and a point on the other surface decides
+nothing.
 """
 
 from __future__ import annotations
@@ -17,11 +18,15 @@ from ..base.compilation import njit
 from .tree import LEAF, triangle_tree
 
 WORK_LIMIT = 100_000_000
-"""Boxes and triangles visited after which nesting or crossing is left undecided and said to be so: about a second of work."""
+"""Boxes and triangles visited after which nesting or crossing is left undecided and said to be so: about
+a second of work.
+"""
 SAMPLES = 24
 """Points of a component, inside evenly picked triangles, of which it is asked whether they lie inside another one."""
 NEAR = 1e-9
-"""Part of a triangle's size, or of the mesh's, within which a hit on an edge, or on the surface itself, isn't trusted."""
+"""Part of a triangle's size, or of the mesh's, within which a hit on an edge, or on the surface itself,
+isn't trusted.
+"""
 
 # Directions that no mesh is aligned with; the first alone is used unless a ray meets an edge.
 _DIRECTIONS = np.array([(0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316)])
@@ -31,7 +36,7 @@ _UNKNOWN, _OUTSIDE, _INSIDE = 0, 1, 2
 
 
 @njit(cache=True, nogil=True)
-def _may_hit(box, origin, inverse):
+def _may_hit(box: np.ndarray, origin: np.ndarray, inverse: np.ndarray) -> bool:
     """Whether the ray from ``origin`` meets the box; inverse (3,): 1/direction."""
     near, far = 0.0, math.inf
     for k in range(3):
@@ -42,9 +47,18 @@ def _may_hit(box, origin, inverse):
 
 
 @njit(cache=True, nogil=True)
-def _hit(vertices, triangle, origin, direction, kx, ky, kz, reach):
-    """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: not near an edge or
-    within ``reach`` of the origin.
+def _hit(
+    vertices: np.ndarray,
+    triangle: np.ndarray,
+    origin: np.ndarray,
+    direction: np.ndarray,
+    kx: int,
+    ky: int,
+    kz: int,
+    reach: float,
+) -> tuple[int, bool]:
+    """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: not near an
+    edge or within ``reach`` of the origin.
     """
     sx, sy = direction[kx] / direction[kz], direction[ky] / direction[kz]
     a, b, c = vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]
@@ -72,7 +86,20 @@ def _hit(vertices, triangle, origin, direction, kx, ky, kz, reach):
 
 
 @njit(cache=True, nogil=True)
-def _shoot(vertices, triangles, component, order, boxes, own, origin, direction, reach, winding, sure, limit):
+def _shoot(  # noqa: PLR0913 - a kernel
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    component: np.ndarray,
+    order: np.ndarray,
+    boxes: np.ndarray,
+    own: int,
+    origin: np.ndarray,
+    direction: np.ndarray,
+    reach: float,
+    winding: np.ndarray,
+    sure: np.ndarray,
+    limit: int,
+) -> int:
     """Add the signed hits of all components but ``own`` to winding (k,), marking those not sure; returns the visits."""
     kz = 0
     for k in range(1, 3):
@@ -105,9 +132,21 @@ def _shoot(vertices, triangles, component, order, boxes, own, origin, direction,
 
 
 @njit(cache=True, nogil=True)
-def _sides(vertices, triangles, component, order, boxes, samples, owners, near, reach, limit):
-    """For samples (s,), triangle numbers of components ``owners`` (s,): how many of each component's samples are outside
-    and inside each other one, (k, k) each, and the components left undecided (k,) when ``limit`` visits didn't suffice.
+def _sides(  # noqa: PLR0913 - a kernel
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    component: np.ndarray,
+    order: np.ndarray,
+    boxes: np.ndarray,
+    samples: np.ndarray,
+    owners: np.ndarray,
+    near: np.ndarray,
+    reach: float,
+    limit: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For samples (s,), triangle numbers of components ``owners`` (s,): how many of each component's samples are
+    outside and inside each other one, (k, k) each, and the components left undecided (k,) when ``limit`` visits didn't
+    suffice.
 
     near (k, k): pairs whose boxes overlap.
     """
@@ -163,7 +202,7 @@ def _sides(vertices, triangles, component, order, boxes, samples, owners, near, 
 
 
 @njit(cache=True, nogil=True)
-def _segment_crosses(p, q, a, b, c):
+def _segment_crosses(p: np.ndarray, q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
     """Whether segment p q passes properly through triangle a b c; touching and coplanar cases don't count."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
@@ -185,7 +224,7 @@ def _segment_crosses(p, q, a, b, c):
 
 
 @njit(cache=True, nogil=True)
-def _triangles_cross(vertices, s, t):
+def _triangles_cross(vertices: np.ndarray, s: np.ndarray, t: np.ndarray) -> bool:
     for k in range(3):
         if _segment_crosses(vertices[s[k]], vertices[s[(k + 1) % 3]], vertices[t[0]], vertices[t[1]], vertices[t[2]]):
             return True
@@ -195,7 +234,16 @@ def _triangles_cross(vertices, s, t):
 
 
 @njit(cache=True, nogil=True)
-def _crossing_pairs(vertices, triangles, component, order, boxes, near, found, limit):
+def _crossing_pairs(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    component: np.ndarray,
+    order: np.ndarray,
+    boxes: np.ndarray,
+    near: np.ndarray,
+    found: np.ndarray,
+    limit: int,
+) -> bool:
     """Mark pairs of components whose triangles cross in found (k, k); False when ``limit`` visits didn't suffice."""
     leaves = (len(boxes) + 1) // 2
     stack = np.empty(64, np.int64)
@@ -232,8 +280,9 @@ def _crossing_pairs(vertices, triangles, component, order, boxes, near, found, l
 
 @dataclass(frozen=True)
 class Nesting:
-    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. decided (k,) bool: False
-    for a component of which the work limit left open where it lies. complete: False when anything was left open.
+    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. decided (k,)
+    bool: False for a component of which the work limit left open where it lies. complete: False when anything was left
+    open.
     """
 
     inside: np.ndarray
@@ -247,7 +296,9 @@ class Nesting:
         return np.count_nonzero(self.inside, axis=1)
 
 
-def component_nesting(vertices, triangles, component, lower, upper) -> Nesting:
+def component_nesting(
+    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> Nesting:
     """How closed components lie to each other; component (m,) numbers them, lower and upper (k, 3) are their boxes."""
     count = len(lower)
     near = np.all((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None]), axis=2)

@@ -14,109 +14,104 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import MeshError
-from .numbers_in_text import (
-    EXACT,
-    NEEDS_FLOAT,
-    float_of,
-    is_blank,
-    line_of,
-    read_number,
-    token_end,
-)
+from .numbers_in_text import error_at, finish_numbers, is_blank, line_end, read_point, skip_blanks, token_end
 
 _OK, _BAD_VERTEX, _BAD_INDEX, _FEW_CORNERS = 0, 1, 2, 3
+_V, _F, _OTHER_LINE = 118, 102, 0
+_VERTEX = "v with three numbers"
 
 
 @njit(cache=True, nogil=True)
-def _count(buffer):
+def _line_kind(buffer: np.ndarray, i: int) -> int:
+    """_V or _F when the line whose first token begins at i is one of theirs."""
+    if i + 1 < buffer.shape[0] and is_blank(buffer[i + 1]) and (buffer[i] == _V or buffer[i] == _F):
+        return buffer[i]
+    return _OTHER_LINE
+
+
+@njit(cache=True, nogil=True)
+def _count(buffer: np.ndarray) -> tuple[int, int, int]:
     """Numbers of v lines, f lines, and tokens on f lines: upper bounds that size the arrays."""
     vertices = faces = corners = 0
     i, end = 0, buffer.shape[0]
     while i < end:
-        while i < end and is_blank(buffer[i]):
-            i += 1
-        kind = buffer[i] if i + 1 < end and is_blank(buffer[i + 1]) else 0
-        if kind == 118:
+        i = skip_blanks(buffer, i, False)
+        kind = _line_kind(buffer, i)
+        if kind == _V:
             vertices += 1
-        elif kind == 102:
+        elif kind == _F:
             faces += 1
             i += 1
             while i < end and buffer[i] != 10:
-                while i < end and is_blank(buffer[i]):
-                    i += 1
-                stop = token_end(buffer, i, end)
+                i = skip_blanks(buffer, i, False)
+                stop = token_end(buffer, i)
                 corners += stop > i
                 i = stop
-        while i < end and buffer[i] != 10:
-            i += 1
-        i += 1
+        i = line_end(buffer, i) + 1
     return vertices, faces, corners
 
 
 @njit(cache=True, nogil=True)
-def _read(buffer, vertices, corners, starts, slow):
-    """Fill the arrays; slow (k, 3) takes (flat coordinate index, token start, token end) of numbers left to float().
+def _corner(buffer: np.ndarray, i: int, known: int) -> tuple[int, int]:
+    """(vertex from 0, position after the token) of a face's corner at i, after ``known`` vertices; −1: no such."""
+    end = buffer.shape[0]
+    negative = buffer[i] == 45
+    if negative:
+        i += 1
+    index = 0
+    first = i
+    while i < end and 48 <= buffer[i] <= 57 and i - first < 18:
+        index = index * 10 + (buffer[i] - 48)
+        i += 1
+    ends = i >= end or is_blank(buffer[i]) or buffer[i] == 10 or buffer[i] == 47
+    if index == 0 or not ends:
+        return -1, i
+    return (known - index if negative else index - 1), token_end(buffer, i)
 
-    Returns (status, position, vertices read, polygons read, slow tokens).
+
+@njit(cache=True, nogil=True)
+def _face(buffer: np.ndarray, i: int, corners: np.ndarray, corner: int, known: int) -> tuple[int, int, int]:
+    """Corners from i to the line's end into corners (c,) from ``corner`` on: (status, position, corners read)."""
+    end = buffer.shape[0]
+    first = corner
+    while True:
+        i = skip_blanks(buffer, i, False)
+        if i >= end or buffer[i] == 10 or buffer[i] == 35:
+            break
+        vertex, i = _corner(buffer, i, known)
+        if vertex < 0:
+            return _BAD_INDEX, i, corner
+        corners[corner] = vertex
+        corner += 1
+    return (_OK if corner - first >= 3 else _FEW_CORNERS), i, corner
+
+
+@njit(cache=True, nogil=True)
+def _read(
+    buffer: np.ndarray, vertices: np.ndarray, corners: np.ndarray, starts: np.ndarray, slow: np.ndarray
+) -> tuple[int, int, int, int, int]:
+    """Fill the arrays; slow (k, 3) as in ``read_point``.
+
+    Returns (status, position, vertices read, polygons read, numbers noted in slow).
     """
     vertex = polygon = corner = slow_count = 0
-    i, end = 0, buffer.shape[0]
+    i = 0
     starts[0] = 0
-    while i < end:
-        while i < end and is_blank(buffer[i]):
-            i += 1
-        kind = buffer[i] if i + 1 < end and is_blank(buffer[i + 1]) else 0
-        line = i
-        if kind == 118:
-            i += 1
-            for k in range(3):
-                while i < end and is_blank(buffer[i]):
-                    i += 1
-                first = i
-                value, i, status = read_number(buffer, i, end)
-                if status == EXACT:
-                    vertices[vertex, k] = value
-                elif status == NEEDS_FLOAT:
-                    slow[slow_count, 0] = 3 * vertex + k
-                    slow[slow_count, 1] = first
-                    slow[slow_count, 2] = i
-                    slow_count += 1
-                else:
-                    return _BAD_VERTEX, line, vertex, polygon, slow_count
+    while i < buffer.shape[0]:
+        line = i = skip_blanks(buffer, i, False)
+        kind = _line_kind(buffer, i)
+        if kind == _V:
+            i, slow_count, whole = read_point(buffer, i + 1, vertices, vertex, slow, slow_count, False)
+            if not whole:
+                return _BAD_VERTEX, line, vertex, polygon, slow_count
             vertex += 1
-        elif kind == 102:
-            i += 1
-            count = 0
-            while True:
-                while i < end and is_blank(buffer[i]):
-                    i += 1
-                if i >= end or buffer[i] == 10 or buffer[i] == 35:
-                    break
-                negative = buffer[i] == 45
-                if negative:
-                    i += 1
-                index = 0
-                first = i
-                while i < end and 48 <= buffer[i] <= 57 and i - first < 18:
-                    index = index * 10 + (buffer[i] - 48)
-                    i += 1
-                ends = i >= end or is_blank(buffer[i]) or buffer[i] == 10 or buffer[i] == 47
-                if i == first or index == 0 or not ends:
-                    return _BAD_INDEX, line, vertex, polygon, slow_count
-                index = vertex - index if negative else index - 1
-                if index < 0:
-                    return _BAD_INDEX, line, vertex, polygon, slow_count
-                corners[corner] = index
-                corner += 1
-                count += 1
-                i = token_end(buffer, i, end)
-            if count < 3:
-                return _FEW_CORNERS, line, vertex, polygon, slow_count
+        elif kind == _F:
+            status, i, corner = _face(buffer, i + 1, corners, corner, vertex)
+            if status != _OK:
+                return status, line, vertex, polygon, slow_count
             polygon += 1
             starts[polygon] = corner
-        while i < end and buffer[i] != 10:
-            i += 1
-        i += 1
+        i = line_end(buffer, i) + 1
     return _OK, 0, vertex, polygon, slow_count
 
 
@@ -142,20 +137,13 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     slow = np.empty((3 * n, 3), np.int64)
     status, position, n, p, slow_count = _read(buffer, vertices, corners, starts, slow)
     if status != _OK:
-        text = data[position : position + 60].split(b"\n")[0].decode("ascii", "replace").strip()
         expected = {
             _BAD_VERTEX: "v with three coordinates",
             _BAD_INDEX: "f with nonzero integer vertex numbers, negative ones counted back from the last vertex",
             _FEW_CORNERS: "f with three or more corners",
         }[status]
-        raise MeshError(f"{name} line {line_of(data, position)}", text, expected)
-    flat = vertices.reshape(-1)
-    for index, first, stop in slow[:slow_count].tolist():
-        value = float_of(data[first:stop])
-        if value is None:
-            token = data[first:stop][:40].decode("ascii", "replace")
-            raise MeshError(f"{name} line {line_of(data, first)}", token, "v with three numbers")
-        flat[index] = value
+        raise error_at(data, position, name, expected)
+    finish_numbers(vertices, slow[:slow_count], data, name, _VERTEX)
     corners = corners[: starts[p]]
     if corners.size and int(corners.max()) >= n:
         where = int(np.argmax(corners >= n))

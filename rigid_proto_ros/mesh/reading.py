@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.bounded_file import read_bounded
 from ..base.bundled import PACKAGE_FOLDER
 from ..base.compilation import njit
 from ..base.errors import MeshError
@@ -120,7 +121,7 @@ def _found_mesh(name: str) -> Path:
 
 
 @njit(cache=True, nogil=True)
-def _fan(corners, starts, triangles, polygon_starts):
+def _fan(corners: np.ndarray, starts: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray) -> None:
     t = 0
     for polygon in range(starts.shape[0] - 1):
         first = starts[polygon]
@@ -216,14 +217,8 @@ def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES) -> Mesh:
     the cache by its content's hash. Raises MeshError naming the file and what is wrong with it.
     """
     path = resolve_mesh(name)
-    try:
-        size = path.stat().st_size
-        if size > BYTES_PER_TRIANGLE * max_triangles:
-            limit = f"{BYTES_PER_TRIANGLE * max_triangles}, enough for {max_triangles} triangles"
-            raise MeshError(path.name, f"{size} bytes are more than {limit}; --max-triangles raises the limit")
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError("mesh", f"{str(path)!r} can't be read ({error.strerror})") from None
+    kind = f"a mesh of {max_triangles} triangles (--max-triangles raises the limit)"
+    data = read_bounded(path, BYTES_PER_TRIANGLE * max_triangles, "mesh", kind)
     sha256 = hashlib.sha256(data).hexdigest()
     key = f"{sha256}-{path.suffix.lower().lstrip('.')}"
     cached = len(data) >= CACHED_SIZE and not mesh_cache.is_passing(path)

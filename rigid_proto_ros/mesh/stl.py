@@ -10,16 +10,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import MeshError
-from .numbers_in_text import (
-    EXACT,
-    NEEDS_FLOAT,
-    excerpt,
-    float_of,
-    is_blank,
-    line_of,
-    read_number,
-    token_end,
-)
+from .numbers_in_text import error_at, finish_numbers, read_point, skip_blanks, token_end
 from .topology import first_equal_rows
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -69,7 +60,7 @@ _OK, _BAD_NUMBER, _NOT_THREE = 0, 1, 2
 
 
 @njit(cache=True, nogil=True)
-def _word(buffer, i, stop):
+def _word(buffer: np.ndarray, i: int, stop: int) -> int:
     """Which of the words that matter the token from i to stop is, in capitals or not."""
     length = stop - i
     for kind in range(1, len(_WORDS)):
@@ -85,22 +76,20 @@ def _word(buffer, i, stop):
 
 
 @njit(cache=True, nogil=True)
-def _facets(buffer, points, slow):
-    """Corner points into points (n, 3), token by token, so that line ends count as blanks; slow (k, 3) takes (flat index, token
-    start, token end) of numbers left to float(). Returns (status, position, points, whole facets, slow tokens).
+def _facets(buffer: np.ndarray, points: np.ndarray, slow: np.ndarray) -> tuple[int, int, int, int, int]:
+    """Corner points into points (n, 3), token by token: line ends count as blanks; slow (k, 3) as in ``read_point``.
+
+    Returns (status, position, points, whole facets, numbers noted in slow).
     """
     i, end = 0, buffer.shape[0]
     count = facets = in_facet = slow_count = 0
     named = False  # within the name of a solid, which may hold any word
     while True:
-        while i < end and (is_blank(buffer[i]) or buffer[i] == 10):
-            i += 1
+        first = i = skip_blanks(buffer, i, True)
         if i >= end:
             return _OK, i, count, facets, slow_count
-        stop = token_end(buffer, i, end)
-        kind = _word(buffer, i, stop)
-        first = i
-        i = stop
+        i = token_end(buffer, i)
+        kind = _word(buffer, first, i)
         if kind in (_SOLID, _END_SOLID):
             named = True
         elif kind == _FACET_WORD:
@@ -112,37 +101,23 @@ def _facets(buffer, points, slow):
         elif kind == _VERTEX and not named:
             if in_facet == 3 or count == points.shape[0]:
                 return _NOT_THREE, first, count, facets, slow_count
-            for k in range(3):
-                while i < end and (is_blank(buffer[i]) or buffer[i] == 10):
-                    i += 1
-                place = i
-                value, i, status = read_number(buffer, i, end)
-                if status == EXACT:
-                    points[count, k] = value
-                elif status == NEEDS_FLOAT:
-                    slow[slow_count, 0], slow[slow_count, 1], slow[slow_count, 2] = 3 * count + k, place, i
-                    slow_count += 1
-                else:
-                    return _BAD_NUMBER, first, count, facets, slow_count
+            i, slow_count, whole = read_point(buffer, i, points, count, slow, slow_count, True)
+            if not whole:
+                return _BAD_NUMBER, first, count, facets, slow_count
             in_facet += 1
             count += 1
 
 
 def _ascii_points(data: bytes, name: str) -> np.ndarray:
     """Corner points (3m, 3) in file order."""
+    accepted = "vertex with three numbers"
     # A corner takes 12 bytes or more ("vertex 0 0 0"), and never more numbers than that are left to float().
     room = len(data) // 12 + 1
     points, slow = np.empty((room, 3)), np.empty((3 * room, 3), np.int64)
     status, position, count, facets, slow_count = _facets(np.frombuffer(data, np.uint8), points, slow)
-    flat = points.reshape(-1)
-    for index, first, stop in slow[:slow_count].tolist():
-        value = float_of(data[first:stop])
-        if value is None:
-            where = f"{name} line {line_of(data, first)}"
-            raise MeshError(where, excerpt(data, first), "vertex with three numbers")
-        flat[index] = value
+    finish_numbers(points, slow[:slow_count], data, name, accepted)
     if status == _BAD_NUMBER:
-        raise MeshError(f"{name} line {line_of(data, position)}", excerpt(data, position), "vertex with three numbers")
+        raise error_at(data, position, name, accepted)
     if status == _NOT_THREE or count != 3 * facets:
         received = f"{count} vertices in {facets} whole facets"
         raise MeshError(name, f"{received}, which is not three a facet; the file may be truncated")

@@ -49,7 +49,7 @@ def weld_equal(vertices: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def _root(parent, i):
+def _root(parent: np.ndarray, i: int) -> int:
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -57,15 +57,35 @@ def _root(parent, i):
 
 
 @njit(cache=True, nogil=True)
-def _edges(corners, vertex_count):
-    """Group the directed edges of ``corners`` (m, 3) by undirected edge, and join triangles that share one.
+def _join(parent: np.ndarray, s: int, t: int) -> None:
+    """Put s and t into one set, whose root is its smallest member."""
+    a, b = _root(parent, s), _root(parent, t)
+    if a < b:
+        parent[b] = a
+    elif b < a:
+        parent[a] = b
 
-    Returns edge arrays (low vertex, high vertex, uses low→high, uses high→low, first and second triangle) and each
-    triangle's representative in its component. Edges from a vertex to itself are no edges.
+
+@njit(cache=True, nogil=True)
+def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray:
+    """The smallest member of the set that each of 0 to count − 1 is in, when first[k] and second[k] are in one set."""
+    parent = np.arange(count)
+    for k in range(first.shape[0]):
+        _join(parent, first[k], second[k])
+    for i in range(count):
+        parent[i] = _root(parent, i)
+    return parent
+
+
+@njit(cache=True, nogil=True)
+def _half_edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The triangles' sides by their lower vertex: those of vertex v are keys[starts[v]:starts[v + 1]].
+
+    A key is (higher vertex, triangle, 1 when it runs from high to low), from the highest bits on: sorted keys of one
+    vertex stand edge by edge. Sides from a vertex to itself are left out.
     """
-    m = corners.shape[0]
     starts = np.zeros(vertex_count + 1, np.int64)
-    for t in range(m):
+    for t in range(corners.shape[0]):
         for k in range(3):
             u, v = corners[t, k], corners[t, (k + 1) % 3]
             if u != v:
@@ -73,62 +93,78 @@ def _edges(corners, vertex_count):
     for i in range(vertex_count):
         starts[i + 1] += starts[i]
     fill = starts[:-1].copy()
-    other = np.empty(starts[vertex_count], np.int32)
-    user = np.empty(starts[vertex_count], np.int32)  # triangle, or ~triangle when it runs high to low
-    for t in range(m):
+    keys = np.empty(starts[vertex_count], np.int64)
+    for t in range(corners.shape[0]):
         for k in range(3):
-            u, v = corners[t, k], corners[t, (k + 1) % 3]
+            u, v = np.int64(corners[t, k]), np.int64(corners[t, (k + 1) % 3])
             if u != v:
                 low = min(u, v)
-                other[fill[low]] = max(u, v)
-                user[fill[low]] = t if u < v else ~t
+                keys[fill[low]] = (max(u, v) << 32) | (t << 1) | (u > v)
                 fill[low] += 1
-    parent = np.arange(m)
-    table = np.empty((starts[vertex_count], 6), np.int32)
+    return starts, keys
+
+
+@njit(cache=True, nogil=True)
+def _sort(keys: np.ndarray, first: int, last: int) -> None:
+    """Sort keys[first:last], mostly some six of them, in place."""
+    if last - first > 24:
+        keys[first:last] = np.sort(keys[first:last])
+        return
+    for i in range(first + 1, last):
+        key = keys[i]
+        j = i
+        while j > first and keys[j - 1] > key:
+            keys[j] = keys[j - 1]
+            j -= 1
+        keys[j] = key
+
+
+@njit(cache=True, nogil=True)
+def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray, int, bool]:
+    """Match the sides of ``corners`` (m, 3) edge by edge, and join triangles that share one.
+
+    Returns edge arrays (low vertex, high vertex, uses low→high, uses high→low, first and second triangle), each
+    triangle's component (m,), their number, and whether a triangle may repeat another one: two at one edge then have
+    the same third corner.
+    """
+    starts, keys = _half_edges(corners, vertex_count)
+    parent = np.arange(corners.shape[0])
+    table = np.empty((len(keys), 6), np.int32)
     count = 0
+    repeats = False
     for low in range(vertex_count):
-        first, last = starts[low], starts[low + 1]
-        if last - first > 24:
-            order = np.argsort(other[first:last], kind="mergesort")
-            other[first:last] = other[first:last][order]
-            user[first:last] = user[first:last][order]
-        else:
-            for i in range(first + 1, last):
-                o, s = other[i], user[i]
-                j = i
-                while j > first and other[j - 1] > o:
-                    other[j] = other[j - 1]
-                    user[j] = user[j - 1]
-                    j -= 1
-                other[j] = o
-                user[j] = s
-        i = first
+        last = starts[low + 1]
+        _sort(keys, starts[low], last)
+        i = starts[low]
         while i < last:
-            j = i
-            table[count, 0] = low
-            table[count, 1] = other[i]
-            table[count, 2] = table[count, 3] = 0
-            table[count, 4] = user[i] if user[i] >= 0 else ~user[i]
-            table[count, 5] = -1
-            while j < last and other[j] == other[i]:
-                t = user[j] if user[j] >= 0 else ~user[j]
-                if user[j] >= 0:
-                    table[count, 2] += 1
-                else:
-                    table[count, 3] += 1
-                if j == i + 1:
-                    table[count, 5] = t
-                a, b = _root(parent, table[count, 4]), _root(parent, t)
-                if a < b:
-                    parent[b] = a
-                elif b < a:
-                    parent[a] = b
-                j += 1
+            high = keys[i] >> 32
+            t = (keys[i] & 0xFFFFFFFF) >> 1
+            table[count, 0], table[count, 1], table[count, 2], table[count, 3] = low, high, 0, 0
+            table[count, 4], table[count, 5] = t, -1
+            third = corners[t, 0] + corners[t, 1] + corners[t, 2]
+            first = i
+            while i < last and keys[i] >> 32 == high:
+                table[count, 2 + (keys[i] & 1)] += 1
+                other = (keys[i] & 0xFFFFFFFF) >> 1
+                if i == first + 1:
+                    table[count, 5] = other
+                if i > first:
+                    _join(parent, t, other)
+                    # Of more than two triangles only some pairs are compared.
+                    same = corners[other, 0] + corners[other, 1] + corners[other, 2] == third
+                    repeats = repeats or i > first + 1 or same
+                i += 1
             count += 1
-            i = j
-    for t in range(m):
-        parent[t] = _root(parent, t)
-    return table[:count], parent
+    component = np.empty(len(parent), np.int64)
+    components = 0
+    for t in range(len(parent)):
+        root = _root(parent, t)
+        if root == t:  # it stands before the others of its component
+            component[t] = components
+            components += 1
+        else:
+            component[t] = component[root]
+    return table[:count], component, components, repeats
 
 
 @dataclass(frozen=True)
@@ -177,7 +213,7 @@ class Topology:
 
 
 @njit(cache=True, nogil=True)
-def _without_area(vertices, triangles):
+def _without_area(vertices: np.ndarray, triangles: np.ndarray) -> int:
     """Number of triangles whose area is zero to rounding."""
     count = 0
     for t in range(triangles.shape[0]):
@@ -193,24 +229,26 @@ def _without_area(vertices, triangles):
 
 def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     """The topology of triangles (m, 3) over vertices (n, 3)."""
-    corners = weld_equal(vertices)[triangles]
-    edges, parent = _edges(corners, len(vertices))
-    roots, component = np.unique(parent, return_inverse=True)
+    first = weld_equal(vertices)
+    corners = triangles if np.array_equal(first, np.arange(len(first))) else first[triangles]
+    edges, component, components, repeats = _edges(corners, len(vertices))
+    duplicates, opposites = _repeated(corners) if repeats else (np.zeros(len(corners), dtype=bool), 0)
+    degenerate = int(_without_area(vertices, triangles))
+    return Topology(corners, edges, component, components, duplicates, opposites, degenerate)
+
+
+def _repeated(corners: np.ndarray) -> tuple[np.ndarray, int]:
+    """Whether each of ``corners`` (m, 3) repeats an earlier one with the same winding, (m,), and the number that repeat
+    one with the opposite winding."""
     ordered = np.sort(corners, axis=1)
     first = first_equal_rows(ordered)
     # A triangle with two corners in one place adds nothing, however often it is there.
     real = (ordered[:, 0] != ordered[:, 1]) & (ordered[:, 1] != ordered[:, 2])
-    repeated = (first != np.arange(len(first))) & real
+    again = np.nonzero((first != np.arange(len(first))) & real)[0]
+    same = _even_permutation(corners[again]) == _even_permutation(corners[first[again]])
     duplicates = np.zeros(len(first), dtype=bool)
-    opposites = 0
-    if repeated.any():
-        again = np.nonzero(repeated)[0]
-        same = _even_permutation(corners[again]) == _even_permutation(corners[first[again]])
-        duplicates[again[same]] = True
-        opposites = int(np.count_nonzero(~same))
-    return Topology(
-        corners, edges, component, len(roots), duplicates, opposites, int(_without_area(vertices, triangles))
-    )
+    duplicates[again[same]] = True
+    return duplicates, int(np.count_nonzero(~same))
 
 
 def _even_permutation(corners: np.ndarray) -> np.ndarray:
@@ -220,7 +258,9 @@ def _even_permutation(corners: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def _component_sums(vertices, triangles, component, count, reference):
+def _component_sums(
+    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, reference: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     volume = np.zeros(count)
     area = np.zeros((count, 3))
     lower = np.full((count, 3), np.inf)
@@ -244,8 +284,55 @@ def _component_sums(vertices, triangles, component, count, reference):
     return volume, area, lower, upper
 
 
-def component_volumes(vertices, triangles, component, count):
-    """Per component: signed volume (k,) from the mesh's centre, vector area (k, 3), lower and upper corners (k, 3)."""
-    used = vertices[triangles.ravel()]
-    reference = 0.5 * used.min(axis=0) + 0.5 * used.max(axis=0)
-    return _component_sums(vertices, triangles, component, count, reference)
+@dataclass(frozen=True)
+class Extent:
+    """The box of the vertices that triangles use, lower and upper (3,); how many vertices are used by none, how many of
+    the used ones aren't finite, and the first of those or −1."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    unused: int
+    not_finite: int
+    first_not_finite: int
+
+
+@njit(cache=True, nogil=True)
+def _extent(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, int, int, int]:
+    used = np.zeros(vertices.shape[0], np.bool_)
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            used[triangles[t, k]] = True
+    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
+    unused = not_finite = 0
+    first = -1
+    for i in range(vertices.shape[0]):
+        if not used[i]:
+            unused += 1
+            continue
+        if not np.isfinite(0.0 * vertices[i, 0] + 0.0 * vertices[i, 1] + 0.0 * vertices[i, 2]):
+            not_finite += 1
+            first = i if first < 0 else first
+        for k in range(3):
+            lower[k], upper[k] = min(lower[k], vertices[i, k]), max(upper[k], vertices[i, k])
+    return lower, upper, unused, not_finite, first
+
+
+def referenced_extent(vertices: np.ndarray, triangles: np.ndarray) -> Extent:
+    """The extent of the vertices (n, 3) that triangles (m, 3) use."""
+    return Extent(*_extent(vertices, triangles))
+
+
+@dataclass(frozen=True)
+class Components:
+    """Per component: signed volume (k,) from ``middle`` (3,), vector area (k, 3), lower and upper corners (k, 3)."""
+
+    middle: np.ndarray
+    volume: np.ndarray
+    area: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+def component_sums(vertices: np.ndarray, triangles: np.ndarray, topology: Topology, middle: np.ndarray) -> Components:
+    """The components' volumes and boxes; ``middle`` (3,) is a point near the mesh's centre."""
+    return Components(middle, *_component_sums(vertices, triangles, topology.component, topology.components, middle))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A tree of boxes over triangles, so that a query visits the few that may matter.
 
-Triangles are sorted along a Morton curve through their centres (Morton, IBM 1966; Karras, High Performance Graphics 2012) and
-taken LEAF at a time; the boxes above them form a complete binary tree: node i has the children 2i + 1 and 2i + 2.
+Triangles are sorted along a Morton curve through their centres (Morton, IBM 1966; Karras, High Performance Graphics
+2012) and taken LEAF at a time; the boxes above them form a complete binary tree: node i has the children 2i + 1 and 2i
++ 2.
 """
 
 from __future__ import annotations
@@ -16,10 +17,9 @@ LEAF = 4
 
 
 @njit(cache=True, nogil=True)
-def _spread(value):
+def _spread(value: np.uint64) -> np.uint64:
     """The 21 low bits of a number with two zeros between each."""
-    x = np.uint64(value)
-    x = (x | (x << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
+    x = (value | (value << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
     x = (x | (x << np.uint64(16))) & np.uint64(0x1F0000FF0000FF)
     x = (x | (x << np.uint64(8))) & np.uint64(0x100F00F00F00F00F)
     x = (x | (x << np.uint64(4))) & np.uint64(0x10C30C30C30C30C3)
@@ -27,7 +27,9 @@ def _spread(value):
 
 
 @njit(cache=True, nogil=True)
-def _codes(vertices, triangles, chosen, low, size):
+def _codes(
+    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray, low: np.ndarray, size: np.ndarray
+) -> np.ndarray:
     codes = np.empty(len(chosen), np.uint64)
     for i in range(len(chosen)):
         code = np.uint64(0)
@@ -42,7 +44,7 @@ def _codes(vertices, triangles, chosen, low, size):
 
 
 @njit(cache=True, nogil=True)
-def _boxes(vertices, triangles, order, leaves):
+def _boxes(vertices: np.ndarray, triangles: np.ndarray, order: np.ndarray, leaves: int) -> np.ndarray:
     """Lower and upper corners of all nodes (2·leaves − 1, 6); an empty node's lower corner lies above its upper one."""
     boxes = np.empty((2 * leaves - 1, 6))
     boxes[:, :3] = np.inf
@@ -62,8 +64,8 @@ def _boxes(vertices, triangles, order, leaves):
 
 
 def triangle_tree(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(order, boxes) of the triangles numbered ``chosen`` (k,): their order (k,) along the curve, leaf after leaf, and the
-    nodes' boxes (2·leaves − 1, 6), lower and upper corner; leaf l is node leaves − 1 + l.
+    """(order, boxes) of the triangles numbered ``chosen`` (k,): their order (k,) along the curve, leaf after leaf, and
+    the nodes' boxes (2·leaves − 1, 6), lower and upper corner; leaf l is node leaves − 1 + l.
     """
     points = vertices[triangles[chosen].ravel()]
     low = points.min(axis=0)

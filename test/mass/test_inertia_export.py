@@ -57,7 +57,7 @@ def test_a_flat_body_is_accepted_by_mujoco():
     plate = moved(([[0, 0, 0], [1, 0, 0], [1.0, 2, 0], [0, 2, 0]], np.array([[0, 1, 2], [0, 2, 3]])), (0, 0, 0))
     for seed in range(12):
         turned = moved((np.array(plate[0]), plate[1]), (1, 2, 3), seed)
-        properties = MeshMoments(*turned, closed=False).mass_properties("shell", mass=2.0)
+        properties = MeshMoments(*turned, no_solid="open").mass_properties("shell", mass=2.0)
         text = mjcf_inertial(properties)
         assert "diaginertia" in text
         model = mujoco.MjModel.from_xml_string(

@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 from mass_solids import PLACES, box, circle, prism, solids, sphere
+from reference_mirtich import mirtich_moments
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.exact_moments import exact_solid_moments, relative_errors
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import PART, solid_moments
-from rigid_proto_ros.mass.moments_mirtich import mirtich_moments
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mesh.reading import load_mesh
 

@@ -191,7 +191,7 @@ def test_refusals_name_the_field_and_what_is_accepted():
 
 def test_an_open_surface_is_refused_where_a_volume_is_needed_and_only_there():
     vertices, triangles = box()
-    opened = MeshMoments(vertices, triangles[:-1], closed=False, closed_reason="open surface: 3 boundary edges")
+    opened = MeshMoments(vertices, triangles[:-1], no_solid="open surface: 3 boundary edges; use --repair")
     for model in COMPUTED:
         with pytest.raises(MeshError, match="--repair"):
             opened.mass_properties(model, density=1000.0)
@@ -204,12 +204,12 @@ def test_an_open_surface_is_refused_where_a_volume_is_needed_and_only_there():
 def test_points_on_a_line_are_refused_by_the_models_name():
     line = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
     with pytest.raises(TensorError, match="points"):
-        MeshMoments(line, np.array([[0, 1, 2]]), closed=False).mass_properties("points", mass=1.0)
+        MeshMoments(line, np.array([[0, 1, 2]]), no_solid="open").mass_properties("points", mass=1.0)
 
 
 def test_a_flat_surface_has_its_other_models():
     square = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 1.0, 0], [0.0, 1.0, 0]])
-    flat = MeshMoments(square, np.array([[0, 1, 2], [0, 2, 3]]), closed=False)
+    flat = MeshMoments(square, np.array([[0, 1, 2], [0, 2, 3]]), no_solid="open")
     for model in COMPUTED[1:]:
         a, b, c = np.diag(flat.mass_properties(model, mass=1.0).inertia)
         assert a + b == pytest.approx(c, rel=1e-14)

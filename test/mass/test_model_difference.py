@@ -87,7 +87,7 @@ def test_explicit_numbers_keep_their_com_and_an_open_mesh_has_no_solids() -> Non
     values = {"inertia_model": "explicit", "explicit_inertia.center_of_mass": given_com, "inertia_model_com": "solid"}
     assert read_scene("hammer", values).setup.body.center_of_mass.tolist() == pytest.approx(given_com)
     corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    open_one = MeshMoments(corner, np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]]), closed=False)
+    open_one = MeshMoments(corner, np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]]), no_solid="open")
     with pytest.raises(MeshError, match="open"):
         open_one.mass_properties("bounding_box", mass=1.0, com="solid")
 

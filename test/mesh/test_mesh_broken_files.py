@@ -214,10 +214,10 @@ def test_a_file_that_may_not_be_read_says_so(tmp_path, capsys, monkeypatch):
     path = tmp_path / "locked.obj"
     path.write_bytes(obj())
 
-    def refuse(_self):
+    def refuse(_self, _mode):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("pathlib.Path.read_bytes", refuse)
+    monkeypatch.setattr("pathlib.Path.open", refuse)
     status, _, err = inspect(capsys, str(path))
     assert status == 2
     assert "Permission denied" in one_line(err)

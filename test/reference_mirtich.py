@@ -9,6 +9,8 @@ whole polygons go in. Shares no formula with the tetrahedron sums; tests compare
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 
@@ -58,7 +60,7 @@ def _projection_integrals(ring: np.ndarray, a: int, b: int) -> dict[str, float]:
     return {key: total[key] / divisor[key] for key in total}
 
 
-def mirtich_moments(vertices: np.ndarray, rings) -> tuple[float, np.ndarray, np.ndarray]:
+def mirtich_moments(vertices: np.ndarray, rings: Iterable) -> tuple[float, np.ndarray, np.ndarray]:
     """Volume, centroid (3,) and inertia (3, 3) about the centroid at unit density.
 
     vertices (n, 3); rings: vertex numbers of each planar polygon, counterclockwise from outside. Sums are taken about
