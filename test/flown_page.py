@@ -231,7 +231,7 @@ class FlownPage:
         def shown() -> bool:
             page, link = self.page, self.link
             at = page.state is not None and page.state.time_ns == link.rows[-1][0] and not page._events
-            return at and not page._scenes.busy and page.scenario.values == link.scenario.values
+            return at and not page._scenes.busy and page.scenario.parameters == link.scenario.parameters
 
         self.until(shown, "page that has heard all")
 

@@ -35,8 +35,9 @@ from rigid_proto_ros.motion.integrators.integrator import (
     WORLD_TORQUE,
 )
 from rigid_proto_ros.ros.interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from rigid_proto_ros.scene.declaration import LIVE, READ_ONLY, Parameter
 from rigid_proto_ros.scene.lessons import lesson, lessons
-from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
+from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         scene, script = scene_path("t_handle"), example_path("flip_and_poke")
     scenario = read_scene(str(scene))
     session.unlink(missing_ok=True)
-    print(f"1. rigid_body_node: {scenario.values['mesh']}, {scenario.setup.body.mass:.6g} kg", flush=True)
+    print(f"1. rigid_body_node: {scenario.parameters.mesh}, {scenario.setup.body.mass:.6g} kg", flush=True)
     with Processes() as processes:
         node = processes.start(
             [*own_executable("rigid_body_node"), "--ros-args", "--params-file", str(scene)]

@@ -35,7 +35,7 @@ def write_demo(mesh: str, folder: Path) -> tuple[Path, Path]:
     scene = {
         "rigid_body": {
             "ros__parameters": {
-                "mesh": scenario.values["mesh"],
+                "mesh": scenario.parameters.mesh,
                 "initial": {"angular_velocity": [float(w) for w in spin]},
             }
         }

@@ -8,12 +8,17 @@ import json
 import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.bundled import scene_names
 from ..base.command_line import completes
 from ..base.errors import InputError
 from ..base.output_file import output_file
 from .terminal import line, table
+
+if TYPE_CHECKING:
+    from ..scene.parameters import Parameters
+    from ..simulation.observer import Observers
 
 EXAMPLES = (
     ("rigid_proto simulate t_handle", "the bundled T-handle, 10 s"),
@@ -69,15 +74,15 @@ def run(args: argparse.Namespace) -> int:
     scenario = read_scene(args.scene, dict(parse_setting(s) for s in args.set), _warn)
     for warning in scenario.warnings:
         _warn(warning)
-    script = read_script(args.script, scenario.values["wrench_timeout"]) if args.script else []
-    recordings = [file for file in (args.record or scenario.values["record"], args.bag) if file]
+    script = read_script(args.script, scenario.parameters.wrench_timeout) if args.script else []
+    recordings = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
     if args.bag and not is_mcap(args.bag):
         raise InputError("--bag", args.bag, "a file that ends in .mcap")
     if recordings:
         # Whatever is refused is refused here, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
         _check_places(recordings)
-    observer = _recorder(recordings, scenario.values)
+    observer = _recorder(recordings, scenario.parameters)
     try:
         flight = OfflineRun(scenario, script, observer)
         wall_time = run_with_progress(flight, nanoseconds(args.duration))
@@ -108,7 +113,7 @@ def _check_places(files: list[str]) -> None:
         raise InputError("--bag", files[-1], "another file than that of --record")
 
 
-def _recorder(files: list[str], values):
+def _recorder(files: list[str], parameters: Parameters) -> Observers | None:
     """One observer that records to all of these files; None without any."""
     if not files:
         return None
@@ -118,7 +123,7 @@ def _recorder(files: list[str], values):
     opened: list = []
     try:
         for file in files:
-            opened.append(make_recorder(file, values=values, on_error=_warn, simulated_log=True))
+            opened.append(make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True))
     except InputError:
         for recorder in opened:
             recorder.close()

@@ -24,7 +24,7 @@ def record_row(study: Study, row: Variation, file: str, tell: Callable[[str], No
     """Fly the row once more with a recorder that sees everything."""
     scenario, commands = row.scenario, row.commands
     OfflineRun(scenario, commands)  # a row that is refused overwrites no recording
-    observer = make_recorder(file, values=row.values, on_error=tell, simulated_log=True)
+    observer = make_recorder(file, parameters=row.parameters, on_error=tell, simulated_log=True)
     try:
         OfflineRun(scenario, commands, observer).advance(study.duration_ns)
     finally:
@@ -44,7 +44,7 @@ def _flight(study: Study, number: int):
     row = variation(study, number)
     scenario = row.scenario
     simulation = OfflineRun(scenario, row.commands).simulation
-    rate = min(float(scenario.values["publish_rate"]), MAX_STATES / (study.duration_ns * 1e-9))
+    rate = min(scenario.parameters.publish_rate, MAX_STATES / (study.duration_ns * 1e-9))
     times_ns, states = [], []
     while (time_ns := publication_ns(len(times_ns), rate)) <= study.duration_ns:
         state = simulation.advance(time_ns)

@@ -114,7 +114,6 @@ def _node_arguments(scene: str, mesh: str | None) -> tuple[list[str], int | None
     from ..scene.parameters import PARAMETERS
     from .processes import text_parameter
 
-    values = read_scene(scene, {"mesh": mesh} if mesh else {}).values
+    port = read_scene(scene, {"mesh": mesh} if mesh else {}).parameters.workbench_port
     arguments = ["--ros-args", "--params-file", str(scene_file(scene)), *(text_parameter("mesh", mesh) if mesh else [])]
-    port = values["workbench_port"]
     return arguments, None if port == PARAMETERS["workbench_port"].default else port

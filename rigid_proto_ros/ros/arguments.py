@@ -11,7 +11,7 @@ from ..base.bundled import scene_names
 from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError
 from ..base.nearest_name import did_you_mean
-from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named
+from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scene_file import read_scene_file, typed_value
 
 _WITH_VALUE = (
@@ -123,9 +123,7 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
                     continue
                 given[name] = value
         else:
-            assigned = _assignment(text, node_name)
-            # As in flight: a density that is set wins over a mass that was there.
-            given.update({"mass": 0.0, **assigned} if "density" in assigned else assigned)
+            given.update(with_mass_of_density(_assignment(text, node_name)))
     return given
 
 

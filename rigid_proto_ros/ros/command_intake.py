@@ -220,7 +220,7 @@ class CommandIntake:
         return when_ns
 
     def _effective(self, stamp_ns: int, simulation, scenario) -> tuple[int, str]:
-        horizon_ns = nanoseconds(scenario.values["schedule_horizon"])
+        horizon_ns = nanoseconds(scenario.parameters.schedule_horizon)
         return effective_time(stamp_ns, simulation.time_ns, time.time_ns(), horizon_ns)
 
     def _count_stamps(self, counter: str, count: int) -> None:

@@ -74,7 +74,7 @@ class Flight:
         self.scenario = scenario
         self.observer = observer
         self.simulation = Simulation(scenario.setup, observer)
-        self.timekeeping = Timekeeping(paused=scenario.values["start_paused"])
+        self.timekeeping = Timekeeping(paused=scenario.parameters.start_paused)
         self._publish = publish
         self._take_commands = take_commands
         self._on_failure = on_failure
@@ -94,8 +94,8 @@ class Flight:
 
     def change(self, scenario: Scenario) -> None:
         """Take on another scenario's time settings; its setup reaches the motion by a command."""
-        rate_changed = scenario.values["publish_rate"] != self.scenario.values["publish_rate"]
-        pace_changed = scenario.values["real_time_factor"] != self.scenario.values["real_time_factor"]
+        rate_changed = scenario.parameters.publish_rate != self.scenario.parameters.publish_rate
+        pace_changed = scenario.parameters.real_time_factor != self.scenario.parameters.real_time_factor
         self.scenario = scenario
         # One that isn't there would have missed what was commanded so far: it begins at the next reset.
         if self._ghost is not None:
@@ -216,7 +216,7 @@ class Flight:
     def _pass_over(self, present_ns: int) -> None:
         """Make no publication up to the present, but for what a run without pacing goes by."""
         if self._factor > 0.0 or self._followed_clock:
-            numerator, denominator = float(self.scenario.values["publish_rate"]).as_integer_ratio()
+            numerator, denominator = float(self.scenario.parameters.publish_rate).as_integer_ratio()
             # One early, and then on: the estimate is floored and publications are rounded.
             self._publication = max(self._publication, present_ns * numerator // (1_000_000_000 * denominator) - 1)
             while self._publication_ns() <= present_ns:
@@ -273,15 +273,15 @@ class Flight:
 
     @property
     def _factor(self) -> float:
-        return self.scenario.values["real_time_factor"]
+        return self.scenario.parameters.real_time_factor
 
     def _publication_ns(self) -> int:
-        return publication_ns(self._publication, self.scenario.values["publish_rate"])
+        return publication_ns(self._publication, self.scenario.parameters.publish_rate)
 
     def _find_next_publication(self) -> None:
         """The first publication after the present."""
         now_ns = self.simulation.time_ns
-        self._publication = max(0, int(now_ns * 1e-9 * self.scenario.values["publish_rate"]) - 1)
+        self._publication = max(0, int(now_ns * 1e-9 * self.scenario.parameters.publish_rate) - 1)
         while self._publication_ns() <= now_ns:
             self._publication += 1
 
@@ -334,7 +334,7 @@ class Flight:
         publication_ns = self._anchor_wall_ns + int(ahead_ns / self._factor) + 1
         if self._lively:
             # Commands taken a little before a publication show in it; those taken with it would show a period later.
-            early_ns = publication_ns - int(LEAD * 1e9 / (self.scenario.values["publish_rate"] * self._factor))
+            early_ns = publication_ns - int(LEAD * 1e9 / (self.scenario.parameters.publish_rate * self._factor))
             if early_ns - self._last_drain_ns >= LIVELY_DRAIN_NS:
                 return min(latest_ns, early_ns)
         return min(latest_ns, publication_ns)

@@ -11,7 +11,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
 from ..base.errors import CommandRefused, InputError
-from ..scene.parameters import is_ros_parameter, parameter_named
+from ..scene.parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scenario import Scenario
 from ..simulation.commands import Change
 from .parameter_server import converted, descriptor, is_read_only, ros_parameter
@@ -49,7 +49,7 @@ class LiveParameters:
             return SetParametersResult(successful=False, reason=f"{', '.join(other)}: can be set at start only")
         parameters = [p for p in parameters if p not in fixed]
         changes = {p.name: p.value for p in parameters if not is_ros_parameter(p.name)}
-        if "density" in changes and "mass" not in changes:
+        if changes.keys() < with_mass_of_density(changes).keys():
             changes["mass"] = 0.0
             parameters = [*parameters, *_as_ros({"mass": 0.0})]
         try:
@@ -81,7 +81,7 @@ class LiveParameters:
         planned = present.with_changes(changes)
         if planned.setup.integrator is not present.setup.integrator:
             _warm_up(planned)
-        if changes.get("record", "") == present.values["record"]:
+        if changes.get("record", "") == present.parameters.record:
             changes = {name: value for name, value in changes.items() if name != "record"}
 
         def check() -> Scenario:
@@ -115,15 +115,17 @@ class LiveParameters:
             finished = node.call(lambda: node.switch_recording(recorder))
             if finished is not None:
                 finished.close()
-        node.states.configure(flight.scenario.values)
+        node.states.configure(flight.scenario.parameters)
 
     def _follow(self) -> None:
         """Bring the ROS parameters up to what scheduled commands and inertia messages have changed."""
-        values = self._node.flight.scenario.values
-        behind = {name: value for name, value in values.items() if not self._is_in_force(_as_ros({name: value})[0])}
+        now = self._node.flight.scenario.parameters
+        behind = {
+            name: value for name, value in now.named().items() if not self._is_in_force(_as_ros({name: value})[0])
+        }
         if behind:
             self._store(_as_ros(behind), behind)
-            self._node.states.configure(values)
+            self._node.states.configure(now)
 
     def _store(self, parameters: list[Parameter], values: dict) -> SetParametersResult:
         """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""

@@ -116,8 +116,8 @@ def _warn(warning: str) -> None:
 
 def _make_viewer(scenario, node_name: str):
     """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
-    values = scenario.values
-    if values["viewer"] == "none":
+    parameters = scenario.parameters
+    if parameters.viewer == "none":
         return None
     from ..rerun_view import RerunObserver
 
@@ -125,18 +125,18 @@ def _make_viewer(scenario, node_name: str):
         print(f"{node_name}: {line}", file=sys.stderr)
 
     return RerunObserver(
-        viewer=values["viewer"],
-        rerun_port=_asked_for(values, "rerun_port"),
-        web_port=_asked_for(values, "web_port"),
+        viewer=parameters.viewer,
+        rerun_port=_asked_for("rerun_port", parameters.rerun_port),
+        web_port=_asked_for("web_port", parameters.web_port),
         name=node_name,
         report=tell,
         on_error=tell,
     )
 
 
-def _asked_for(values, port: str) -> int | None:
+def _asked_for(name: str, port: int) -> int | None:
     """None for a default port, which may move to the next free one."""
-    return None if values[port] == PARAMETERS[port].default else values[port]
+    return None if port == PARAMETERS[name].default else port
 
 
 def _say_that_it_compiles() -> None:
@@ -145,7 +145,7 @@ def _say_that_it_compiles() -> None:
 
 def _described(node) -> str:
     scenario = node.flight.scenario
-    mesh = scenario.values["mesh"] or "a body without a mesh"
+    mesh = scenario.parameters.mesh or "a body without a mesh"
     return f"{mesh}: {scenario.setup.body.mass:.6g} kg, integrator {scenario.setup.integrator.name}"
 
 

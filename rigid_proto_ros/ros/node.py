@@ -52,14 +52,14 @@ class RigidBodyNode(Node):
         scenario = make_scenario(declare_parameters(self))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
-        self.world_frame = scenario.values["world_frame"]
-        self.body_frame = scenario.values["body_frame"] or self.get_name()
+        self.world_frame = scenario.parameters.world_frame
+        self.body_frame = scenario.parameters.body_frame or self.get_name()
         self._event_publisher = EventPublisher(self, self.body_frame, self._mesh_path)
         self._viewer = make_viewer(scenario, self.get_name())
         self._recorder = self.open_recorder(scenario)
         self.observer = self._observers()
         self.states = StatePublisher(self, self.world_frame, self.body_frame, self._specific_force)
-        self.states.configure(scenario.values)
+        self.states.configure(scenario.parameters)
         self.flight = Flight(
             scenario,
             self.observer,
@@ -107,12 +107,12 @@ class RigidBodyNode(Node):
 
     def open_recorder(self, scenario: Scenario) -> Observer | None:
         """The recorder that ``record`` asks for; raises InputError when its file can't be written."""
-        path = scenario.values["record"]
+        path = scenario.parameters.record
         if not path:
             return None
         from ..rerun_view.recorder import make_recorder
 
-        return make_recorder(path, self.get_name(), scenario.values, self._recording_failed)
+        return make_recorder(path, self.get_name(), scenario.parameters, self._recording_failed)
 
     def _recording_failed(self, message: str) -> None:
         print(f"{self.get_name()}: {message}", file=sys.stderr)
@@ -130,7 +130,7 @@ class RigidBodyNode(Node):
 
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
         """/clock, when use_sim_time asks for it and it isn't our own."""
-        if not self.get_parameter("use_sim_time").value or scenario.values["publish_clock"]:
+        if not self.get_parameter("use_sim_time").value or scenario.parameters.publish_clock:
             return None
         self.follows_clock = True
         clock = self.get_clock()
@@ -150,7 +150,7 @@ class RigidBodyNode(Node):
 
     def _specific_force(self):
         """At the contact that ~/imu is mounted at, or the COM."""
-        contact, simulation = self.flight.scenario.values["imu_contact"], self.flight.simulation
+        contact, simulation = self.flight.scenario.parameters.imu_contact, self.flight.simulation
         body = simulation.setup.body
         point = body.point(simulation.setup.contacts[contact]) if contact else np.zeros(3)
         return simulation.specific_force(point)
@@ -172,7 +172,7 @@ class RigidBodyNode(Node):
 
     def check_change(self, scenario: Scenario) -> None:
         """On the physics thread: raises InputError where this scenario can't follow the present one."""
-        if self.follows_clock and scenario.values["publish_clock"]:
+        if self.follows_clock and scenario.parameters.publish_clock:
             raise InputError(
                 "publish_clock", True, "false, while simulated time follows the /clock of another (use_sim_time)"
             )
@@ -230,7 +230,7 @@ class RigidBodyNode(Node):
         refused = dict(simulation.refused)
         return {
             "sim_time_ns": time_ns,
-            "publish_rate": flight.scenario.values["publish_rate"],
+            "publish_rate": flight.scenario.parameters.publish_rate,
             "overruns": timekeeping.overruns,
             "real_time_lost_s": timekeeping.real_time_lost_s,
             **{f"{topic}_received": received.get(topic, 0) for topic in TOPICS},
@@ -251,7 +251,7 @@ class RigidBodyNode(Node):
             "steps": simulation.steps,
             "force_evaluations": simulation.force_evaluations,
             "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
-            "recording": "" if getattr(self._recorder, "error", "not recording") else flight.scenario.values["record"],
+            "recording": "" if getattr(self._recorder, "error", "not recording") else flight.scenario.parameters.record,
             "warning": simulation.failure or self._namesake() or simulation.too_coarse or simulation.too_slow,
         }
 

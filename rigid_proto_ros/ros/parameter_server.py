@@ -8,14 +8,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from ..base.errors import InputError
-from ..scene import parameters
-from ..scene.parameters import (
-    PARAMETERS,
-    READ_ONLY,
-    Parameter,
-    is_ros_parameter,
-    parameter_named,
-)
+from ..scene.declaration import LIVE, READ_ONLY, Parameter
+from ..scene.parameters import PARAMETERS, is_ros_parameter, parameter_named
 
 _TYPES = {
     "double": ParameterType.PARAMETER_DOUBLE,
@@ -30,7 +24,7 @@ _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
     """The ROS descriptor of a declared parameter."""
     when = {READ_ONLY: "Set at start only."}.get(parameter.changes, f"Changes take effect {parameter.changes}.")
-    if parameter.changes == parameters.LIVE:
+    if parameter.changes == LIVE:
         when = "Can be changed while the simulation runs."
     result = ParameterDescriptor(
         name=parameter.name,

@@ -19,10 +19,9 @@ from ..base.errors import InputError
 from ..messages import cdr
 from ..messages.session_messages import PROJECTIONS, StampedRows
 from ..scene.command_codec import MARKS, ScriptCommand, frame_names, in_words, of_event
-from ..scene.parameters import defaults
-from ..scene.scene_file import read_scene_text
 from ..session.playback import sorted_states
 from ..session.recorded_session import RecordedSession
+from ..session.replay import recorded_parameters
 from ..session.runs import decode_event
 from . import qos
 from .script_sender import ScriptSender
@@ -64,16 +63,15 @@ def session_commands(session: RecordedSession) -> list[ScriptCommand]:
     """What moved the body, at the times at which it acted and in frames that a node of any name reads; pauses and steps are of
     the clock alone.
     """
-    values = {**defaults(), **(read_scene_text(session.scene, "the recorded scene").values if session.scene else {})}
-    contacts = {name.removeprefix("contacts.") for name in values if name.startswith("contacts.")}
-    frames = frame_names(values, session.node_name)
+    parameters = recorded_parameters(session)
+    frames = frame_names(parameters, session.node_name)
     commands = []
     for number, line in enumerate(session.lines, 1):
         time_ns, kind, content = decode_event(line, number)
         if kind in MARKS:
             continue
         try:
-            command = in_words(of_event(time_ns, kind, content), contacts, frames)
+            command = in_words(of_event(time_ns, kind, content), parameters.contacts, frames)
         except InputError as error:
             raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
         if kind == "set":
@@ -135,12 +133,10 @@ def _streams(session: RecordedSession) -> dict[str, StampedRows]:
 
 def _template(name: str, session: RecordedSession) -> Callable[[int, list[float]], bytes]:
     """How a row of a topic becomes bytes, with the frames' names that the session flew with."""
-    values = read_scene_text(session.scene, "the recorded scene").values if session.scene else {}
-    world = str(values.get("world_frame") or "world")
+    world, body = frame_names(recorded_parameters(session), session.node_name)
     if name != "odom":
         template = cdr.StampedTemplate(world, {"pose": 7, "twist": 6}[name])
         return lambda time_ns, row: bytes(template.pack(time_ns, row))
-    body = str(values.get("body_frame") or session.node_name.rpartition("/")[2])
     template = cdr.StampedTemplate(world, cdr.ODOMETRY_DOUBLES, child_frame_id=body)
 
     def pack(time_ns: int, row: list[float]) -> bytes:

@@ -80,7 +80,7 @@ class Scheduled:
         listed = read_schedule(self.text)
         self.is_list = isinstance(listed, list)
         self.count = len(listed) if self.is_list else 1
-        commands = expand_schedule(listed, float(scenario.values["wrench_timeout"]))
+        commands = expand_schedule(listed, float(scenario.parameters.wrench_timeout))
         self.commands = with_contacts(commands, scenario.setup.contacts)
 
     def _judge(self, scenario: Scenario, change: Callable) -> None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from sensor_msgs.msg import Imu
 from ..base.rotation import rotate
 from ..messages import cdr
 from ..motion.state import State
+from ..scene.parameters import Parameters
 from . import qos
 
 
@@ -50,15 +51,15 @@ class StatePublisher:
         self._tf_message: Any = None
         self._wanted: list = []
 
-    def configure(self, values: Mapping[str, object]) -> None:
+    def configure(self, parameters: Parameters) -> None:
         """Switch /clock and /tf on and off; runs on the executor's thread."""
         # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched off.
-        if values["publish_clock"] and self._made_clock is None:
+        if parameters.publish_clock and self._made_clock is None:
             self._made_clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
-        if values["publish_tf"] and self._made_tf is None:
+        if parameters.publish_tf and self._made_tf is None:
             self._made_tf = self._tf_publisher()
-        self._clock = self._made_clock if values["publish_clock"] else None
-        self._tf = self._made_tf if values["publish_tf"] else None
+        self._clock = self._made_clock if parameters.publish_clock else None
+        self._tf = self._made_tf if parameters.publish_tf else None
 
     def _tf_publisher(self):
         try:

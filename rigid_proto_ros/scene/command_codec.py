@@ -32,6 +32,7 @@ from ..simulation.commands import (
     TieString,
     WrenchCommand,
 )
+from .parameters import Parameters
 from .scenario import yaml_double, yaml_value
 from .scene_file import scalar
 
@@ -169,9 +170,9 @@ def _text(value) -> str:
 # Data -> the simulation's command
 
 
-def frame_names(values: Mapping[str, object], node_name: str) -> tuple[str, str]:
+def frame_names(parameters: Parameters, node_name: str) -> tuple[str, str]:
     """What the node of this name calls the world's frame and the body's."""
-    return str(values["world_frame"]), str(values["body_frame"]) or node_name.rpartition("/")[2] or "rigid_body"
+    return parameters.world_frame, parameters.body_frame or node_name.rpartition("/")[2] or "rigid_body"
 
 
 def core_command(

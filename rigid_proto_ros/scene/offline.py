@@ -15,7 +15,7 @@ from ..simulation.observer import Observer
 from ..simulation.simulation import Simulation, judge
 from .command_codec import ScriptCommand, core_command
 from .ghost import ghost_of
-from .parameters import is_ros_parameter, parameter_named
+from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
 from .scene_file import read_scene_file, scalar
 from .script import with_contacts
@@ -43,10 +43,7 @@ def read_scene(
     An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the settings
     sets the scene's mass, which would win, to 0, as it does in flight.
     """
-    values = {**scene_values(scene_file(name), warn), **(settings or {})}
-    if settings and "density" in settings and "mass" not in settings:
-        values["mass"] = 0.0
-    return make_scenario(values)
+    return make_scenario({**scene_values(scene_file(name), warn), **with_mass_of_density(settings or {})})
 
 
 def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, object]:
@@ -122,7 +119,7 @@ class OfflineRun:
     def advance(self, until_ns: int) -> bool:
         """Carry the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
         if self.observer is not None:
-            rate = self.scenario.values["publish_rate"]
+            rate = self.scenario.parameters.publish_rate
             while (next_ns := publication_ns(self._next_publication, rate)) <= until_ns:
                 state = self.simulation.advance(next_ns)
                 if self.simulation.failure:

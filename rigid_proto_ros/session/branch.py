@@ -105,7 +105,7 @@ def _scene(scenario: Scenario, row: np.ndarray, changes: dict) -> Scenario:
     numbers = row.tolist()
     velocities = PROJECTIONS["twist"](numbers)
     values = {
-        **scenario.values,
+        **scenario.parameters.named(),
         **changes,
         "initial.position": numbers[0:3],
         "initial.orientation_xyzw": numbers[3:7],

@@ -12,7 +12,7 @@ import logging
 import platform
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,8 @@ from ..mesh.reading import resolve_mesh
 from ..messages import cdr, session_messages
 from ..motion.body import Body
 from ..motion.loads import Load
+from ..scene.command_codec import frame_names
+from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
 from ..simulation.commands import WrenchCommand
 from ..simulation.mailbox import Block, Mailbox, Mark
@@ -53,20 +55,18 @@ class McapObserver(Observer):
         self,
         path: str | Path,
         node_name: str = "rigid_body",
-        values: Mapping[str, object] | None = None,
+        parameters: Parameters | None = None,
         on_error: Callable[[str], None] | None = None,
         simulated_log: bool = False,
     ) -> None:
         from .mcap_file import McapFile
 
-        values = values or {}
         self.error = ""
         self._path = path
         self._on_error = on_error or _logger.error
         self._simulated_log = simulated_log
         self._run_begins_ns = self._latest_log_ns = 0
-        world = str(values.get("world_frame") or "world")
-        self._body_frame = str(values.get("body_frame") or node_name)
+        world, self._body_frame = frame_names(parameters or Parameters(), node_name)
         self._templates = {
             name: np.frombuffer(bytes(cdr.StampedTemplate(world, count).buffer), np.uint8)
             for name, count in (("pose", 7), ("twist", 6))

@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import command_of_event, frame_names
 from ..scene.ghost import Ghost
-from ..scene.parameters import convert_all
+from ..scene.parameters import Parameters, convert_all
 from ..scene.scenario import Scenario, check_inertia, make_scenario
 from ..scene.scene_file import read_scene_text
 from ..simulation.commands import Change, Command
@@ -21,6 +21,12 @@ from ..simulation.simulation import Simulation
 from .mesh import find_mesh, scene_sha256
 from .recorded_session import RecordedSession
 from .runs import decode_event
+
+
+def recorded_parameters(session: RecordedSession) -> Parameters:
+    """The parameters that the session began with; those of the default where it has no scene."""
+    scene = read_scene_text(session.scene, "the recorded scene").values if session.scene else {}
+    return Parameters().replaced(scene)
 
 
 def session_scenario(session: RecordedSession) -> Scenario:
@@ -109,8 +115,7 @@ class Resimulation:
             self.simulation.submit(command, time_ns, (b"", number), judged)
 
     def _command(self, kind: str, content: dict, number: int) -> Command | None:
-        values = self.scenario.values
-        frames = frame_names(values, self.node_name)
+        frames = frame_names(self.scenario.parameters, self.node_name)
         try:
             if kind == "set":
                 convert_all(content)

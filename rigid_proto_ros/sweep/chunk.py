@@ -7,6 +7,7 @@ one by one by the simulation, with the same bits.
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -14,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.errors import InputError
+from ..scene.declaration import Value
 from ..simulation.batch import Results, fly_variants, new_results
 from .forms import VERTEX, Draw, as_text
 from .groups import Group, is_structural
@@ -176,12 +178,13 @@ def _vertices(study: Study, columns: list[np.ndarray], column: np.ndarray) -> np
     """Vertex numbers (n,): they depend on each row's mesh."""
     structural = [(v, c) for v, c in zip(study.vary, columns, strict=True) if is_structural(v)]
     numbers = np.empty(len(column), np.int64)
+    named = study.parameters.named()
     for i, uniform in enumerate(column):
-        values = dict(study.values)
+        changes: dict[str, Value] = {}
         try:
             for vary, own in structural:
-                vary.target.put(values, [], plain(own[i]))
-            numbers[i] = vertex_number(uniform, body_mesh_of(values))
+                vary.target.put(ChainMap(changes, named), [], plain(own[i]))
+            numbers[i] = vertex_number(uniform, body_mesh_of(study.parameters.replaced(changes)))
         except InputError:
             numbers[i] = -1
     return numbers

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,7 +13,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..motion import loads as ld
 from ..motion.integrators.taylor_adaptive import degree_for
-from ..scene.parameters import convert_all, parameter_named
+from ..scene.declaration import Value
+from ..scene.parameters import parameter_named, with_mass_of_density
 from ..scene.scenario import BodyMesh
 from ..scene.script import expand_script
 from ..simulation import batch_body as bb
@@ -27,8 +29,6 @@ from .templates import (
     NotCarried,
     Script,
     Settler,
-    ballast_names,
-    ballast_of,
     checked_integrator,
     constants_of,
     script_of,
@@ -54,31 +54,29 @@ class Group:
     and says what is wrong.
     """
 
-    def __init__(self, study: Study, structural: Mapping[str, object], reference: Mapping[str, object] | None) -> None:
-        values = dict(study.values)
+    def __init__(self, study: Study, structural: Mapping[str, Value], reference: Mapping[str, Value] | None) -> None:
+        changes: dict[str, Value] = {}
+        values = ChainMap(changes, study.parameters.named())
         for vary in study.vary:
             if is_structural(vary):
                 vary.target.put(values, [], plain(structural[vary.target.name]))
         if study.density_decides:
-            values["mass"] = 0.0
-        self.reference = reference or {}
-        values.update(convert_all(self.reference))
-        if "density" in self.reference and "mass" not in self.reference:
-            values["mass"] = 0.0
-            self.reference = {**self.reference, "mass": 0.0}
+            changes["mass"] = 0.0
+        self.reference = with_mass_of_density(reference or {})
         self.study = study
-        self.values = values
-        self.body_mesh: BodyMesh | None = body_mesh_of(values)
-        self.constants = constants_of(values, self.body_mesh)
-        self.settings, self.times, self.ballast = settings_of(values), times_of(values), ballast_of(values)
-        self.settler = Settler(values, self.body_mesh)
+        self.parameters = parameters = study.parameters.replaced(changes).replaced(self.reference)
+        self.body_mesh: BodyMesh | None = body_mesh_of(parameters)
+        self.constants = constants_of(parameters, self.body_mesh)
+        self.settings, self.times = settings_of(parameters), times_of(parameters)
+        self.ballast = np.array(parameters.point_masses, dtype=float).reshape(-1, 4)
+        self.settler = Settler(parameters, self.body_mesh)
         self.overlay: Overlay | None = None
-        timeout = values["wrench_timeout"]
+        timeout = parameters.wrench_timeout
         if fits(study):
             self.overlay, loads = make_overlay(study, self.settler, timeout)
         else:
             _, loads = script_of(expand_script(study.script, "script", timeout), self.settler)
-        self.integrator = checked_integrator(values, loads)
+        self.integrator = checked_integrator(parameters, loads)
 
     def variants(self, columns: list[np.ndarray], count: int) -> tuple[Variants, np.ndarray]:
         """Arrays of ``count`` rows with these values of what varies, and which of them the batch may judge (n,)."""
@@ -97,7 +95,7 @@ class Group:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         settings = np.broadcast_to(self.settings, (count, bb.SETTINGS)).copy()
         times = np.broadcast_to(self.times, (count, bb.TIMES)).copy()
-        names = ballast_names(self.values)
+        names = [f"ballast.{name}" for name in sorted(self.parameters.ballast)]
         varies_ballast = any(v.target.parameter.startswith("ballast.") for v in self.study.vary)
         ballast = np.broadcast_to(self.ballast, (count if varies_ballast else 1, *self.ballast.shape)).copy()
         for vary, column in zip(self.study.vary, columns, strict=True):
@@ -128,9 +126,11 @@ class Group:
         scripts: list[Script | None] = []
         for i in range(count):
             try:
-                commands = expand_script(self._script([c[i] for c in columns]), "script", self.values["wrench_timeout"])
+                commands = expand_script(
+                    self._script([c[i] for c in columns]), "script", self.parameters.wrench_timeout
+                )
                 script, loads = script_of(commands, self.settler)
-                checked_integrator(self.values, loads)
+                checked_integrator(self.parameters, loads)
                 scripts.append(script)
             except (NotCarried, InputError, TypeError, AttributeError, KeyError):
                 scripts.append(None)

@@ -20,8 +20,9 @@ import numpy as np
 
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError
+from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_file, scene_values
-from ..scene.parameters import READ_ONLY, convert_all, parameter_named
+from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
 from ..scene.plain_yaml import load_plain_yaml
 from ..scene.scenario import Scenario, make_scenario, nanoseconds
 from ..scene.scene_file import MAX_BYTES
@@ -49,20 +50,20 @@ class Vary:
 
 @dataclass(frozen=True)
 class Study:
-    """values: all parameters of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
+    """parameters: of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
     samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise,
     or None.
     """
 
     name: str
-    values: Mapping[str, object]
+    parameters: Parameters
     script: object
     duration_ns: int
     seed: int
     sampler: str
     samples: int
     vary: tuple[Vary, ...]
-    reference: Mapping[str, object] | None
+    reference: Mapping[str, Value] | None
     measures: Measures
     fingerprint: str
 
@@ -162,10 +163,7 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool 
     beside = folder / scene
     path = beside if beside.is_file() else scene_file(scene)
     own = convert_all(_settings(spec.get("set"), f"{name}, set"))
-    given = {**scene_values(path, lambda _text: None), **own}
-    if "density" in own and "mass" not in own:
-        given["mass"] = 0.0
-    base = make_scenario(given)
+    base = make_scenario({**scene_values(path, lambda _text: None), **with_mass_of_density(own)})
     script = _script(spec.get("script"), folder, f"{name}, script")
     duration_s = number(spec["duration"], f"{name}, duration", 1e-9, 1e9)
     seed = whole(spec.get("seed", 0), f"{name}, seed", 0, 1 << 128)
@@ -174,17 +172,17 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool 
         raise InputError(f"{name}, sampler", sampler, ", ".join(SAMPLERS))
     watch = number(spec.get("watch", 50.0), f"{name}, watch", 1e-6, 1e6)
     measures = read_measures(spec.get("measure"), spec.get("stop"), watch, duration_s, f"{name}, measure")
-    vary = _vary(spec["vary"], name, base.values, script_entries(script))
+    vary = _vary(spec["vary"], name, base.parameters, script_entries(script))
     reference = _reference(spec.get("reference"), f"{name}, reference", base)
     if measures.needs_reference and reference is None:
         raise InputError(f"{name}, reference", None, "parameters of a reference, as a difference is measured")
     samples = _samples(spec.get("samples"), f"{name}, samples", vary, sampler)
     study = Study(
-        name, base.values, script, nanoseconds(duration_s), seed, sampler, samples, vary, reference, measures, ""
+        name, base.parameters, script, nanoseconds(duration_s), seed, sampler, samples, vary, reference, measures, ""
     )
     _check_rows(study, f"{name}, samples", yes)
     _check_flyable(study, base)
-    content = json.dumps(_with_text_keys([spec, dict(base.values), script]), sort_keys=True, default=str)
+    content = json.dumps(_with_text_keys([spec, base.parameters.named(), script]), sort_keys=True, default=str)
     return replace(study, fingerprint=hashlib.sha256(content.encode()).hexdigest())
 
 
@@ -227,10 +225,11 @@ def _script(spec: Any, folder: Path, field: str) -> Any:
     return spec
 
 
-def _vary(spec: Any, name: str, values: Mapping[str, object], entries: list) -> tuple[Vary, ...]:
+def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[Vary, ...]:
     if not isinstance(spec, dict) or not spec:
         raise InputError(f"{name}, vary", spec, "{name: how, ...} with at least one thing that varies")
     found = []
+    values = parameters.named()
     for key, how in spec.items():
         field = f"{name}, vary.{key}"
         target = read_target(str(key), f"{name}, vary", values, entries)
@@ -297,7 +296,7 @@ def _check_flyable(study: Study, base: Scenario) -> None:
     """The scene as it stands takes off with its script, and so does its reference: what fails later is
     the row's own.
     """
-    commands = expand_script(study.script, "script", base.values["wrench_timeout"])
+    commands = expand_script(study.script, "script", base.parameters.wrench_timeout)
     OfflineRun(base, commands)
     if study.reference is not None:
         OfflineRun(base.with_changes(study.reference), commands)

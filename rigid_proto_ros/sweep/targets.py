@@ -14,7 +14,8 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..base.nearest_name import one_of
-from ..scene.parameters import READ_ONLY, Parameter, parameter_named
+from ..scene.declaration import READ_ONLY, Parameter, Value
+from ..scene.parameters import parameter_named
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
 _BALLAST = "mass x y z"
@@ -75,7 +76,7 @@ def _with_component(vector: list, k: int, value: Any) -> list:
     return vector
 
 
-def read_target(name: str, field: str, values: Mapping[str, object], entries: list) -> Target:
+def read_target(name: str, field: str, values: Mapping[str, Value], entries: list) -> Target:
     """The target of a name, given the scene's values and the script's entries; raises InputError with the
     nearest name.
     """

@@ -5,7 +5,6 @@ compiled batch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,7 @@ from ..motion.integrators.integrator import (
 from ..motion.integrators.taylor_adaptive import degree_for
 from ..motion.loads import LOAD, Load, settle
 from ..scene.command_codec import ScriptCommand
+from ..scene.parameters import Parameters
 from ..scene.scenario import BodyMesh, nanoseconds
 from ..simulation import batch_body as bb
 from ..simulation import flight as fl
@@ -66,42 +66,32 @@ class Script:
     loads: np.ndarray
 
 
-def settings_of(values: Mapping[str, object]) -> np.ndarray:
-    """The row of settings (SETTINGS,) of complete values."""
-    row = np.zeros(bb.SETTINGS)
+def settings_of(parameters: Parameters) -> np.ndarray:
+    """The row of settings (SETTINGS,) of parameters."""
+    row, values = np.zeros(bb.SETTINGS), parameters.named()
     for name, (at, count) in FAST.items():
         value = np.ravel(np.asarray(values[name], dtype=float))
         row[at : at + count] = np.repeat(value, 3) if name == "scale" and len(value) == 1 else value
     return row
 
 
-def times_of(values: Mapping[str, object]) -> np.ndarray:
-    """The row of times (TIMES,) of complete values."""
-    row = np.zeros(bb.TIMES, np.int64)
+def times_of(parameters: Parameters) -> np.ndarray:
+    """The row of times (TIMES,) of parameters."""
+    row, values = np.zeros(bb.TIMES, np.int64), parameters.named()
     for name, at in TIMES.items():
         row[at] = max(1, nanoseconds(values[name]))
-    row[bb.TIMEOUT_NS] = nanoseconds(values["wrench_timeout"])
-    row[bb.DEGREE] = degree_for(values["accuracy"])
+    row[bb.TIMEOUT_NS] = nanoseconds(parameters.wrench_timeout)
+    row[bb.DEGREE] = degree_for(parameters.accuracy)
     return row
 
 
-def ballast_names(values: Mapping[str, object]) -> list[str]:
-    """Parameters of point masses, in the order in which they are added."""
-    return sorted(name for name in values if name.startswith("ballast."))
-
-
-def ballast_of(values: Mapping[str, object]) -> np.ndarray:
-    """Point masses (k, 4)."""
-    return np.array([values[name] for name in ballast_names(values)], dtype=float).reshape(-1, 4)
-
-
-def constants_of(values: Mapping[str, object], body_mesh: BodyMesh | None) -> np.ndarray:
+def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarray:
     """What of the mesh and the model doesn't change with a row's settings (CONSTANTS,); raises
     NotCarried, InputError.
     """
     row = np.zeros(bb.CONSTANTS)
-    model = values["inertia_model"]
-    row[bb.GYROSCOPIC] = float(values["gyroscopic"])
+    model = parameters.inertia_model
+    row[bb.GYROSCOPIC] = float(parameters.gyroscopic)
     if body_mesh is not None:
         row[bb.HAS_SURFACE] = 1.0
         row[bb.EXTENT : bb.EXTENT + 3] = body_mesh.surface.extent
@@ -117,7 +107,7 @@ def constants_of(values: Mapping[str, object], body_mesh: BodyMesh | None) -> np
         row[bb.SOLID_MEASURE] = np.nan
     row[bb.MODEL] = bb.SHELL if model == "shell" else bb.ORDINARY
     row[bb.MEASURE] = moments.measure
-    places = moments if values["inertia_model_com"] == "model" else body_mesh.moments.moments("solid")
+    places = moments if parameters.inertia_model_com == "model" else body_mesh.moments.moments("solid")
     row[bb.REFERENCE : bb.REFERENCE + 3] = places.reference
     row[bb.CENTER : bb.CENTER + 3] = places.center
     row[bb.CENTER_LOW : bb.CENTER_LOW + 3] = places.center_low
@@ -125,15 +115,15 @@ def constants_of(values: Mapping[str, object], body_mesh: BodyMesh | None) -> np
     return row
 
 
-def checked_integrator(values: Mapping[str, object], loads: list[Load]) -> Integrator:
+def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
     """The integrator, if it can carry these loads; raises NotCarried."""
-    if values["string.attached"]:
+    if parameters.string.attached:
         raise NotCarried
-    integrator = integrator_named(values["integrator"])
+    integrator = integrator_named(parameters.integrator)
     needs = set().union(*map(needs_of_load, loads))
-    if not values["gyroscopic"]:
+    if not parameters.gyroscopic:
         needs.add(NO_GYROSCOPIC_TERM)
-    if values["angular_damping"]:
+    if parameters.angular_damping:
         needs.add(ANGULAR_DAMPING)
     try:
         check_carried(integrator, frozenset(needs))
@@ -142,16 +132,11 @@ def checked_integrator(values: Mapping[str, object], loads: list[Load]) -> Integ
     return integrator
 
 
-def contacts_of(values: Mapping[str, object]) -> dict[str, tuple]:
-    """Contacts by name, in mesh coordinates."""
-    return {name.removeprefix("contacts."): tuple(v) for name, v in values.items() if name.startswith("contacts.")}
-
-
 class Settler:
     """Settles the frames of one mesh's commands, each once."""
 
-    def __init__(self, values: Mapping[str, object], body_mesh: BodyMesh | None) -> None:
-        self._contacts = contacts_of(values)
+    def __init__(self, parameters: Parameters, body_mesh: BodyMesh | None) -> None:
+        self._contacts = dict(parameters.contacts)
         self._surface = body_mesh.surface if body_mesh else None
         self._known: dict[str, tuple] = {}
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections import ChainMap
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -13,6 +13,8 @@ import numpy as np
 import yaml
 
 from ..scene.command_codec import ScriptCommand
+from ..scene.declaration import Value
+from ..scene.parameters import Parameters
 from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
 from ..scene.script import expand_script
 from .forms import VERTEX, Draw
@@ -24,20 +26,20 @@ MESHES_KEPT = 16
 
 @dataclass(frozen=True)
 class Variation:
-    """values: every parameter. script: as YAML gives it."""
+    """script: as YAML gives it."""
 
-    values: Mapping[str, object]
+    parameters: Parameters
     script: object
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario of the values; raises InputError where no body or flight has them."""
-        return build_scenario(self.values, body_mesh_of(self.values))
+        """The scenario of the parameters; raises InputError where no body or flight has them."""
+        return build_scenario(self.parameters, body_mesh_of(self.parameters))
 
     @property
     def commands(self) -> list[ScriptCommand]:
         """The script's commands; raises InputError."""
-        return expand_script(self.script, "script", self.values["wrench_timeout"])
+        return expand_script(self.script, "script", self.parameters.wrench_timeout)
 
     @property
     def script_text(self) -> str:
@@ -52,7 +54,8 @@ def variation(study: Study, row: int) -> Variation:
 
 def apply(study: Study, chosen: list) -> Variation:
     """The variation with these values of what varies."""
-    values, script = dict(study.values), copy.deepcopy(study.script)
+    changes: dict[str, Value] = {}
+    values, script = ChainMap(changes, study.parameters.named()), copy.deepcopy(study.script)
     entries = script_entries(script)
     if study.density_decides:
         values["mass"] = 0.0
@@ -63,8 +66,9 @@ def apply(study: Study, chosen: list) -> Variation:
         else:
             vary.target.put(values, entries, plain(value))
     for vary, value in vertices:
-        vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh_of(values))})
-    return Variation(values, script)
+        body_mesh = body_mesh_of(study.parameters.replaced(changes))
+        vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh)})
+    return Variation(study.parameters.replaced(changes), script)
 
 
 def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
@@ -81,15 +85,13 @@ def plain(value: Any) -> object:
     return list(value) if isinstance(value, tuple) else value
 
 
-def body_mesh_of(values: Mapping[str, object]) -> BodyMesh | None:
-    """The mesh that the values name, with its moments; read once in a process."""
-    mesh = values["mesh"]
+def body_mesh_of(parameters: Parameters) -> BodyMesh | None:
+    """The mesh that the parameters name, with its moments; read once in a process."""
     # Only a body without a mesh asks for its model.
-    model = "solid" if mesh else values["inertia_model"]
-    return _body_mesh(mesh, values["mesh_repair"], values["mesh_fallback"], model)
+    model = "solid" if parameters.mesh else parameters.inertia_model
+    return _body_mesh(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback, model)
 
 
 @lru_cache(maxsize=MESHES_KEPT)
 def _body_mesh(mesh: str, repair: bool, fallback: str, model: str) -> BodyMesh | None:
-    names = {"mesh": mesh, "mesh_repair": repair, "mesh_fallback": fallback, "inertia_model": model}
-    return load_body_mesh(names)
+    return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback, inertia_model=model))

@@ -99,7 +99,7 @@ class Acting:
             lasting_ns = nanoseconds(frame.duration_s)
         if not load.is_zero:
             # Simulated time runs as fast as it is told to, eyes don't.
-            seen_ns = round(SHOWN_AT_LEAST_NS * (scenario.values["real_time_factor"] or 1.0))
+            seen_ns = round(SHOWN_AT_LEAST_NS * (scenario.parameters.real_time_factor or 1.0))
             until_ns = time_ns + (lasting_ns if held else max(lasting_ns, seen_ns))
             text = _strength_text(command.force, frame.impulse)
             self._acting.append(_Acting(held, load, text, time_ns, until_ns))

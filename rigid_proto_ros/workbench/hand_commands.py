@@ -13,7 +13,8 @@ from collections.abc import Callable
 
 from ..ros.scheduling import SLOW
 from ..scene.command_codec import ScriptCommand, outgoing
-from ..scene.parameters import LIVE, parameter_named
+from ..scene.declaration import LIVE
+from ..scene.parameters import parameter_named
 from .rewind import KEPT
 from .ros_link import RosLink
 

@@ -282,7 +282,7 @@ class Page:
     @property
     def step_s(self) -> float:
         """[s] What ``~/step`` and the keys for steps go on by: one publication period."""
-        return 0.01 if self.scenario is None else 1.0 / float(self.scenario.values["publish_rate"])
+        return 0.01 if self.scenario is None else 1.0 / float(self.scenario.parameters.publish_rate)
 
     def look_by(self, seconds: float) -> None:
         """Look further back, or less far with a negative number."""
@@ -331,8 +331,8 @@ class Page:
             self.acting.changed(old, scenario, self.state)
             self.shadow.changed(scenario, self.state)
         self.body_tab.changed(scenario, self._another_body)
-        self._upload.flies(str(scenario.values["mesh"]))
-        self._controls.update(scenario.values)
+        self._upload.flies(str(scenario.parameters.mesh))
+        self._controls.update(scenario.parameters.named())
         if self._another_body:
             self._another_body = False
             self.usual_force = self.tools.force = suggested_force(scenario, 2.0 * self.view.radius)
@@ -440,7 +440,7 @@ class Page:
     def _act(self, kind: str, content: dict, time_ns: int) -> None:
         """What acted on the body acts on what is drawn beside it; what can't be followed is said."""
         try:
-            frames = frame_names(self.scenario.values, self.link.target)
+            frames = frame_names(self.scenario.parameters, self.link.target)
             command = command_of_event(kind, content, self.scenario.setup.contacts, frames)
             if command is not None:
                 self.acting.event(command, time_ns, self.scenario, self.state)

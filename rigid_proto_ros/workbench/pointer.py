@@ -153,7 +153,7 @@ class Pointer:
             return
         commands = []
         frequency = self._tools.frequency
-        if frequency > 0.0 and scenario.values["string.frequency"] != frequency:
+        if frequency > 0.0 and scenario.parameters.string.frequency != frequency:
             commands.append(_set("string.frequency", frequency))
         if self._tools.at_com or surface is None:
             aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
@@ -182,7 +182,7 @@ class Pointer:
     def hold(self) -> None:
         """To be called often: a hand that doesn't move goes on holding."""
         if self.dragging and not self._hand.paused:
-            timeout_s = self._flown.scenario.values["string.timeout"]
+            timeout_s = self._flown.scenario.parameters.string.timeout
             hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
             if time.monotonic() >= self._drag.last_target_s + hold_s:
                 self._send_target()
@@ -223,5 +223,5 @@ def _three(point) -> tuple[float, float, float]:
 
 def suggested_force(scenario: Scenario, size: float) -> float:
     """A poke [N] that gives the body a part of its size a second: two digits are enough."""
-    duration_s = scenario.values["poke_duration"]
+    duration_s = scenario.parameters.poke_duration
     return float(f"{POKE_TRAVEL * size * scenario.setup.body.mass / duration_s:.2g}")

@@ -12,7 +12,8 @@ import numpy as np
 from ..base.errors import InputError, MeshError
 from ..base.rotation import rotate_inverse
 from ..scene.command_codec import ScriptCommand
-from ..scene.parameters import READ_ONLY, parameter_named
+from ..scene.declaration import READ_ONLY
+from ..scene.parameters import parameter_named
 from ..scene.scenario import scene_text
 from ..scene.scene_file import read_scene_text
 from ..scene.script import expand_script

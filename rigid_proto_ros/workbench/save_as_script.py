@@ -66,7 +66,7 @@ def save_as_script(session: RecordedSession) -> SavedScript:
     scene = kept_scene(scenario)
     head = "# Done by hand. Reproduce it with: rigid_proto simulate SCENE --script THIS, or poke_client THIS --reset\n"
     script = head + "".join(f"- {flow(entry)}\n" for entry in entries)
-    mesh = scenario.values["mesh"]
+    mesh = scenario.parameters.mesh
     if scenario.body_mesh is not None and scenario.body_mesh.mesh.path == mesh:
         notes.append(f"the scene names the mesh file {mesh}: keep it with the scene")
     last_ns = nanoseconds(entries[-1]["t"]) if entries else 0
@@ -77,10 +77,10 @@ def kept_scene(scenario: Scenario) -> str:
     """A scenario as a parameter file of what differs from the defaults, without what belongs to the running node."""
     values = {
         name: value
-        for name, value in scenario.values.items()
+        for name, value in scenario.parameters.named().items()
         if name not in NOT_OF_THE_MOTION and (name not in PARAMETERS or value != PARAMETERS[name].default)
     }
-    values["mesh"] = scenario.values["mesh"]
+    values["mesh"] = scenario.parameters.mesh
     return scene_text(values, scenario.body_mesh.mesh.sha256 if scenario.body_mesh else "")
 
 
@@ -115,7 +115,7 @@ class _Writer(Observer):
             self._change(time_ns, content if kind == "set" else {})
             return
         again = self._again
-        frames = frame_names(again.scenario.values, again.node_name)
+        frames = frame_names(again.scenario.parameters, again.node_name)
         command = of_event(time_ns, kind, content)
         if kind in ("wrench", "poke"):
             self._add(time_ns, _load_entry(command, self._applied, frames))
@@ -138,10 +138,11 @@ class _Writer(Observer):
         self._last = after
         changes = {name: value for name, value in content.items() if name not in NOT_OF_THE_MOTION}
         if not content:
-            changes = {name: value for name, value in after.values.items() if value != before.values.get(name)}
+            earlier = before.parameters.named()
+            changes = {name: value for name, value in after.parameters.named().items() if value != earlier.get(name)}
         if not changes:
             # It cut the motion's steps all the same.
-            changes = {"poke_duration": after.values["poke_duration"]}
+            changes = {"poke_duration": after.parameters.poke_duration}
         self._add(time_ns, {"set": changes})
 
 

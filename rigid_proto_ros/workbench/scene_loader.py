@@ -7,7 +7,8 @@ import asyncio
 from collections.abc import Callable, Mapping
 
 from ..base.errors import InputError
-from ..scene.parameters import READ_ONLY, parameter_named
+from ..scene.declaration import READ_ONLY
+from ..scene.parameters import parameter_named
 from ..scene.scenario import Scenario, make_scenario
 from ..scene.scene_file import read_scene_text
 
@@ -50,7 +51,8 @@ class SceneLoader:
         present = self.scenario
         if present is None or not all(name.startswith("string.") for name in changes):
             return
-        if all(present.values.get(name) == value for name, value in changes.items()):
+        in_force = present.parameters.named()
+        if all(in_force.get(name) == value for name, value in changes.items()):
             return
         try:
             self.scenario = present.with_changes(changes)
@@ -78,7 +80,7 @@ class SceneLoader:
                 if (
                     self.scenario is not None
                     and self.scenario is self._ahead
-                    and scenario.values == self.scenario.values
+                    and scenario.parameters == self.scenario.parameters
                 ):
                     continue  # its event came first
                 before, self.scenario = self.scenario, scenario
@@ -89,9 +91,10 @@ class SceneLoader:
 
 def _scenario(present: Scenario | None, values: Mapping[str, object]) -> Scenario:
     """What the values describe; from the present one's mesh and moments where they are the same."""
-    if present is None or present.values.keys() != values.keys():
+    in_force = {} if present is None else present.parameters.named()
+    if present is None or in_force.keys() != values.keys():
         return make_scenario(values)
-    changes = {name: value for name, value in values.items() if present.values[name] != value}
+    changes = {name: value for name, value in values.items() if in_force[name] != value}
     if any(parameter_named(name).changes == READ_ONLY for name in changes):
         return make_scenario(values)
     if "density" in changes and "mass" not in changes:

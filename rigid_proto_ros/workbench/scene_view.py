@@ -203,7 +203,7 @@ class SceneView:
             self._drawn_body = drawn
             self._tip = farthest_point(surface, body) if surface is not None else np.zeros(3)
             self._draw_inertia(scenario, box, ellipsoid, corners)
-        self._place_contacts(str(scenario.values["mesh"]))
+        self._place_contacts(str(scenario.parameters.mesh))
         return replaced
 
     def label_contacts(self, contacts: Mapping[str, Sequence[float]], mesh: str) -> None:

@@ -109,14 +109,14 @@ class SessionTab:
     async def _bring(self, scene: str, script: str) -> None:
         page = self._page
         await page.known()
-        situation = situation_of(scene, script, page.scenario.values)
+        situation = situation_of(scene, script, page.scenario.parameters.named())
         await page.bring_about(replace(situation, changes={**situation.changes, **self._speed()}))
         page.new_body()
 
     def _speed(self) -> dict[str, object]:
         """What the lesson needs for a speed, and after it what was before."""
         lesson = self._lessons.get(self._choice.value)
-        present = float(self._page.scenario.values["real_time_factor"])
+        present = float(self._page.scenario.parameters.real_time_factor)
         speed = None if lesson is None else SPEED_WITH.get(lesson.name)
         if speed is not None:
             if self._speed_before_lesson is None:

@@ -75,11 +75,11 @@ def names(scenario: Scenario, left: bool) -> tuple[str, str, str]:
     """What body and ghost are called, and in what alone they differ."""
     if left:
         return "now", "previous motion", "The same body from the same state, under different commands."
-    own, other = str(scenario.values["inertia_model"]), str(scenario.values["ghost.inertia_model"])
-    integrator = str(scenario.values["ghost.integrator"])
+    own, other = str(scenario.parameters.inertia_model), str(scenario.parameters.ghost.inertia_model)
+    integrator = str(scenario.parameters.ghost.integrator)
     if integrator and not other:
-        return str(scenario.values["integrator"]), integrator, "Released alike; only the integrator differs."
-    alike = "only the tensor differs" if scenario.values["inertia_model_com"] == "solid" else "tensor and COM differ"
+        return str(scenario.parameters.integrator), integrator, "Released alike; only the integrator differs."
+    alike = "only the tensor differs" if scenario.parameters.inertia_model_com == "solid" else "tensor and COM differ"
     return (
         f"body: {TITLES.get(own, own)}",
         f"ghost: {TITLES.get(other, other)}",

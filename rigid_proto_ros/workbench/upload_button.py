@@ -124,7 +124,7 @@ class UploadButton:
         if upload is None:
             return
         values = {**upload.flight(self._unit.value, self._up.value), **changes}
-        for name, value in page.scenario.values.items():
+        for name, value in page.scenario.parameters.named().items():
             if name.startswith("ballast."):
                 values[name] = [0.0, *value[1:]]
         page.new_body()

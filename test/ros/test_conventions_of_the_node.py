@@ -10,7 +10,8 @@ from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench
 from conftest import held_domain
 from ros_process import running_node
 
-from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
+from rigid_proto_ros.scene.declaration import READ_ONLY
+from rigid_proto_ros.scene.parameters import PARAMETERS, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 
@@ -135,7 +136,8 @@ def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, t
     # Read without ROS it is that scene too.
     first = make_scenario(read_scene_text(scene).values)
     again = make_scenario({n: v for n, v in read_scene_file(dump).values.items() if not is_ros_parameter(n)})
-    assert first.values == again.values == make_scenario({**rig.scene, **first.values}).values
+    assert first.parameters == again.parameters
+    assert first.parameters == make_scenario({**rig.scene, **first.parameters.named()}).parameters
     with held_domain() as domain:
         environment = {**rig.environment, "ROS_DOMAIN_ID": str(domain)}
         second = NodeProcess(environment, tmp_path / "second.log", {}, "--params-file", str(dump))

@@ -96,7 +96,7 @@ def test_the_transform_is_the_pose(monkeypatch):
     """tf2_msgs isn't in the wheels: its one message stands in, and a node that only creates publishers."""
     from rigid_proto_ros.motion.state import State
     from rigid_proto_ros.ros.state_publisher import StatePublisher
-    from rigid_proto_ros.scene.parameters import defaults
+    from rigid_proto_ros.scene.parameters import Parameters
 
     published = []
 
@@ -109,13 +109,13 @@ def test_the_transform_is_the_pose(monkeypatch):
     monkeypatch.setitem(sys.modules, "tf2_msgs.msg", messages)
     node = SimpleNamespace(create_publisher=publisher)
     states = StatePublisher(node, "world", "body", lambda: np.zeros(3))
-    states.configure({**defaults(), "publish_tf": True})
+    states.configure(Parameters(publish_tf=True))
     state = State(3 * SECOND + 7, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
     states.pack_all(state)
     assert not published
     assert states.look_for_subscribers()
     states.publish(state)
-    states.configure({**defaults(), "publish_tf": False})
+    states.configure(Parameters())
     states.look_for_subscribers()
     states.publish(state)
     (transform,) = published[0].transforms

@@ -10,8 +10,9 @@ from command_rig import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.scene.declaration import READ_ONLY, Parameter
 from rigid_proto_ros.scene.offline import read_scene
-from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, Parameter
+from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 
 NUMERIC = [p for p in (*PARAMETERS.values(), *PATTERNS.values()) if p.type in ("double", "doubles")]
 IDS = [p.name for p in NUMERIC]
@@ -91,7 +92,7 @@ def scene_lines(spelled) -> str:
 def test_a_file_means_the_same_however_its_numbers_are_spelled(spelled, tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(scene_lines(spelled), encoding="utf-8")
-    values = read_scene(str(path)).values
+    values = read_scene(str(path)).parameters.named()
     for parameter in filter(settable, NUMERIC):
         assert values[parameter.name] == parameter.convert(whole(parameter)), parameter.name
     assert values["contacts.tip"] == [1.0, 2.0, 3.0]

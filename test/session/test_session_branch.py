@@ -65,14 +65,14 @@ def test_a_branch_flies_on_as_the_session_did(session, tmp_path, at, capsys):
 def test_a_branch_has_the_parameters_in_force(session, tmp_path):
     for at, density in ((0.1, 7850.0), (0.5, 9000.0)):
         assert main(["replay", str(session), "--at", str(at), "--as-scene", str(tmp_path / "x.yaml")]) == 0
-        values = read_scene(str(tmp_path / "x.yaml")).values
+        values = read_scene(str(tmp_path / "x.yaml")).parameters.named()
         assert values["density"] == density
         assert values["record"] == ""
 
 
 def test_a_string_held_by_hand_is_tied_again_as_it_was_and_let_go_in_time(session, tmp_path):
     assert main(["replay", str(session), "--at", "3.5", "--as-scene", str(tmp_path / "x.yaml")]) == 0
-    values = read_scene(str(tmp_path / "x.yaml")).values
+    values = read_scene(str(tmp_path / "x.yaml")).parameters.named()
     assert values["string.attached"] and values["initial.string_mass"] > 0.0
     (let_go,) = read_script(tmp_path / "x_pokes.yaml")
     # Tied at 3.1 s, string.timeout 1 s.

@@ -153,7 +153,7 @@ def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
     assert new.mass == old.mass
     assert new.center_of_mass.tobytes() == old.center_of_mass.tobytes()
     assert new.inertia.tobytes() == old.inertia.tobytes()
-    values = flight.scenario.values
+    values = flight.scenario.parameters.named()
     assert values["inertia_model"] == "explicit"
     assert all(v[0] == 0.0 for n, v in values.items() if n.startswith("ballast."))
 
@@ -207,7 +207,7 @@ def test_density_set_wins_over_mass_and_mass_over_density():
     assert heavy.setup.body.mass == 3.0
     assert heavy.with_changes({"scale": [2.0]}).setup.body.mass == 3.0
     light = heavy.with_changes({"density": 785.0})
-    assert light.values["mass"] == 0.0
+    assert light.parameters.mass == 0.0
     assert light.setup.body.mass == pytest.approx(scenario.setup.body.mass / 10, rel=1e-14)
     assert light.with_changes({"scale": [2.0]}).setup.body.mass == pytest.approx(8 * light.setup.body.mass, rel=1e-14)
 
@@ -221,7 +221,7 @@ def test_changes_given_together_are_judged_together():
         scenario.with_changes({"mesh": ""})
     with pytest.raises(InputError):
         bare.with_changes({"inertia_model": "solid"})
-    assert bare.with_changes({"inertia_model": "solid", "mesh": "hammer"}).values["mesh"] == "hammer"
+    assert bare.with_changes({"inertia_model": "solid", "mesh": "hammer"}).parameters.mesh == "hammer"
 
 
 def random_change(numbers: random.Random) -> dict:
@@ -256,7 +256,7 @@ def fly_random_changes(count: int, seed: int) -> tuple[int, int]:
     """Changes applied and refused, a state checked after each."""
     numbers = random.Random(seed)
     flight = Flight()
-    known = flight.scenario.values
+    known = flight.scenario.parameters.named()
     simulation = flight.simulation
     refused = 0
     for _ in range(count):

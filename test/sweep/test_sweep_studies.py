@@ -82,7 +82,7 @@ def test_ten_to_the_twelve_rows_need_a_yes() -> None:
     spec = {**PLAIN, "vary": {"mass": {"grid": TWELVE}, "density": {"grid": TWELVE}}}
     asked = make_study(spec, yes=True)
     assert asked.rows == 10**12
-    last = variation(asked, asked.rows - 1).values
+    last = variation(asked, asked.rows - 1).parameters.named()
     assert (last["mass"], last["density"]) == (2.0, 2.0)
 
 
@@ -90,9 +90,9 @@ def test_grids_make_every_combination_and_lists_go_in_step() -> None:
     own = study(STRUCTURE)
     assert own.rows == 3 * 2 * 3 * 2
     rows = [variation(own, k) for k in range(own.rows)]
-    seen = {(r.values["inertia_model"], r.values["mesh"], r.script[1]["force"][0]) for r in rows}
+    seen = {(r.parameters.inertia_model, r.parameters.mesh, r.script[1]["force"][0]) for r in rows}
     assert len(seen) == 18
-    pairs = {(r.values["mesh"], r.values["integrator"]) for r in rows}
+    pairs = {(r.parameters.mesh, r.parameters.integrator) for r in rows}
     assert pairs == {("t_handle", "auto"), ("hammer", "rk4"), ("book", "dop853")}
 
 
@@ -108,7 +108,7 @@ def test_the_seed_of_a_row_is_numpys_own_for_study_and_row() -> None:
 def test_a_row_draws_from_its_own_seed() -> None:
     own = study(POKES)
     u = np.random.default_rng(np.random.SeedSequence(POKES["seed"], spawn_key=(11,))).random(2)
-    values = variation(own, 11).values
+    values = variation(own, 11).parameters.named()
     assert values["mass"] == math.exp(math.log(0.1) + (math.log(1.0) - math.log(0.1)) * u[0])
     assert values["scale"] == [0.5 + 1.5 * u[1]]
 

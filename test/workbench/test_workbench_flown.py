@@ -157,6 +157,6 @@ def test_one_click_shows_body_and_ghost_released_alike_and_the_angle_that_grows_
     assert np.all(np.diff(angles) > 0.0) and np.degrees(angles[-1]) > 10.0
     degrees = f"**{np.degrees(angles[-1]):.0f}° apart**"
     flown.until(lambda: degrees in shown.sentence, "the number")
-    assert "only the tensor differs" in shown.sentence and flown.page.scenario.values["inertia_model_com"] == "solid"
+    assert "only the tensor differs" in shown.sentence and flown.page.scenario.parameters.inertia_model_com == "solid"
     flown.pick("One book, three throws")
     flown.until(lambda: not shown.sentence, "end of the comparison")

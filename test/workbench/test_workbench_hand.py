@@ -87,7 +87,7 @@ def test_what_is_done_together_in_flight_is_one_message_and_waits_for_nothing() 
     (frequency, aside, knot, target) = (decode_event(line, 1)[2] for line in hand.link._log.lines)
     assert hand.kinds() == ["set", "set", "set", "string_target"] and target["point"] == [0.0, 0.0, 0.1]
     assert frequency == {"string.frequency": 8.0}
-    assert knot["string.attach"] == hand.link.scenario.values["string.attach"] != aside["string.attach"]
+    assert knot["string.attach"] == hand.link.scenario.parameters.string.attach != aside["string.attach"]
     assert hand.pointer.dragging
 
 
@@ -110,19 +110,19 @@ def test_parameters_set_while_paused_act_between_what_is_done_by_hand_before_and
     set_mass(-1.0)
     set_mass(3.0)
     # Seen at once, as the node has them; nothing else has acted.
-    assert hand.link.scenario.values["mass"] == 3.0 and not hand.kinds()
+    assert hand.link.scenario.parameters.mass == 3.0 and not hand.kinds()
     assert answers == [True, True, False, True]
     hand.hand.go_on()
     hand.link.fly(0.001)
     acted = [decode_event(line, 1)[1:] for line in hand.link._log.lines]
     in_order = [("poke", None), ("set", 2.0), ("poke", None), ("set", 3.0)]
     assert [(kind, content.get("mass")) for kind, content in acted][:4] == in_order
-    assert hand.link.scenario.values["mass"] == hand.link.simulation.setup.body.mass == 3.0
+    assert hand.link.scenario.parameters.mass == hand.link.simulation.setup.body.mass == 3.0
     # Nothing done by hand: the service alone.
     set_mass(4.0)
     received = hand.link.received
     hand.hand.go_on()
-    assert hand.link.received == received and hand.link.scenario.values["mass"] == 4.0
+    assert hand.link.received == received and hand.link.scenario.parameters.mass == 4.0
 
 
 def test_what_was_done_before_a_reset_is_forgotten_with_it() -> None:

@@ -79,7 +79,7 @@ def test_a_rewind_takes_the_node_there_and_its_motion_goes_on_as_it_did() -> Non
     assert np.abs(again.simulation.state.row[:7] - history.row(int(1.5 * SECOND))[:7]).max() < 2e-9
 
     applied(hand, history, rewind)
-    assert hand.scenario.values["mass"] == 0.2
+    assert hand.scenario.parameters.mass == 0.2
     assert history.span[1] == rewind.moment_ns
     hand.wait(int(0.3 * SECOND))
     assert np.array_equal(hand.simulation.state.row[:7], again.simulation.state.row[:7])
@@ -254,8 +254,8 @@ def test_nothing_heard_is_nothing_to_rewind_to() -> None:
 
 
 def test_changes_set_mass_and_density_together_and_take_ballast_off() -> None:
-    present = make_scenario({**SCENE, "mass": 0.2, "ballast.tip": [0.03, 0.0, 0.0, 0.07]}).values
-    wanted = make_scenario({**SCENE, "mass": 0.2, "density": 500.0, "record": ""}).values
+    present = make_scenario({**SCENE, "mass": 0.2, "ballast.tip": [0.03, 0.0, 0.0, 0.07]}).parameters.named()
+    wanted = make_scenario({**SCENE, "mass": 0.2, "density": 500.0, "record": ""}).parameters.named()
     changes = changes_to(wanted, present)
     assert changes["mass"] == 0.2
     assert changes["density"] == 500.0

@@ -106,7 +106,7 @@ def test_a_change_that_only_a_later_scene_allows_flies_again() -> None:
     hand.set(inertia_model="solid")
     hand.load(False, "world@vertex/3", [0.01, 0.0, 0.0])
     hand.wait(SECOND // 10)
-    assert make_scenario(hand.first.values).body_mesh is None
+    assert make_scenario(hand.first.parameters.named()).body_mesh is None
     with pytest.raises(InputError):
         hand.first.with_changes({"inertia_model": "solid"})
     assert len(yaml.safe_load(assert_flies_again(hand).script)) == 3

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""A sorted list of every name that users and their scripts rely on, one a line: commands and options, parameters, topics and
+services, keys of JSON objects, diagnostics and scripts, controls of the page, bundled files.
+
+    python tools/interface_list.py > test/interface.txt
+
+test/test_interface_list.py compares; a line that goes, or changes, is a promise broken.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import io
+import json
+import re
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rigid_proto_ros.base import bundled
+from rigid_proto_ros.cli import main as cli
+from rigid_proto_ros.ros import diagnostics, poke_client
+from rigid_proto_ros.ros import interface as ros_interface
+from rigid_proto_ros.ros.arguments import own_arguments
+from rigid_proto_ros.scene import parameters, script
+
+OPTION = re.compile(r"^  (-\S+(?: \S+)*)", re.MULTILINE)
+POSITIONAL = re.compile(r"^positional arguments:\n((?:  .*\n)+)", re.MULTILINE)
+PATIENCE_S = 60.0
+
+
+def printed(main: Callable[[list[str]], object], *arguments: str) -> str:
+    """What a command prints on stdout, also where it ends the process."""
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
+        main(list(arguments))
+    return text.getvalue()
+
+
+def commands() -> Iterator[str]:
+    """Commands with their arguments and options, as --help shows them."""
+    helps = {f"rigid_proto {name}": printed(cli.main, name, "--help") for name in cli.COMMANDS}
+    helps["poke_client"] = printed(poke_client.main, "--help")
+    helps["rigid_body_node"] = printed(own_arguments, "--help")
+    for command, text in helps.items():
+        yield f"command {command}"
+        for found in POSITIONAL.findall(text):
+            for line in re.findall(r"^  (\S+)", found, re.MULTILINE):
+                yield f"argument {command} {line}"
+        for option in OPTION.findall(text):
+            yield f"option {command} {option}"
+
+
+def declared_parameters() -> Iterator[str]:
+    """Parameters with type, default, bounds and when they may change."""
+    for parameter in (*parameters.PARAMETERS.values(), *parameters.PATTERNS.values()):
+        default = json.dumps(parameter.default)
+        yield f"parameter {parameter.name}: {parameter.type}, {default}; {parameter.accepted}; {parameter.changes}"
+
+
+def topics_and_services() -> Iterator[str]:
+    """Topics, services and the keys of /diagnostics that count refusals."""
+    for interface in ros_interface.INTERFACES:
+        on_request = f", on {interface.on_request}" if interface.on_request else ""
+        yield f"{interface.direction} {interface.name} {interface.type}{on_request}"
+    for reason in diagnostics.REFUSAL_REASONS:
+        yield f"diagnostics refused_{reason}"
+
+
+def script_keys() -> Iterator[str]:
+    """Keys of the entries of a script."""
+    for kind, keys in script.ENTRY_KEYS.items():
+        for key in keys:
+            yield f"script {kind} {key}"
+
+
+def json_keys() -> Iterator[str]:
+    """Keys of what --json prints."""
+    inspected = json.loads(printed(cli.main, "inspect", "hammer", "--verify", "--json"))
+    simulated = json.loads(printed(cli.main, "simulate", "t_handle", "--duration", "0.01", "--json"))
+    for command, found in (("inspect", inspected), ("simulate", simulated)):
+        for key, value in found.items():
+            yield f"json {command} {key}"
+            if isinstance(value, dict):
+                for inner, part in value.items():
+                    yield f"json {command} {key}.{inner}"
+                    for innermost in part if isinstance(part, dict) else ():
+                        yield f"json {command} {key}.{inner}.{innermost}"
+
+
+def bundled_files() -> Iterator[str]:
+    """Names of bundled bodies, scenes, studies and examples."""
+    for kind, names in (
+        ("body", bundled.body_names()),
+        ("scene", bundled.scene_names()),
+        ("study", bundled.study_names()),
+        ("example", bundled.example_names()),
+    ):
+        for name in names:
+            yield f"{kind} {name}"
+
+
+class _Link:
+    """In the place of the page's link to ROS: a node that says its scene and takes nothing."""
+
+    def __init__(self, target: str, deliver: Callable, on_scene: Callable, _on_diagnostics: Callable) -> None:
+        self.target = target
+        self._deliver, self._on_scene = deliver, on_scene
+
+    def listen(self) -> None:
+        from rigid_proto_ros.scene.offline import read_scene
+
+        self._deliver(self._on_scene, read_scene("t_handle").text)
+
+    def take(self) -> object:
+        from rigid_proto_ros.workbench.ros_link import Heard
+
+        return Heard()
+
+    def close(self) -> None:
+        pass
+
+    stop_listening = close
+
+
+def page_controls() -> Iterator[str]:
+    """Controls of the page by their kind and label; those that exist on every page from its start."""
+    import viser
+
+    from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+    from rigid_proto_ros.workbench import page as page_module
+    from rigid_proto_ros.workbench.server import make_server, stop_server
+
+    labels: set[str] = set()
+
+    def recording(method: Callable, kind: str) -> Callable:
+        @functools.wraps(method)
+        def recorded(self: object, label: object = "", *arguments: object, **keywords: object) -> object:
+            handle = method(self, label, *arguments, **keywords)
+            if isinstance(label, str) and label.strip() and "<" not in label and kind not in ("markdown", "html"):
+                labels.add(f"page {kind} {label}")
+            return handle
+
+        return recorded
+
+    undo: list[tuple[type, str, Callable]] = []
+    for owner in (viser.GuiApi, viser.GuiTabGroupHandle):
+        for name in [name for name in vars(owner) if name.startswith("add_")]:
+            method = getattr(owner, name)
+            undo.append((owner, name, method))
+            if name not in ("add_panel", "add_tab_group", "add_uplot"):
+                setattr(owner, name, recording(method, name.removeprefix("add_")))
+    link, page_module.RosLink = page_module.RosLink, _Link
+    server = make_server(LOOPBACK, any_free_port(), lambda link: None)
+    try:
+
+        async def made() -> page_module.Page:
+            return page_module.Page(server, "/rigid_body", "http://here")
+
+        loop = server.get_event_loop()
+        page = asyncio.run_coroutine_threadsafe(made(), loop).result(PATIENCE_S)
+        page.link.listen()
+        deadline = time.monotonic() + PATIENCE_S
+        while page.scenario is None and time.monotonic() < deadline:
+            time.sleep(0.02)
+    finally:
+        page_module.RosLink = link
+        for owner, name, method in undo:
+            setattr(owner, name, method)
+    stop_server(server)
+    page.close()
+    yield from labels
+
+
+def interface_list() -> list[str]:
+    """Every line, sorted."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(Path(folder)):
+        parts = (
+            commands,
+            declared_parameters,
+            topics_and_services,
+            script_keys,
+            json_keys,
+            bundled_files,
+            page_controls,
+        )
+        return sorted({line for part in parts for line in part()})
+
+
+if __name__ == "__main__":
+    print("\n".join(interface_list()))
