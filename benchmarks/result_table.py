@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import csv
 import datetime
-import platform
 import subprocess
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from rigid_proto_ros.base.provenance import cpu, versions
 
 PROVENANCE = ("date", "commit", "cpu", "python", "numba", "numpy")
 
@@ -47,10 +47,8 @@ def provenance() -> dict[str, str]:
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "commit": _commit(),
-        "cpu": _cpu(),
-        "python": platform.python_version(),
-        "numba": _version("numba"),
-        "numpy": _version("numpy"),
+        "cpu": cpu(),
+        **{name: versions()[name] for name in ("python", "numba", "numpy")},
     }
 
 
@@ -70,23 +68,6 @@ def _commit() -> str:
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return head.stdout.strip() + ("+changes" if changed.stdout.strip() else "")
-
-
-def _cpu() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "none"
 
 
 def _text(value) -> str:

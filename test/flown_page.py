@@ -23,8 +23,8 @@ from rigid_proto_ros.scene.script import (
     expand_schedule,
     expand_script,
     read_schedule,
-    script_entries,
 )
+from rigid_proto_ros.scene.yaml_text import load_plain_yaml
 from rigid_proto_ros.simulation.commands import Change, WrenchCommand
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -87,7 +87,7 @@ class FlownLink:
         self._submit(read(0, frame_id, tuple(float(x) for x in point)))
 
     def schedule(self, entry: str) -> None:
-        for command in expand_script([script_entries(entry)]):
+        for command in expand_script([load_plain_yaml(entry, "entry")]):
             self.command(command)
 
     def send(self, topic: str, data: bytes) -> None:

@@ -7,9 +7,7 @@ opened or closed while somebody watches.
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
-import platform
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -22,6 +20,7 @@ import rerun_bindings
 
 from ..base.errors import InputError
 from ..base.output_file import output_file
+from ..base.provenance import cpu, versions
 from .layout import Subject
 from .ports import LOOPBACK
 from .rrd_file import end_without_index
@@ -67,8 +66,8 @@ class Stream(ABC):
         self.recording.send_property(
             "made_with",
             rr.AnyValues(
-                versions=[f"{package} {version}" for package, version in _versions()],
-                cpu=platform.processor() or platform.machine(),
+                versions=[f"{package} {version}" for package, version in versions("rerun-sdk").items()],
+                cpu=cpu(),
             ),
         )
 
@@ -210,17 +209,6 @@ def forget_closed_recordings() -> None:
 def end_without_waiting() -> None:
     """What the library does at the end of the process is to wait, without limit, for every recording to be taken."""
     rr.unregister_shutdown()
-
-
-def _versions() -> list[tuple[str, str]]:
-    packages = ["rigid_proto_ros", "numpy", "numba", "rerun-sdk"]
-    found = [("python", platform.python_version())]
-    for package in packages:
-        try:
-            found.append((package, importlib.metadata.version(package)))
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
 
 
 def _last_line(error: BaseException) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 import yaml
 
 from ..base.errors import InputError
+from .yaml_text import compose_yaml, read_text
 
 _TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
 _FALSE = {"N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
@@ -22,19 +23,6 @@ _INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
 _DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
 _SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
 _HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\Z")
-
-MAX_BYTES = 16 << 20
-"""Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
-
-
-class _Loader(yaml.SafeLoader):
-    """Without aliases, which rcl doesn't read either: one that holds itself has no end."""
-
-    def compose_node(self, parent, index):
-        event = self.peek_event()
-        if isinstance(event, yaml.AliasEvent):
-            raise yaml.MarkedYAMLError(problem=f"the alias *{event.anchor}", problem_mark=event.start_mark)
-        return super().compose_node(parent, index)
 
 
 @dataclass
@@ -74,12 +62,12 @@ def scalar(text: str):
 
 def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
     """Read the sections for this node, later ones winning; raises InputError naming file, line and remedy."""
-    return _read_sections(compose_yaml(Path(path)), str(path), node_name)
+    return _read_sections(compose_yaml(read_text(Path(path), "a YAML file"), str(path)), str(path), node_name)
 
 
 def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
     """As ``read_scene_file``, from text; ``name`` stands in errors."""
-    return _read_sections(compose_text(text, name), name, node_name)
+    return _read_sections(compose_yaml(text, name), name, node_name)
 
 
 def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFile:
@@ -110,33 +98,9 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
     return scene
 
 
-def compose_yaml(path: Path) -> yaml.Node | None:
-    """The YAML tree of a file, with lines; raises InputError when it can't be read."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a scene has at most {MAX_BYTES}")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), error.strerror, "a readable YAML file") from None
-    except UnicodeDecodeError:
-        raise InputError(str(path), "the file isn't UTF-8 text") from None
-    return compose_text(text, str(path))
-
-
-def compose_text(text: str, name: str) -> yaml.Node | None:
-    """The YAML tree of a text; ``name`` stands in errors."""
-    try:
-        return yaml.compose(text, Loader=_Loader)
-    except (yaml.YAMLError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-        where = f"{name}, line {mark.line + 1}" if mark else name
-        raise InputError(where, problem, "valid YAML without aliases") from None
-
-
 def typed_value(text: str, name: str):
     """A value as rcl types it on a command line; raises InputError for what rcl refuses."""
-    node = compose_text(text, name)
+    node = compose_yaml(text, name)
     if isinstance(node, yaml.SequenceNode):
         return _sequence(name, node)
     if not isinstance(node, yaml.ScalarNode):

@@ -16,9 +16,8 @@ from ..base.errors import InputError
 from ..base.nearest_name import did_you_mean
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
 from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
-from .plain_yaml import load_plain_yaml
 from .scenario import nanoseconds
-from .scene_file import MAX_BYTES
+from .yaml_text import load_plain_yaml, read_text
 
 MAX_TIME_S = 1e9
 MAX_ENTRIES = 1_000_000
@@ -42,26 +41,12 @@ def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCom
 
     wrench_timeout [s]: held wrenches are repeated every half of it.
     """
-    path = Path(path)
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a script has at most {MAX_BYTES}")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), error.strerror, "a readable poke script") from None
-    except UnicodeDecodeError:
-        raise InputError(str(path), "the file isn't UTF-8 text") from None
-    return parse_script(text, str(path), wrench_timeout)
+    return parse_script(read_text(Path(path), "a poke script"), str(path), wrench_timeout)
 
 
 def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -> list[ScriptCommand]:
     """As ``read_script``, from text."""
-    return expand_script(script_entries(text, name), name, wrench_timeout)
-
-
-def script_entries(text: str, name: str = "script"):
-    """What a script's YAML says, nothing of it checked yet; raises InputError for what is no plain YAML."""
-    return load_plain_yaml(text, name)
+    return expand_script(load_plain_yaml(text, name), name, wrench_timeout)
 
 
 def read_schedule(text: str):

@@ -7,9 +7,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-import yaml
-
 from ..base.errors import InputError
+from ..scene.yaml_text import load_plain_yaml, read_text
 from .mcap_file import (
     ZSTD_MAGIC,
     McapContent,
@@ -75,10 +74,10 @@ def _listed(metadata: Path) -> list[str]:
     if not metadata.is_file():
         return []
     try:
-        bag = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+        bag = load_plain_yaml(read_text(metadata, "a YAML file"), str(metadata))["rosbag2_bagfile_information"]
         storage, names, compression = bag["storage_identifier"], bag["relative_file_paths"], bag["compression_format"]
         names = [str(name) for name in names]
-    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, RecursionError):
+    except (KeyError, TypeError):
         raise InputError(str(metadata), "not readable as the metadata that rosbag2 writes") from None
     if storage != "mcap":
         raise InputError("storage", storage, "mcap; ros2 bag convert makes one of another storage")

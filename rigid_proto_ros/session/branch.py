@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import yaml
 
 from ..base.errors import InputError
 from ..messages.session_messages import PROJECTIONS
@@ -14,6 +13,7 @@ from ..motion.body import Body
 from ..motion.frames import parse_frame
 from ..motion.loads import Load
 from ..scene.scenario import Scenario, make_scenario, nanoseconds
+from ..scene.yaml_text import dump_yaml
 from ..simulation.commands import WrenchCommand
 from ..simulation.observer import Observer, ShownLoad
 from .recorded_session import RecordedSession
@@ -63,7 +63,7 @@ class Branch:
     @property
     def pokes_text(self) -> str:
         """The entries as a script."""
-        return yaml.safe_dump(self.pokes, sort_keys=False, default_flow_style=None, width=120)
+        return dump_yaml(self.pokes)
 
 
 def branch_at(session: RecordedSession, time_ns: int) -> Branch:

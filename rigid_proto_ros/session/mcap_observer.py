@@ -7,9 +7,7 @@ one file: a reset begins the next one, as in a bag of the topics.
 
 from __future__ import annotations
 
-import importlib.metadata
 import logging
-import platform
 import threading
 import time
 from collections.abc import Callable
@@ -19,6 +17,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.output_file import output_file
+from ..base.provenance import cpu, versions
 from ..mesh.reading import resolve_mesh
 from ..messages import cdr, session_messages
 from ..motion.body import Body
@@ -279,11 +278,5 @@ def _offered(latched: bool) -> str:
 
 
 def _made_with() -> dict[str, str]:
-    made = {"cpu": platform.processor() or platform.machine(), "python": platform.python_version()}
-    for package in ("rigid_proto_ros", "numpy", "numba", "mcap"):
-        try:
-            made[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    made["began"] = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    return made
+    began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    return {"cpu": cpu(), **versions("mcap"), "began": began}

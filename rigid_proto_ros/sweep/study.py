@@ -23,10 +23,9 @@ from ..base.errors import InputError
 from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_file, scene_values
 from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
-from ..scene.plain_yaml import load_plain_yaml
 from ..scene.scenario import Scenario, make_scenario, nanoseconds
-from ..scene.scene_file import MAX_BYTES
 from ..scene.script import expand_script
+from ..scene.yaml_text import load_plain_yaml, read_text
 from .fields import mapping, number, whole
 from .forms import GRID, LIST, Draw, Points, read_form
 from .measures import Measures, read_measures
@@ -137,15 +136,7 @@ def study_file(name: str) -> Path:
 
 
 def _yaml(path: Path) -> object:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(str(path), f"the file has {path.stat().st_size} bytes; a study has at most {MAX_BYTES}")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), error.strerror, "a readable file") from None
-    except UnicodeDecodeError:
-        raise InputError(str(path), "the file isn't UTF-8 text") from None
-    return load_plain_yaml(text, str(path))
+    return load_plain_yaml(read_text(path, "a YAML file"), str(path))
 
 
 def read_study(name: str, yes: bool = False) -> Study:

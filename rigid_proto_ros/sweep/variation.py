@@ -10,13 +10,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import yaml
 
 from ..scene.command_codec import ScriptCommand
 from ..scene.declaration import Value
 from ..scene.parameters import Parameters
 from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
 from ..scene.script import expand_script
+from ..scene.yaml_text import dump_yaml
 from .forms import VERTEX, Draw
 from .study import Study, script_entries
 
@@ -44,7 +44,7 @@ class Variation:
     @property
     def script_text(self) -> str:
         """The script as a file."""
-        return yaml.safe_dump(self.script, sort_keys=False, default_flow_style=None, width=120)
+        return dump_yaml(self.script)
 
 
 def variation(study: Study, row: int) -> Variation:

@@ -22,7 +22,8 @@ from ..scene.command_codec import flow
 from ..scene.parameters import PARAMETERS, convert_all
 from ..scene.scenario import scene_text
 from ..scene.scene_file import read_scene_text
-from ..scene.script import expand_script, script_entries
+from ..scene.script import expand_script
+from ..scene.yaml_text import load_plain_yaml
 from .save_as_script import NOT_OF_THE_MOTION
 
 VERSION = "1"
@@ -50,7 +51,7 @@ def encode(scene: str, script: str = "") -> str:
     if len(zlib.compress(script.encode(), 1)) > MAX_LINK:
         # It won't fit, and reading it takes a second for every thousand entries.
         raise _too_long(f"a script of {len(script)} characters")
-    entries = script_entries(script)
+    entries = load_plain_yaml(script, "script")
     _check(values, entries)
     text = json.dumps({"scene": values, "script": entries or []}, separators=(",", ":"), allow_nan=False).encode()
     if len(text) > MAX_DECODED:
