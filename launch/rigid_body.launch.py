@@ -4,8 +4,8 @@
 ros2 launch rigid_proto_ros rigid_body.launch.py scene:=hammer script:=/path/to/pokes.yaml viewer:=web
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -33,7 +33,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([*declared, OpaqueFunction(function=nodes)])
 
 
-def nodes(context) -> list[Node]:
+def nodes(context: LaunchContext) -> list[Node]:
     """The body's node, and a poke client where a script is named."""
     # Only here: a launch file is listed on machines on which the package isn't on the path.
     from rigid_proto_ros.base.bundled import example_path
@@ -50,11 +50,14 @@ def nodes(context) -> list[Node]:
         namespace=given["namespace"],
         parameters=[*_for_node(str(scene_file(given["scene"])), target), parameters],
         output="screen",
+        # A client that waits for it would wait for ever.
+        on_exit=Shutdown(),
     )
     if not given["script"]:
         return [body]
     script = given["script"] if "/" in given["script"] else str(example_path(given["script"].removesuffix(".yaml")))
-    options = ["--node", target, "--timeout", "60"]
+    # The first start compiles for a minute or two: the client waits for as long as it takes.
+    options = ["--node", target, "--timeout", "0"]
     if given["reset"].lower() in ("true", "1", "yes"):
         options.append("--reset")
     client = Node(package=PACKAGE, executable="poke_client", arguments=[script, *options], output="screen")
@@ -62,7 +65,7 @@ def nodes(context) -> list[Node]:
 
 
 def _for_node(scene: str, target: str) -> list:
-    """The scene as launch takes it: as the file, or as its values where a node of another name wouldn't find its section."""
+    """The scene as launch takes it: the file, or its values where a node of another name wouldn't find its section."""
     if target == "/rigid_body":
         return [scene]
     from rigid_proto_ros.scene.scene_file import read_scene_file

@@ -32,13 +32,11 @@ def main(scenario: str) -> None:
     rclpy.init()
     counts: Counter[str] = Counter()
     parameters = dict(SPIN) if scenario != "at_rest" else {"publish_rate": 500.0}
-    overrides = [rclpy.parameter.Parameter(name, value=value) for name, value in parameters.items()]
-    node = RigidBodyNode(parameter_overrides=overrides)
-    node.states.pack_all(warm_up(node.flight.scenario.setup))
+    thread = PhysicsThread()
+    node = RigidBodyNode(thread, parameters)
+    node.states.pack_all(warm_up(node.loop.scenario.setup))
     count_publications(counts)
     messages = count_messages(counts)
-    thread = PhysicsThread([node.flight])
-    node.thread = thread
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     listener = rclpy.create_node("listener")
@@ -49,10 +47,10 @@ def main(scenario: str) -> None:
     if scenario == "listened_to":
         for message_type, topic in ((PoseStamped, "pose"), (TwistStamped, "twist"), (Odometry, "odom")):
             listener.create_subscription(message_type, f"/rigid_body/{topic}", lambda m: None, 10, raw=True)
-        while not node.states.look_for_subscribers() or publisher.get_subscription_count() == 0:
+        while not node.states.find_subscribers() or publisher.get_subscription_count() == 0:
             time.sleep(0.02)
         time.sleep(0.5)
-    thread.start()
+    thread.start([node.loop])
     while steps_and_time(node)[1] < 1e9:
         executor.spin_once(timeout_sec=0.05)
     messages.clear()
@@ -90,7 +88,7 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
     heard: list[float] = []
     masses, calls = [], []
     executor.add_node(listener)
-    thread.start()
+    thread.start([node.loop])
 
     def until(condition) -> None:
         deadline = time.monotonic() + 60.0
@@ -101,7 +99,7 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
     def change(mass: float) -> None:
         answer = node.set_parameters_atomically([rclpy.parameter.Parameter("mass", value=mass)])
         assert answer.successful, answer.reason
-        until(lambda: node.call(lambda: node.flight.simulation.setup.body.mass) == mass)
+        until(lambda: node.call(lambda: node.loop.simulation.setup.body.mass) == mass)
         # Whatever that made ready for the executor is served.
         for _ in range(20):
             executor.spin_once(timeout_sec=0.0)
@@ -131,12 +129,12 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
 
 def steps_and_time(node: RigidBodyNode) -> tuple[int, int]:
     """Committed steps and simulated time, read on the physics thread."""
-    return node.call(lambda: (node.flight.simulation.steps, node.flight.simulation.time_ns))
+    return node.call(lambda: (node.loop.simulation.steps, node.loop.simulation.time_ns))
 
 
 def look(node: RigidBodyNode, counts: Counter) -> tuple[tuple[int, int], Counter]:
     """The same and the counts of one moment: states are published by the physics thread."""
-    simulation = node.flight.simulation
+    simulation = node.loop.simulation
     return node.call(lambda: ((simulation.steps, simulation.time_ns), Counter(counts)))
 
 

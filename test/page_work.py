@@ -26,17 +26,16 @@ def main() -> None:
     """One listener to the pose from first to last; the page's link comes and goes."""
     rclpy.init()
     counts: Counter[str] = Counter()
-    node = RigidBodyNode(parameter_overrides=[rclpy.parameter.Parameter(name, value=v) for name, v in SPIN.items()])
-    node.states.pack_all(warm_up(node.flight.scenario.setup))
+    thread = PhysicsThread()
+    node = RigidBodyNode(thread, SPIN)
+    node.states.pack_all(warm_up(node.loop.scenario.setup))
     count_publications(counts)
-    thread = PhysicsThread([node.flight])
-    node.thread = thread
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     spinning = threading.Thread(target=executor.spin, daemon=True)
     listener = rclpy.create_node("listener")
     listener.create_subscription(PoseStamped, "/rigid_body/pose", lambda m: None, 10, raw=True)
-    thread.start()
+    thread.start([node.loop])
     spinning.start()
 
     def count(twist_listeners: int) -> dict:

@@ -182,6 +182,28 @@ class Client:
         _until(future.done, f"an answer of {service}", timeout)
         return plain(future.result())
 
+    def lockstep(self, node, count, push):
+        """``count`` times: publish an impulse that means now, call step, and wait for the twist of its end, after which the
+        next goes out. Returns the stamps of the twists [ns] and the answers.
+        """
+        publisher, _ = self.publishers[f"{node}/poke"]
+        message = WrenchStamped()
+        message.header.frame_id = "world;impulse"
+        message.wrench.force.x = push
+        service = self.node.create_client(Trigger, f"{node}/step")
+        _until(service.service_is_ready, f"the service {node}/step")
+        twists = self.received[f"{node}/twist"]
+        stamps, answers = [], []
+        for _ in range(count):
+            twists.clear()
+            publisher.publish(message)
+            future = service.call_async(Trigger.Request())
+            _until(future.done, "an answer of step")
+            answers.append(future.result().message)
+            _until(lambda: twists, "a twist")
+            stamps.append(stamp_ns(twists[-1]))
+        return {"stamps": stamps, "answers": answers}
+
     def set_parameters(self, node, values, atomically=False):
         """[[name, value]] through the standard services; [[successful, reason]]."""
         kind = "SetParametersAtomically" if atomically else "SetParameters"

@@ -134,7 +134,7 @@ Ubuntu 24.04 lets pip install nothing beside apt (PEP 668), so that rosdep would
 
 ROS_PACKAGES = {
     *("diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs"),
-    *("launch", "launch_ros", "rclpy"),
+    *("launch", "launch_ros", "rclpy", "ament_index_python", "rcl_interfaces", "tf2_msgs"),
 }
 """Released into Jazzy under these names."""
 
@@ -168,9 +168,13 @@ def test_every_ros_package_that_the_code_imports_is_declared() -> None:
     imported = {
         line.split()[1].split(".")[0] for line in text.splitlines() if line.strip().startswith(("from ", "import "))
     }
-    used = {name for name in imported if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
-    # tf2_msgs is optional: /tf is published where it is installed. builtin_interfaces comes with every message package.
-    assert used - {"tf2_msgs", "builtin_interfaces"} <= declared
+    used = {
+        name
+        for name in imported
+        if name.startswith(("rclpy", "ament")) or name.endswith(("_msgs", "_srvs", "_interfaces"))
+    }
+    # builtin_interfaces comes with every message package; simulation_interfaces is served where it is installed.
+    assert used - {"builtin_interfaces", "simulation_interfaces"} <= declared
 
 
 def scene_parameters(name: str) -> dict:

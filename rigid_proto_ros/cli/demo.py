@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
             + [*text_parameter("record", str(session.resolve())), "-p", "start_paused:=true"]
         )
         print(f"2. poke_client --reset {script}", flush=True)
-        client = processes.start([*own_executable("poke_client"), str(script), "--reset", "--timeout", "60"])
+        client = processes.start([*own_executable("poke_client"), str(script), "--reset", "--timeout", "0"])
         status = processes.wait_for(client, while_running=node)
         if status != 0:
             print(f"rigid_proto demo: poke_client ended with status {status}", file=sys.stderr)

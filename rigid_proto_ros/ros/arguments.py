@@ -1,22 +1,32 @@
 # SPDX-License-Identifier: MIT
-"""ROS arguments checked before rcl reads them, so that a slip ends in one line with a remedy and not in a stack of errors."""
+"""What the command line gives, read before rcl reads it: a slip ends in one line with a remedy and not in
+a stack of errors.
+"""
 
 from __future__ import annotations
 
 import argparse
+import re
 import textwrap
 from collections.abc import Callable
+from pathlib import Path
 
 from ..base.bundled import scene_names
 from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError
 from ..base.nearest_name import did_you_mean
+from ..scene.offline import scene_file, scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scene_file import read_scene_file, typed_value
 
+NODE_NAME = "rigid_body"
+
+_NODE_NAME_FORM = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+
 _WITH_VALUE = (
-    "-p", "--param", "--params-file", "-r", "--remap", "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name",
-)  # fmt: skip
+    *("-p", "--param", "--params-file", "-r", "--remap"),
+    *("-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name"),
+)
 _SWITCHES = tuple(
     f"--{word}-{what}-logs" for word in ("enable", "disable") for what in ("rosout", "stdout", "external-lib")
 )
@@ -31,8 +41,9 @@ EXAMPLES = (
 
 
 def own_arguments(argv: list[str]) -> argparse.Namespace:
-    """``bodies``: the files behind ``--bodies``. Everything else outside ``--ros-args ... [--]`` ends the process: --help with
-    0, what isn't known with 2 and the nearest option. Options inside that rcl wouldn't know are refused, too.
+    """``bodies``: the files behind ``--bodies``. Everything else outside ``--ros-args ... [--]`` ends the process:
+    --help with 0, what isn't known with 2 and the nearest option. Options inside that rcl wouldn't know are refused,
+    too.
     """
     parser = Parser(
         prog="rigid_body_node",
@@ -102,15 +113,19 @@ def _parameter_help() -> str:
 
 
 def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> dict[str, object]:
-    """The parameters that files and ``-p name:=value`` in ``argv`` give this node, later ones winning; raises InputError.
+    """The parameters that files and ``-p name:=value`` in ``argv`` give this node, later ones winning; raises
+    InputError.
 
-    rcl reads the same; but where a later value has another type than an earlier one it keeps the earlier one. A name that is no
-    parameter is an error with the nearest known one; in a ``/**`` section, which other nodes share, a warning.
+    rcl reads the same; but where a later value has another type than an earlier one it keeps the earlier one. A name
+    that is no parameter is an error with the nearest known one; in a ``/**`` section, which other nodes share, a
+    warning.
     """
     given: dict[str, object] = {}
     for option, text in _ros_options(argv):
         if option == "--params-file":
             scene = read_scene_file(text, node_name)
+            if warning := scene.warning(text, node_name):
+                warn(warning)
             for name, value in scene.values.items():
                 if is_ros_parameter(name):
                     continue
@@ -151,7 +166,7 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
     node, colon, name = left.rpartition(":")
     if not colon:
         name = left
-    elif node.lstrip("/") not in (node_name, "**"):
+    elif node.lstrip("/") not in (node_name.lstrip("/"), node_name.rpartition("/")[2], "**"):
         return {}
     if is_ros_parameter(name):
         return {}
@@ -159,3 +174,41 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
     if not value.strip():
         raise InputError(f"-p {name}", value, parameter.accepted)
     return {name: typed_value(value, f"-p {name}")}
+
+
+def remapped_node_name(argv: list[str], name: str = NODE_NAME) -> str:
+    """The node's name, after its namespace if it is given one, by ``-r __node:=name`` and ``-r __ns:=/namespace`` (also
+    ``--remap``, ``__name``); the last ones count.
+    """
+    namespace = ""
+    for option, value in zip(argv, argv[1:], strict=False):
+        if option in ("-r", "--remap"):
+            left, assigned, right = value.partition(":=")
+            if assigned and left.rpartition(":")[2] in ("__node", "__name"):
+                name = right
+            elif assigned and left == "__ns":
+                namespace = right.strip("/")
+    return f"{namespace}/{name}" if namespace else name
+
+
+def read_bodies(files: list[str]) -> dict[str, dict[str, object]]:
+    """The parameters given by each file of ``--bodies``, under the name of its node, which is that of the file.
+
+    Raises InputError for a file that can't be read, a name that no node can have, or two equal ones.
+    """
+    bodies: dict[str, dict[str, object]] = {}
+    for file in files:
+        path = scene_file(file)
+        name = _node_name_of(path)
+        if name in bodies:
+            raise InputError("--bodies", file, f"files with different names; {name} is there already")
+        bodies[name] = scene_values(path, print)
+    return bodies
+
+
+def _node_name_of(path: Path) -> str:
+    """The file's stem with other characters than [A-Za-z0-9_] as _; raises InputError if that names no node."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", path.stem)
+    if not _NODE_NAME_FORM.match(name) or len(name) > 255:
+        raise InputError("--bodies", str(path), "a file whose name, made a node's name, begins with a letter or _")
+    return name

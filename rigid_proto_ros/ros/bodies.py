@@ -1,35 +1,136 @@
 # SPDX-License-Identifier: MIT
-"""Several bodies in one process: ``rigid_body_node --bodies a.yaml b.yaml``, a node for each scene, named after its file."""
+"""The bodies of one process and the threads that they need, from the arguments to the end."""
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
+import sys
+import threading
+import traceback
+from collections.abc import Callable
 
+import rclpy
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from ..base.compilation import told_when_compiling
 from ..base.errors import InputError
-from ..scene.offline import scene_file, scene_values
+from ..scene.parameters import PARAMETERS
+from ..scene.scenario import Scenario
+from ..simulation.observer import Observer
+from .arguments import NODE_NAME, given_arguments, read_bodies, remapped_node_name
+from .node import RigidBodyNode
+from .physics_thread import PhysicsThread
+from .warm_up import warm_up
 
-NODE_NAME_FORM = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
-
-def read_bodies(files: list[str]) -> dict[str, dict]:
-    """The parameters given by each file under its node's name.
-
-    Raises InputError for a file that can't be read, a name that no node can have, or two equal ones.
+class Bodies:
+    """The nodes of this process. files: what stands behind ``--bodies``. request_end() is called when the process
+    should end by itself.
     """
-    bodies: dict[str, dict] = {}
-    for file in files:
-        path = scene_file(file)
-        name = node_name_of(path)
-        if name in bodies:
-            raise InputError("--bodies", file, f"files with different names; {name} is there already")
-        bodies[name] = scene_values(path, print)
-    return bodies
+
+    def __init__(self, argv: list[str], files: list[str], request_end: Callable[[], None]) -> None:
+        self._argv = argv
+        self._files = files
+        self._request_end = request_end
+        self._ending = False
+        self._crashed = False
+        self._nodes: list[RigidBodyNode] = []
+        self._physics = PhysicsThread(self._on_crash)
+        self._executor: Executor | None = None
+        self._executing: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Make the nodes, which may compile for minutes, and let them run. Raises InputError."""
+        bodies = read_bodies(self._files)
+        given = given_arguments(self._argv, remapped_node_name(self._argv), _warn)
+        try:
+            # The middleware must outlive the physics thread, so rclpy's own handlers of signals stay out.
+            rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
+        except Exception as error:  # rclpy's own error types differ between versions
+            raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
+        with told_when_compiling(_say_that_it_compiles):
+            # What the command line gives is for all of them, and comes after the files.
+            for name, values in (bodies or {NODE_NAME: {}}).items():
+                self._nodes.append(RigidBodyNode(self._physics, {**values, **given}, _make_viewer, name))
+            for node in self._nodes:
+                node.states.pack_all(warm_up(node.loop.scenario.setup))
+        self._executor = SingleThreadedExecutor()
+        for node in self._nodes:
+            self._executor.add_node(node)
+        self._executing = threading.Thread(target=self._spin, args=(self._executor,), name="executor", daemon=True)
+        self._executing.start()
+        self._physics.start([node.loop for node in self._nodes])
+        for node in self._nodes:
+            node.get_logger().info(f"{node.get_fully_qualified_name()} is simulating {_described(node.loop.scenario)}")
+
+    def _spin(self, executor: Executor) -> None:
+        while not self._ending:
+            try:
+                executor.spin()
+                break
+            except ExternalShutdownException:
+                break
+            except Exception:
+                # One request that fails by a fault of ours must not take the other services with it.
+                traceback.print_exc()
+        self._request_end()
+
+    def _on_crash(self) -> None:
+        self._crashed = True
+        self._request_end()
+
+    def close(self) -> int:
+        """End the motion and the recordings; returns the exit status that this makes."""
+        self._ending = True
+        self._physics.stop()
+        for node in list(self._nodes):
+            node.close()
+        return 1 if self._crashed else 0
+
+    def leave_ros(self) -> None:
+        """After ``close``, once ``start`` has returned or raised."""
+        if self._executor is not None:
+            self._executor.shutdown(timeout_sec=0.5)
+        if self._executing is not None:
+            self._executing.join(timeout=0.5)
+        for node in self._nodes:
+            node.destroy_node()
+        rclpy.try_shutdown()
 
 
-def node_name_of(path: Path) -> str:
-    """The file's stem with other characters than [A-Za-z0-9_] as _; raises InputError if that names no node."""
-    name = re.sub(r"[^A-Za-z0-9_]", "_", path.stem)
-    if not NODE_NAME_FORM.match(name) or len(name) > 255:
-        raise InputError("--bodies", str(path), "a file whose name, made a node's name, begins with a letter or _")
-    return name
+def _warn(warning: str) -> None:
+    print(f"rigid_body_node: {warning}", file=sys.stderr)
+
+
+def _make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
+    """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
+    parameters = scenario.parameters
+    if parameters.viewer == "none":
+        return None
+    from ..rerun_view import RerunObserver
+
+    def tell(line: str) -> None:
+        print(f"{node_name}: {line}", file=sys.stderr)
+
+    return RerunObserver(
+        viewer=parameters.viewer,
+        rerun_port=_asked_for("rerun_port", parameters.rerun_port),
+        web_port=_asked_for("web_port", parameters.web_port),
+        name=node_name,
+        report=tell,
+        on_error=tell,
+    )
+
+
+def _asked_for(name: str, port: int) -> int | None:
+    """None for a default port, which may move to the next free one."""
+    return None if port == PARAMETERS[name].default else port
+
+
+def _say_that_it_compiles() -> None:
+    print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
+
+
+def _described(scenario: Scenario) -> str:
+    mesh = scenario.parameters.mesh or "a body without a mesh"
+    return f"{mesh}: {scenario.setup.body.mass:.6g} kg, integrator {scenario.setup.integrator.name}"

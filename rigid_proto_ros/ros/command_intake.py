@@ -1,38 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""From the command topics to the simulation: taken by the physics thread in each tick, read, checked, counted.
-
-The subscriptions belong to the node but no executor serves them: a message that the physics thread takes from the
-middleware's queue itself costs a third of one that an executor hands to a callback.
-"""
+"""From the command topics to the simulation: taken by the physics thread in each tick, read, checked, counted."""
 
 from __future__ import annotations
 
 import time
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import String
 
 from ..base.errors import CommandRefused
 from ..messages import cdr
 from ..motion.frames import Frame, parse_frame
-from ..scene.command_codec import core_command
-from ..scene.scenario import check_inertia, nanoseconds
+from ..scene.command_codec import ScriptCommand, core_command, of_message, whole_stamp
+from ..scene.scenario import BodyMesh, check_inertia, nanoseconds
 from ..simulation.commands import WrenchCommand
-from . import qos
-from .message_bytes import read_command, read_message, read_wrench_stamped
-from .polled_subscription import TakenByHand
-from .scheduling import LONG_TEXT, Beside, Scheduled
-from .sequence_gaps import SequenceGaps
-from .stamps import effective_time
+from ..simulation.setup import Setup
+from .command_queue import CommandQueue, Unserved
+from .scheduling import LONG_TEXT, BackgroundThread, ScheduleMessage
+from .simulation_loop import SimulationLoop
 
 TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
 
 QUIET_NS = 4_000_000
-"""How often topics are looked at that carried nothing lately [ns of wall time]."""
+"""How often topics are read that carried nothing lately [ns of wall time]."""
 
 PUBLISHERS_NS = 250_000_000
 """How often it is noted who publishes on a topic that carries nothing [ns of wall time]."""
@@ -40,170 +36,160 @@ PUBLISHERS_NS = 250_000_000
 MOST_FRAMES = 1000
 """Frames of wrenches that are kept as read."""
 
-LIVELY_NS = 5_000_000_000
-"""A topic is looked at in every tick for this long after a message [ns of wall time]."""
+ACTIVE_NS = 5_000_000_000
+"""A topic is read in every tick for this long after a message [ns of wall time]."""
+
+DAY_NS = 24 * 3600 * 1_000_000_000
 
 
 class CommandIntake:
-    """apply_changes(changes, mesh at hand) gives the Setup with parameters changed, as scheduled ``set`` entries need it.
+    """frames: what the node calls the world's and the body's frame. apply_changes(changes, mesh at hand) gives the
+    Setup with parameters changed when a scheduled ``set`` acts, apply_inertia(content) that of an inertia message.
 
-    received counts every message taken by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now;
-    refusals are the simulation's.
+    received counts every message taken by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean
+    now; refusals are the simulation's.
     """
 
     def __init__(
         self,
         node: Node,
+        loop: SimulationLoop,
         frames: tuple[str, str],
-        apply_changes: Callable,
-        apply_inertia: Callable,
+        apply_changes: Callable[[dict, BodyMesh | None], Setup],
+        apply_inertia: Callable[[dict], Setup],
     ) -> None:
         self.received: Counter[str] = Counter()
         self.late = 0
         self.wall_stamp = 0
+        self._loop = loop
         self._frames = frames
         self._apply_changes = apply_changes
         self._apply_inertia = apply_inertia
-        self.queue_full = 0
-        self.sequence_gaps = 0
-        self._next_quiet_look_ns = 0
-        self._next_publishers_look_ns = 0
+        self._next_quiet_ns = 0
+        self._next_publishers_ns = 0
         self._read_frames: dict[str, Frame] = {}
-        self._beside = Beside()
+        self._background = BackgroundThread()
         self._logger = node.get_logger()
-        group = TakenByHand()
-
-        def subscribe(message_type, topic):
-            return node.create_subscription(
-                message_type,
-                f"~/{topic}",
-                lambda message: None,
-                qos.own(qos.COMMAND),
-                callback_group=group,
-                raw=True,
-                qos_overriding_options=qos.OVERRIDABLE,
-            )
-
-        self._sources = (
-            ("wrench", subscribe(WrenchStamped, "wrench"), WrenchStamped, self._wrench),
-            ("poke", subscribe(WrenchStamped, "poke"), WrenchStamped, self._poke),
-            ("string", subscribe(PointStamped, "string/target"), PointStamped, self._string_target),
-            ("string", subscribe(PointStamped, "string/attach"), PointStamped, self._string_attach),
-            ("inertia", subscribe(InertiaStamped, "inertia/set"), InertiaStamped, self._inertia),
-            ("schedule", subscribe(String, "schedule"), String, self._schedule),
+        group = Unserved()
+        self._sources: tuple[tuple[str, CommandQueue, Callable[[bytes], int]], ...] = (
+            ("wrench", CommandQueue(node, WrenchStamped, "wrench", group), lambda data: self._wrench(data, True)),
+            ("poke", CommandQueue(node, WrenchStamped, "poke", group), lambda data: self._wrench(data, False)),
+            ("string", CommandQueue(node, PointStamped, "string/target", group), self._string_target),
+            ("string", CommandQueue(node, PointStamped, "string/attach", group), self._string_attach),
+            ("inertia", CommandQueue(node, InertiaStamped, "inertia/set", group), self._inertia),
+            ("schedule", CommandQueue(node, String, "schedule", group), self._schedule),
         )
-        self._lively_until_ns = [0] * len(self._sources)
-        self._depths = [subscription.qos_profile.depth for _, subscription, _, _ in self._sources]
-        self._gaps = [SequenceGaps(subscription) for _, subscription, _, _ in self._sources]
+        self._active_until_ns = [0] * len(self._sources)
 
-    def take(self, simulation, scenario, wall_ns: int, catch_up: Callable[[], None], whole: bool = False) -> bool:
-        """Submit everything that has arrived; what is refused is counted and the observer told, and the rest goes on. Returns whether
-        something has arrived within the last LIVELY_NS.
+    @property
+    def queue_full(self) -> int:
+        """How often a queue was found full."""
+        return sum(queue.queue_full for _, queue, _ in self._sources)
 
-        catch_up() is called before the first message of a tick, so that now is the tick's own time. Topics that carried something lately are looked at in every tick, quiet ones every QUIET_NS, or now if ``whole``.
+    @property
+    def sequence_gaps(self) -> int:
+        """Messages that were sent and never arrived, as far as that can be known."""
+        return sum(queue.sequence_gaps for _, queue, _ in self._sources)
+
+    def take(self, wall_ns: int, all_topics: bool = False) -> bool:
+        """Submit everything that has arrived; what is refused is counted and the observer told, and the rest goes on.
+        Returns whether something has arrived within the last ACTIVE_NS.
+
+        The loop catches up before the first message, so that now is the tick's own time. Topics that carried something
+        lately are read in every tick, quiet ones every QUIET_NS, or now if ``all_topics``.
         """
-        caught_up = False
-        for message in self._beside.finished():
-            if not caught_up:
-                caught_up = True
-                catch_up()
-            self.received["schedule"] += self._take_scheduled(message, simulation, scenario)
-        look_at_quiet = whole or wall_ns >= self._next_quiet_look_ns
-        if look_at_quiet:
-            self._next_quiet_look_ns = wall_ns + QUIET_NS
-        look_at_publishers = look_at_quiet and wall_ns >= self._next_publishers_look_ns
-        if look_at_publishers:
-            self._next_publishers_look_ns = wall_ns + PUBLISHERS_NS
-        for source, (topic, subscription, message_type, read) in enumerate(self._sources):
-            if not look_at_quiet and wall_ns > self._lively_until_ns[source]:
-                continue
-            gaps = self._gaps[source]
-            with subscription.handle:
-                # Bounded, so that a flood can't hold up the motion for ever.
-                for count in range(qos.COMMAND_DEPTH):
-                    taken = subscription.handle.take_message(message_type, True)
-                    if taken is None:
-                        if (look_at_publishers or (count and look_at_quiet)) and gaps.emptied():
-                            self.queue_full += 1
-                        break
-                    if count == self._depths[source] - 1:
-                        self.queue_full += 1
-                    if not caught_up:
-                        caught_up = True
-                        catch_up()
-                    self._lively_until_ns[source] = wall_ns + LIVELY_NS
-                    self.sequence_gaps += gaps.before(taken[1].get("publication_sequence_number"))
-                    counted = 1
-                    try:
-                        entries = read(taken[0], simulation, scenario)
-                        counted = 1 if entries is None else entries
-                    except CommandRefused as refusal:
-                        simulation.refuse(refusal)
-                    # Last: a message that counts as received counts as late or refused too, if it is.
-                    self.received[topic] += counted
-        return wall_ns < max(self._lively_until_ns)
+        for number, message in enumerate(self._background.finished()):
+            if number == 0:
+                self._loop.catch_up()
+            self.received["schedule"] += self._take_scheduled(message)
+        read_quiet = all_topics or wall_ns >= self._next_quiet_ns
+        if read_quiet:
+            self._next_quiet_ns = wall_ns + QUIET_NS
+        note_publishers = read_quiet and wall_ns >= self._next_publishers_ns
+        if note_publishers:
+            self._next_publishers_ns = wall_ns + PUBLISHERS_NS
+        for source, (topic, queue, read) in enumerate(self._sources):
+            if read_quiet or wall_ns <= self._active_until_ns[source]:
+                for data in queue.take(note_publishers):
+                    self._loop.catch_up()
+                    self._active_until_ns[source] = wall_ns + ACTIVE_NS
+                    self._read(topic, read, data)
+        return wall_ns < max(self._active_until_ns)
 
-    def _wrench(self, data, simulation, scenario) -> None:
-        self._submit_wrench(True, data, simulation, scenario)
+    def _read(self, topic: str, read: Callable[[bytes], int], data: bytes) -> None:
+        counted = 1
+        try:
+            counted = read(data)
+        except CommandRefused as refusal:
+            self._loop.simulation.refuse(refusal)
+        # Last: a message that counts as received counts as late or refused too, if it is.
+        self.received[topic] += counted
 
-    def _poke(self, data, simulation, scenario) -> None:
-        self._submit_wrench(False, data, simulation, scenario)
+    # Each returns how many commands the message counts as
 
-    def _submit_wrench(self, held: bool, data: bytes, simulation, scenario) -> None:
+    def _wrench(self, data: bytes, held: bool) -> int:
+        simulation = self._loop.simulation
         stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
         frame = self._read_frames.get(frame_id)
         if frame is None:
-            frame = parse_frame(frame_id, simulation.setup.contacts, *self._frames)
+            frame = parse_frame(frame_id, frozenset(simulation.setup.contacts), *self._frames)
             # Contacts and frames' names are set at start only, so what was read once stays so.
             if len(self._read_frames) >= MOST_FRAMES:
                 self._read_frames.clear()
             self._read_frames[frame_id] = frame
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
-        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+        simulation.submit(command, self._when(stamp_ns))
+        return 1
 
-    def _string_target(self, data: bytes, simulation, scenario) -> None:
-        self._string("string/target", data, simulation, scenario)
+    def _string_target(self, data: bytes) -> int:
+        return self._string("string/target", data)
 
-    def _string_attach(self, data: bytes, simulation, scenario) -> None:
-        self._string("string/attach", data, simulation, scenario)
+    def _string_attach(self, data: bytes) -> int:
+        return self._string("string/attach", data)
 
-    def _string(self, topic: str, data: bytes, simulation, scenario) -> None:
+    def _string(self, topic: str, data: bytes) -> int:
         sent = read_command(topic, data, PointStamped)
-        command = core_command(sent, sent.t_ns, (), None, self._frames)
-        simulation.submit(command, self._when(sent.t_ns, simulation, scenario))
+        command = core_command(sent, sent.t_ns, (), self._no_change, self._frames)
+        self._loop.simulation.submit(command, self._when(sent.t_ns))
+        return 1
 
-    def _inertia(self, data: bytes, simulation, scenario) -> None:
+    def _inertia(self, data: bytes) -> int:
         sent = read_command("inertia/set", data, InertiaStamped)
-        command = core_command(sent, sent.t_ns, (), None, self._frames, self._apply_inertia, bytes(data))
-        check_inertia(scenario, command.content)
-        stamp_ns = sent.t_ns
-        simulation.submit(command, self._when(stamp_ns, simulation, scenario))
+        command = core_command(sent, sent.t_ns, (), self._no_change, self._frames, self._apply_inertia, bytes(data))
+        check_inertia(self._loop.scenario, command.content)
+        self._loop.simulation.submit(command, self._when(sent.t_ns))
+        return 1
 
-    def _schedule(self, data, simulation, scenario) -> int:
-        message = Scheduled(bytes(data), read_message(data, String).data)
-        quick = self._beside.is_empty and len(message.text) <= LONG_TEXT
+    def _no_change(self, changes: dict) -> Setup:
+        raise TypeError(f"no set comes on this topic: {changes}")
+
+    def _schedule(self, data: bytes) -> int:
+        scenario = self._loop.scenario
+        message = ScheduleMessage(bytes(data), read_message(data, String).data)
+        quick = self._background.is_empty and len(message.text) <= LONG_TEXT
         if quick:
             message.read(scenario)
             quick = not message.is_slow
         if quick:
             message.judge(scenario, self._apply_changes)
-            return self._take_scheduled(message, simulation, scenario)
+            return self._take_scheduled(message)
 
         def work() -> None:
             if not message.commands:
                 message.read(scenario)
             message.judge(scenario, self._apply_changes)
 
-        self._beside.give(message, work)
+        self._background.give(message, work)
         return 0
 
-    def _take_scheduled(self, message: Scheduled, simulation, scenario) -> int:
+    def _take_scheduled(self, message: ScheduleMessage) -> int:
         """Submit all of a message's entries, or refuse them all; returns how many there are."""
+        simulation = self._loop.simulation
         try:
             if message.refusal is not None:
                 raise message.refusal
-            times = [self._effective(entry.t_ns, simulation, scenario) for entry in message.entries]
+            times = [self._effective(entry.t_ns) for entry in message.entries]
         except CommandRefused as refusal:
             simulation.refuse(refusal, message.count)
             return message.count
@@ -214,14 +200,14 @@ class CommandIntake:
             simulation.submit(entry.command, when_ns, entry.listed, entry.judged)
         return message.count
 
-    def _when(self, stamp_ns: int, simulation, scenario) -> int:
-        when_ns, counter = self._effective(stamp_ns, simulation, scenario)
+    def _when(self, stamp_ns: int) -> int:
+        when_ns, counter = self._effective(stamp_ns)
         self._count_stamps(counter, 1)
         return when_ns
 
-    def _effective(self, stamp_ns: int, simulation, scenario) -> tuple[int, str]:
-        horizon_ns = nanoseconds(scenario.parameters.schedule_horizon)
-        return effective_time(stamp_ns, simulation.time_ns, time.time_ns(), horizon_ns)
+    def _effective(self, stamp_ns: int) -> tuple[int, str]:
+        horizon_ns = nanoseconds(self._loop.scenario.parameters.schedule_horizon)
+        return effective_time(stamp_ns, self._loop.simulation.time_ns, time.time_ns(), horizon_ns)
 
     def _count_stamps(self, counter: str, count: int) -> None:
         if counter == "late":
@@ -230,5 +216,70 @@ class CommandIntake:
             first, self.wall_stamp = self.wall_stamp == 0, self.wall_stamp + count
             if first:
                 self._logger.warning(
-                    "a command is stamped with the system's clock: it acts now, and so do later ones; stamps of commands are simulated time"
+                    "a command is stamped with the system's clock: it acts now, and so do later ones; "
+                    "stamps of commands are simulated time"
                 )
+
+
+def effective_time(stamp_ns: int, now_ns: int, wall_ns: int, horizon_ns: int) -> tuple[int, str]:
+    """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
+
+    Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day of
+    the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
+    (``stamp``).
+    """
+    if stamp_ns == 0:
+        return now_ns, ""
+    if stamp_ns <= now_ns:
+        return now_ns, "late" if stamp_ns < now_ns else ""
+    if stamp_ns <= now_ns + horizon_ns:
+        return stamp_ns, ""
+    if abs(stamp_ns - wall_ns) <= DAY_NS:
+        return now_ns, "wall_stamp"
+    raise CommandRefused(
+        "stamp",
+        "header.stamp",
+        f"{stamp_ns / 1e9:.9g} s",
+        f"0, or simulated time up to {horizon_ns / 1e9:g} s (schedule_horizon) after {now_ns / 1e9:.9g} s",
+    )
+
+
+# Messages read from their bytes, without message objects; anything unusual goes through rclpy's own reader
+
+
+def read_wrench_stamped(data: bytes) -> tuple[int, str, tuple, tuple]:
+    """stamp [ns], frame_id, force, torque of a serialized geometry_msgs/WrenchStamped.
+
+    Raises CommandRefused for bytes that are no such message, or whose frame_id isn't UTF-8.
+    """
+    try:
+        seconds, nanoseconds, frame_id, values = cdr.read_stamped_doubles(data, 6)
+    except ValueError:
+        seconds, nanoseconds, frame_id, values = cdr.read_stamped_doubles(_little_endian(data, WrenchStamped), 6)
+    return whole_stamp(seconds, nanoseconds), frame_id, values[:3], values[3:]
+
+
+def read_command(topic: str, data: bytes, message_type: type) -> ScriptCommand:
+    """The command of a message on a topic other than ``schedule``; raises CommandRefused for bytes that
+    are none of its type.
+    """
+    try:
+        return of_message(topic, data)
+    except CommandRefused:
+        raise
+    except ValueError:
+        return of_message(topic, _little_endian(data, message_type))
+
+
+def _little_endian(data: bytes, message_type: type) -> bytes:
+    """A message's bytes as little-endian CDR, however its sender has packed them."""
+    return serialize_message(read_message(data, message_type))
+
+
+def read_message(data: bytes, message_type: type) -> Any:
+    """A message from its bytes; raises CommandRefused for bytes that are none of its type."""
+    try:
+        return deserialize_message(data, message_type)
+    except Exception:  # rclpy's own error types differ between versions and middlewares
+        accepted = f"a serialized {message_type.__name__}"
+        raise CommandRefused("frame", "message", f"{len(data)} bytes that are none", accepted) from None

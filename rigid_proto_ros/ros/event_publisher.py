@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from ..messages import cdr
@@ -22,7 +24,7 @@ class EventPublisher(Observer):
     """An observer that publishes; its methods run on the physics thread, and are rare."""
 
     def __init__(self, node: Node, body_frame: str, mesh_path: Callable[[], str]) -> None:
-        def publisher(message_type, topic, profile):
+        def publisher(message_type: type, topic: str, profile: QoSProfile) -> Publisher:
             return node.create_publisher(
                 message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE
             )
@@ -35,7 +37,7 @@ class EventPublisher(Observer):
         self._applied = publisher(WrenchStamped, "applied", qos.EVENT)
         self._events = publisher(String, "events", qos.EVENT)
 
-    def scene_changed(self, time_ns: int, scene: str) -> None:
+    def scene_changed(self, time_ns: int, scene: str) -> None:  # noqa: ARG002 (an observer is told)
         """All parameters, and the mesh's hash in a comment, as a parameter file."""
         self._scene.publish(cdr.string(scene))
 
@@ -59,11 +61,11 @@ class EventPublisher(Observer):
             frame_id = load.frame_id + command.frame.options
             self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
 
-    def refused(self, time_ns: int, reason: str, message: str) -> None:
+    def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002
         """A warning, for what is refused when it comes and for what turns out impossible when it is to act."""
         self._logger.warning(f"refused: {message}", throttle_duration_sec=1.0)
 
-    def event(self, time_ns: int, line: str) -> None:
+    def event(self, time_ns: int, line: str) -> None:  # noqa: ARG002
         """A line of the event log."""
         if self.hears_events():
             self._events.publish(cdr.string(line))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The node's topics and services, listed once for the docs; a test proves that the running node's graph is this list."""
+"""The node's topics and services, listed once for the docs; a test proves that the running node's graph
+is this list.
+"""
 
 from __future__ import annotations
 
@@ -31,27 +33,105 @@ def _service(name: str, type: str, meaning: str) -> Interface:
 
 
 INTERFACES = (
-    _topic(SUBSCRIBED, "~/wrench", "geometry_msgs/WrenchStamped", "held wrench: each message replaces the one before; it ends `wrench_timeout` after the last"),
-    _topic(SUBSCRIBED, "~/poke", "geometry_msgs/WrenchStamped", "pulse: each message adds one that lasts `poke_duration`, or what its frame says"),
-    _topic(SUBSCRIBED, "~/string/target", "geometry_msgs/PointStamped", "position of the string's free end; the first message ties the string, which is released `string.timeout` after the last"),
-    _topic(SUBSCRIBED, "~/string/attach", "geometry_msgs/PointStamped", "where on the body the string is tied, moved to the nearest point of the surface; frames `world`, `body` (m from the COM), `<body_frame>/mesh`"),
-    _topic(SUBSCRIBED, "~/inertia/set", "geometry_msgs/InertiaStamped", "mass, COM and tensor of the whole body; the model becomes `explicit` and the parameters follow"),
-    _topic(SUBSCRIBED, "~/schedule", "std_msgs/String", "one entry of a poke script as YAML, or a list of entries, taken or refused as a whole; `t` in absolute simulated seconds"),
+    _topic(
+        SUBSCRIBED,
+        "~/wrench",
+        "geometry_msgs/WrenchStamped",
+        "held wrench: each message replaces the one before; it ends `wrench_timeout` after the last",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/poke",
+        "geometry_msgs/WrenchStamped",
+        "pulse: each message adds one that lasts `poke_duration`, or what its frame says",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/string/target",
+        "geometry_msgs/PointStamped",
+        "position of the string's free end; the first message ties the string, which is released `string.timeout` "
+        "after the last",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/string/attach",
+        "geometry_msgs/PointStamped",
+        "where on the body the string is tied, moved to the nearest point of the surface; frames `world`, `body` "
+        "(m from the COM), `<body_frame>/mesh`",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/inertia/set",
+        "geometry_msgs/InertiaStamped",
+        "mass, COM and tensor of the whole body; the model becomes `explicit` and the parameters follow",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/schedule",
+        "std_msgs/String",
+        "one entry of a poke script as YAML, or a list of entries, taken or refused as a whole; `t` in absolute "
+        "simulated seconds",
+    ),
     _topic(PUBLISHED, "~/pose", "geometry_msgs/PoseStamped", "COM and attitude of the mesh's axes, in the world"),
-    _topic(PUBLISHED, "~/twist", "geometry_msgs/TwistStamped", "velocity of the COM and angular velocity, both in world axes"),
+    _topic(
+        PUBLISHED,
+        "~/twist",
+        "geometry_msgs/TwistStamped",
+        "velocity of the COM and angular velocity, both in world axes",
+    ),
     _topic(PUBLISHED, "~/odom", "nav_msgs/Odometry", "both; its twist is in body axes"),
-    _topic(PUBLISHED, "~/imu", "sensor_msgs/Imu", "attitude, angular velocity and specific force in body axes, at the contact `imu_contact` or the COM"),
-    _topic(PUBLISHED, "~/inertia", "geometry_msgs/InertiaStamped", "latched: mass, COM (scaled mesh coordinates) and tensor about it (mesh axes)"),
-    _topic(PUBLISHED, "~/applied", "geometry_msgs/WrenchStamped", "each wrench and poke as it took effect, its point resolved on the body"),
-    _topic(PUBLISHED, "~/events", "std_msgs/String", "one JSON line per command, change and service as applied, with a running SHA-256"),
-    _topic(PUBLISHED, "~/scene", "std_msgs/String", "latched: all parameters and the mesh's hash, as a scene that starts the same simulation"),
-    _topic(PUBLISHED, "~/robot_description", "std_msgs/String", "latched: URDF with mesh and inertia, for other viewers"),
-    _topic(PUBLISHED, "/diagnostics", "diagnostic_msgs/DiagnosticArray", "once a second: counters, energies, |L| and its drift, what was refused and why"),
+    _topic(
+        PUBLISHED,
+        "~/imu",
+        "sensor_msgs/Imu",
+        "attitude, angular velocity and specific force in body axes, at the contact `imu_contact` or the COM",
+    ),
+    _topic(
+        PUBLISHED,
+        "~/inertia",
+        "geometry_msgs/InertiaStamped",
+        "latched: mass, COM (scaled mesh coordinates) and tensor about it (mesh axes)",
+    ),
+    _topic(
+        PUBLISHED,
+        "~/applied",
+        "geometry_msgs/WrenchStamped",
+        "each wrench and poke as it took effect, its point resolved on the body",
+    ),
+    _topic(
+        PUBLISHED,
+        "~/events",
+        "std_msgs/String",
+        "one JSON line per command, change and service as applied, with a running SHA-256",
+    ),
+    _topic(
+        PUBLISHED,
+        "~/scene",
+        "std_msgs/String",
+        "latched: all parameters and the mesh's hash, as a scene that starts the same simulation",
+    ),
+    _topic(
+        PUBLISHED,
+        "~/robot_description",
+        "std_msgs/String",
+        "latched: URDF with mesh and inertia, for other viewers",
+    ),
+    _topic(
+        PUBLISHED,
+        "/diagnostics",
+        "diagnostic_msgs/DiagnosticArray",
+        "once a second: counters, energies, |L| and its drift, what was refused and why",
+    ),
     _topic(PUBLISHED, "/clock", "rosgraph_msgs/Clock", "simulated time", "publish_clock"),
     _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, where tf2_msgs is installed", "publish_tf"),
     _service("~/reset", "Trigger", "time 0 and the initial state; wrench, pulses and schedule are dropped"),
     _service("~/pause", "SetBool", "true stops simulated time, false lets it run"),
-    _service("~/step", "Trigger", "while paused: one publication period"),
+    _service(
+        "~/step",
+        "Trigger",
+        "while paused: takes all commands that have arrived, advances `step_periods` publications and answers when "
+        "they are published",
+    ),
     _service("~/clear_wrench", "Trigger", "ends the held wrench and the running pulses"),
     _service("~/string/release", "Trigger", "releases the string"),
-)  # fmt: skip
+)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Parameters that change in flight: checked together, handed to the physics thread, and brought up to what commands changed."""
+"""Parameters that change in flight: checked together, handed to the physics thread, updated to what
+commands changed.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -14,20 +17,38 @@ from ..base.errors import CommandRefused, InputError
 from ..scene.parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scenario import Scenario
 from ..simulation.commands import Change
+from ..simulation.observer import Observer
 from .parameter_server import converted, descriptor, is_read_only, ros_parameter
-from .warm_up import warm_up
+from .physics_thread import Call
+from .simulation_loop import SimulationLoop
+from .state_publisher import StatePublisher
+from .warm_up import warm_up_change
+from .watchers import Watchers
 
-if TYPE_CHECKING:
-    from .node import RigidBodyNode
+Store = Callable[[list[Parameter]], SetParametersResult]
+"""rclpy's own way to set parameters atomically."""
 
 
 class LiveParameters:
     """Serves the parameter services of a node. All but ``changed`` runs on the executor's thread."""
 
-    def __init__(self, node: RigidBodyNode) -> None:
+    def __init__(
+        self,
+        node: Node,
+        store: Store,
+        loop: SimulationLoop,
+        call: Call,
+        watchers: Watchers,
+        states: StatePublisher,
+    ) -> None:
         self._node = node
+        self._store_in_ros = store
+        self._loop = loop
+        self._call = call
+        self._watchers = watchers
+        self._states = states
         self._behind = node.create_guard_condition(self._follow)
-        self._services = _ParameterServices(node, self)
+        self._services = _ParameterServices(node, self.set_several)
 
     def changed(self) -> None:
         """From any thread: a command has changed what parameters say."""
@@ -76,63 +97,75 @@ class LiveParameters:
 
     def _change(self, changes: dict, counted: bool) -> None:
         # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
-        node, flight = self._node, self._node.flight
-        present = flight.scenario
+        loop = self._loop
+        present = loop.scenario
         planned = present.with_changes(changes)
-        if planned.setup.integrator is not present.setup.integrator:
-            _warm_up(planned)
+        warm_up_change(present, planned)
         if changes.get("record", "") == present.parameters.record:
             changes = {name: value for name, value in changes.items() if name != "record"}
 
         def check() -> Scenario:
-            scenario = flight.scenario.with_changes(changes, at_hand=planned.body_mesh)
+            scenario = loop.scenario.with_changes(changes, at_hand=planned.body_mesh)
             try:
-                node.check_change(scenario)
+                loop.check_change(scenario)
             except CommandRefused as refusal:
                 if counted:
-                    flight.simulation.refuse(refusal)
+                    loop.simulation.refuse(refusal)
                 raise
             return scenario
 
         def change() -> None:
             scenario = check()
-            flight.change(scenario)
-            flight.simulation.submit(Change(changes, lambda: scenario.setup))
-            node.tell_scene(scenario)
+            loop.change(scenario)
+            loop.simulation.submit(Change(changes, lambda: scenario.setup))
+            loop.tell_scene()
 
         recorder = None
         if "record" in changes:
             # Opened last: a refused change must leave the file of that name as it is.
-            node.call(check)
-            recorder = node.open_recorder(planned)
+            self._call(check)
+            recorder = self._watchers.open_recorder(planned)
         try:
-            node.call(change)
+            self._call(change)
         except InputError:
             if recorder is not None:
                 recorder.close()
             raise
         if "record" in changes:
-            finished = node.call(lambda: node.switch_recording(recorder))
+            finished = self._call(lambda: self._watchers.switch_recording(loop, recorder))
             if finished is not None:
                 finished.close()
-        node.states.configure(flight.scenario.parameters)
+        self._states.configure(loop.scenario.parameters)
 
     def _follow(self) -> None:
-        """Bring the ROS parameters up to what scheduled commands and inertia messages have changed."""
-        now = self._node.flight.scenario.parameters
+        """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
+        where one has stopped.
+        """
+        if self._watchers.has_failed_recording:
+            self._call(self._give_up_recording).close()
+        now = self._loop.scenario.parameters
         behind = {
             name: value for name, value in now.named().items() if not self._is_in_force(_as_ros({name: value})[0])
         }
         if behind:
             self._store(_as_ros(behind), behind)
-            self._node.states.configure(now)
+            self._states.configure(now)
+
+    def _give_up_recording(self) -> Observer:
+        """On the physics thread; returns the recorder, which is still to be closed."""
+        loop = self._loop
+        loop.change(loop.scenario.with_changes({"record": ""}))
+        recorder = self._watchers.switch_recording(loop, None)
+        loop.tell_scene()
+        assert recorder is not None
+        return recorder
 
     def _store(self, parameters: list[Parameter], values: dict) -> SetParametersResult:
         """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""
         for name, value in values.items():
             if not self._node.has_parameter(name):
                 self._node.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
-        return Node.set_parameters_atomically(self._node, parameters)
+        return self._store_in_ros(parameters)
 
     def _is_in_force(self, parameter: Parameter) -> bool:
         """Whether the node has that parameter, with that value."""
@@ -143,29 +176,25 @@ class LiveParameters:
 
 
 class _ParameterServices(ParameterService):
-    """rclpy's parameter services, but for ``set_parameters``, whose requests are taken as a whole."""
+    """rclpy's parameter services, but for ``set_parameters``, whose requests are taken as a whole.
 
-    def __init__(self, node: Node, parameters: LiveParameters) -> None:
+    rclpy has no public way to replace one of them: the method overridden here is its own. Tried with rclpy 7.1.6
+    (Jazzy); test/ros/test_command_queue.py says when a release breaks it.
+    """
+
+    def __init__(self, node: Node, set_several: Callable[[list[Parameter]], list[SetParametersResult]]) -> None:
         super().__init__(node)
-        self._parameters = parameters
+        self._set_several = set_several
 
-    def _set_parameters_callback(self, request, response):
-        given = [Parameter.from_parameter_msg(message) for message in request.parameters]
-        response.results = self._parameters.set_several(given)
+    def _set_parameters_callback(self, request: Any, response: Any) -> Any:
+        response.results = self._set_several([Parameter.from_parameter_msg(message) for message in request.parameters])
         return response
-
-
-def _warm_up(scenario: Scenario) -> None:
-    try:
-        warm_up(scenario.setup)
-    except CommandRefused:
-        pass  # what acts now decides whether it is refused, and that is counted
 
 
 def _as_ros(values: dict) -> list[Parameter]:
     return [ros_parameter(parameter_named(name), value) for name, value in values.items()]
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """rclpy keeps arrays of doubles as array.array."""
     return value if isinstance(value, (str, bool, int, float)) else list(value)

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -41,41 +44,23 @@ def descriptor(parameter: Parameter) -> ParameterDescriptor:
     return result
 
 
-def declare_parameters(node: Node) -> dict[str, object]:
-    """Declare all parameters on the node and return their values, converted; raises InputError.
+def declare_parameters(node: Node, given: Mapping[str, object]) -> dict[str, Any]:
+    """Declare all parameters on the node, those ``given`` at start with their values, and return them all, converted.
 
-    rclpy refuses an integer where a double is declared, so the values given at start are converted before.
+    What rcl has read from the same files and arguments is ignored: rclpy would refuse an integer where a double is
+    declared. Raises InputError.
     """
-    overrides = node._parameter_overrides
-    names = list(PARAMETERS)
-    for name in overrides:
-        if is_ros_parameter(name) or name in PARAMETERS:
-            continue
-        try:
-            parameter_named(name)
-        except InputError:
-            continue  # from a section for all nodes, and warned of already
-        names.append(name)
     values = {}
-    for name in names:
+    for name in dict.fromkeys([*PARAMETERS, *given]):
         parameter = parameter_named(name)
-        value = parameter.default
-        if name in overrides:
-            value = parameter.convert(overrides[name].value)
-            overrides[name] = ros_parameter(parameter, value)
-        values[name] = value
-        node.declare_parameter(name, value, descriptor(parameter))
+        values[name] = parameter.convert(given[name]) if name in given else parameter.default
+        node.declare_parameter(name, values[name], descriptor(parameter), ignore_override=True)
     return values
 
 
 def ros_parameter(parameter: Parameter, value: object) -> RosParameter:
     """A converted value as rclpy's parameter."""
     return RosParameter(parameter.name, _ROS_TYPES[parameter.type], value)
-
-
-def given_parameters(values: dict[str, object]) -> list[RosParameter]:
-    """Values by name, as a scene file gives them, for a node's ``parameter_overrides``; raises InputError."""
-    return [ros_parameter(parameter_named(name), parameter_named(name).convert(v)) for name, v in values.items()]
 
 
 def converted(changes: list[RosParameter]) -> list[RosParameter]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The thread that owns the flights: it wakes at absolute deadlines and lets each one do what is due.
+"""The thread that owns the simulations: it wakes at absolute deadlines and lets each loop do what is due.
 
 Everybody else hands work over with ``call``; nothing else touches a simulation.
 """
@@ -12,9 +12,13 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from typing import Any
 
 from ..base.errors import InputError
-from .flight import Flight
+from .simulation_loop import SimulationLoop
+
+Call = Callable[[Callable[[], Any]], Any]
+"""Runs a function on the physics thread and returns what it returns; raises InputError when that is too busy."""
 
 SHORT_NS = 3_000_000
 """Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
@@ -24,19 +28,20 @@ STEP_PATIENCE_S = 10.0
 
 
 class PhysicsThread:
-    """flights: the bodies that it carries. on_crash() is called should the thread end by a fault of the program."""
+    """on_crash() is called should the thread end by a fault of the program."""
 
-    def __init__(self, flights: Sequence[Flight], on_crash: Callable[[], None] = lambda: None) -> None:
-        self._flights = list(flights)
+    def __init__(self, on_crash: Callable[[], None] = lambda: None) -> None:
+        self._loops: list[SimulationLoop] = []
         self._on_crash = on_crash
-        self._requests: list[tuple[Flight, Callable, Future]] = []
+        self._requests: list[tuple[SimulationLoop, Callable[[], Any], Future]] = []
         self._wake = threading.Event()
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="physics", daemon=True)
 
-    def start(self) -> None:
-        """Begin simulated time."""
-        # What start-up has made stays: the garbage collector looking through it again would hold up the flight for 0.1 s.
+    def start(self, loops: Sequence[SimulationLoop]) -> None:
+        """Begin the simulated time of these."""
+        self._loops = list(loops)
+        # What start-up has made stays: the garbage collector going through it again would hold up the motion for 0.1 s.
         gc.freeze()
         self._thread.start()
 
@@ -49,13 +54,16 @@ class PhysicsThread:
         for _, _, future in self._requests:
             future.cancel()
 
-    def call(self, flight: Flight, function: Callable, timeout_s: float = 10.0):
-        """Run ``function`` on the physics thread between two ticks and return what it returns, or raise what it raises.
+    def call(self, loop: SimulationLoop, function: Callable[[], Any], timeout_s: float = 10.0) -> Any:
+        """Run ``function`` on the physics thread between two ticks of this loop and return what it returns, or raise
+        what it raises; at once, before the thread is started.
 
         Raises InputError when the thread is too busy to begin it within timeout_s; then it is never run.
         """
+        if self._thread.ident is None:
+            return function()
         future: Future = Future()
-        self._requests.append((flight, function, future))
+        self._requests.append((loop, function, future))
         self._wake.set()
         try:
             return future.result(timeout_s)
@@ -69,15 +77,15 @@ class PhysicsThread:
 
     def _run(self) -> None:
         try:
-            for flight in self._flights:
-                flight.start()
+            for loop in self._loops:
+                loop.start()
             while not self._stopping:
-                self._wait_until(min(flight.next_wake_ns() for flight in self._flights))
+                self._wait_until(min(loop.next_wake_ns() for loop in self._loops))
                 self._serve_requests()
                 now_ns = time.monotonic_ns()
-                for flight in self._flights:
-                    if flight.next_wake_ns() <= now_ns:
-                        flight.tick()
+                for loop in self._loops:
+                    if loop.next_wake_ns() <= now_ns:
+                        loop.tick()
         except Exception:
             traceback.print_exc()
             self._on_crash()
@@ -94,25 +102,25 @@ class PhysicsThread:
 
     def _serve_requests(self) -> None:
         while self._requests:
-            flight, function, future = self._requests.pop(0)
+            loop, function, future = self._requests.pop(0)
             if future.set_running_or_notify_cancel():
-                flight.meet_request()
+                loop.prepare_request()
                 try:
                     future.set_result(function())
                 except BaseException as error:  # the caller's to handle
                     future.set_exception(error)
 
 
-def step_over(call: Callable, flight: Flight) -> int:
-    """While paused, advance to the next publication, by ``call`` to the thread; returns the time reached [ns].
+def step_over(call: Call, loop: SimulationLoop, periods: int = 1) -> int:
+    """While paused, advance over so many publications, by ``call`` to the thread; returns the time reached [ns].
 
     Raises InputError when that takes longer than STEP_PATIENCE_S; the step goes on by itself then.
     """
     end = time.monotonic() + STEP_PATIENCE_S
-    reached = call(flight.step)
+    reached = call(lambda: loop.step(periods))
     while not reached:
         if time.monotonic() > end:
-            accepted = f"a publication period that is simulated in {STEP_PATIENCE_S:g} s; it goes on"
-            raise InputError("step", f"{flight.simulation.time_ns / 1e9:.9g} s reached", accepted)
-        reached = call(lambda: not flight.stepping)
-    return flight.simulation.time_ns
+            accepted = f"publication periods that are simulated in {STEP_PATIENCE_S:g} s; it goes on"
+            raise InputError("step", f"{loop.simulation.time_ns / 1e9:.9g} s reached", accepted)
+        reached = call(lambda: not loop.stepping)
+    return loop.simulation.time_ns

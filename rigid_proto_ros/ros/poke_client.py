@@ -20,6 +20,8 @@ from ..scene.command_codec import ScriptCommand
 from ..scene.parameters import PARAMETERS
 from ..scene.script import MAX_TIME_S, parse_script, read_script
 
+DEFAULT_WRENCH_TIMEOUT_S = float(str(PARAMETERS["wrench_timeout"].default))
+
 _ONE_LINE_COMMANDS = ("poke", "wrench")
 
 
@@ -33,9 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         args = _arguments(own)
         # Read before a node is looked for: a mistake in it is told at once.
-        script = _script(
-            args, PARAMETERS["wrench_timeout"].default if args.wrench_timeout is None else args.wrench_timeout
-        )
+        script = _script(args, DEFAULT_WRENCH_TIMEOUT_S if args.wrench_timeout is None else args.wrench_timeout)
         if args.dry_run:
             _print_plan(script)
             return 0
@@ -78,7 +78,9 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         metavar="S",
         help="wrench_timeout to assume for held wrenches (default: the node's)",
     )
-    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node")
+    parser.add_argument(
+        "--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node (default 10; 0: for ever)"
+    )
     line = parser.add_argument_group("one command from the line")
     line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
     line.add_argument("--force", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N")
@@ -116,7 +118,7 @@ def _script(args: argparse.Namespace, wrench_timeout: float) -> list[ScriptComma
     return parse_script(yaml.safe_dump([entry]), args.what, wrench_timeout)
 
 
-def _point(text: str):
+def _point(text: str) -> str | dict:
     """A point as a frame writes it, as a script entry writes it."""
     word, _, values = text.partition("/")
 
@@ -145,7 +147,7 @@ def _print_plan(script: list[ScriptCommand]) -> None:
             "set": lambda c: str(c.changes),
         }
         content["poke"] = content["wrench"]
-        text = content.get(command.kind, lambda c: "")(command)
+        text = content[command.kind](command) if command.kind in content else ""
         print(f"{command.t_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -13,6 +13,7 @@ import numpy as np
 import rclpy
 from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from ..base.errors import InputError
@@ -60,8 +61,8 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
 
 
 def session_commands(session: RecordedSession) -> list[ScriptCommand]:
-    """What moved the body, at the times at which it acted and in frames that a node of any name reads; pauses and steps are of
-    the clock alone.
+    """What moved the body, at the times at which it acted and in frames that a node of any name reads; pauses and steps
+    are of the clock alone.
     """
     parameters = recorded_parameters(session)
     frames = frame_names(parameters, session.node_name)
@@ -95,7 +96,7 @@ def publish_states(session: RecordedSession, speed: float) -> int:
     return 0
 
 
-def _send_states(node, session: RecordedSession, speed: float) -> None:
+def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
     types = {"pose": PoseStamped, "twist": TwistStamped, "odom": Odometry}
     streams, senders = _streams(session), {}
     for name in streams:
@@ -147,7 +148,7 @@ def _template(name: str, session: RecordedSession) -> Callable[[int, list[float]
 
 
 @contextmanager
-def _context():
+def _context() -> Iterator[None]:
     rclpy.init(args=[sys.argv[0]], signal_handler_options=SignalHandlerOptions.NO)
     try:
         yield

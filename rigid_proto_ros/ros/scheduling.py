@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Messages of the schedule topic: read, and judged as a whole before any of their entries is taken.
 
-What takes long (a mesh to load, kernels to compile, a long text) is done beside the physics thread, and the message counts as
-taken when that is done: the motion never waits for it.
+What takes long (a mesh to load, kernels to compile, a long text) is done on a thread in the background, and the message
+counts as taken when that is done: the motion never waits for it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ..scene.script import expand_schedule, read_schedule, with_contacts
 from ..simulation.commands import Command, Listed
 from ..simulation.setup import Setup
 from ..simulation.simulation import judge
-from .warm_up import warm_up
+from .warm_up import warm_up_change
 
 LONG_TEXT = 20_000
-"""Characters of a message that is read beside the physics thread: some milliseconds."""
+"""Characters of a message that is read in the background: some milliseconds."""
 
 SLOW = frozenset(
     {
@@ -38,7 +38,9 @@ SLOW = frozenset(
 
 @dataclass(frozen=True)
 class Entry:
-    """A command ready to be submitted: its own time, its place in its list, and what Simulation.submit takes as judged."""
+    """A command ready to be submitted: its own time, its place in its list, and what Simulation.submit
+    takes as judged.
+    """
 
     command: Command
     t_ns: int
@@ -48,9 +50,9 @@ class Entry:
 
 
 @dataclass
-class Scheduled:
-    """One message. count: its entries, as messages are counted. commands: once read. entries: once judged. refusal: why none of
-    it is taken.
+class ScheduleMessage:
+    """One message. count: its entries, as messages are counted. commands: once read. entries: once judged. refusal: why
+    none of it is taken.
     """
 
     data: bytes
@@ -63,36 +65,46 @@ class Scheduled:
 
     @property
     def is_slow(self) -> bool:
-        """Whether the physics thread shouldn't judge it."""
+        """Whether it is to be judged in the background."""
         return any(command.changes and SLOW & command.changes.keys() for command in self.commands)
 
     def read(self, scenario: Scenario) -> None:
         """Fill ``commands``."""
-        with_refusal(self, self._read, scenario)
+        self._keep_refusal(self._read, scenario)
 
     def judge(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
-        """Fill ``entries``, each judged in the scene that those before it have made of this one; change(changes, mesh at hand)
-        is called when a ``set`` acts.
+        """Fill ``entries``, each judged in the scene that those before it have made of this one; change(changes, mesh
+        at hand) is called when a ``set`` acts.
         """
-        with_refusal(self, self._judge, scenario, change)
+        self._keep_refusal(self._judge, scenario, change)
+
+    def _keep_refusal(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Do the message's work; what it raises becomes the refusal."""
+        if self.refusal is None:
+            try:
+                work(*arguments)
+            except CommandRefused as refusal:
+                self.refusal = refusal
+            except InputError as error:
+                self.refusal = CommandRefused("schedule", error.field, error.received, error.accepted)
 
     def _read(self, scenario: Scenario) -> None:
         listed = read_schedule(self.text)
         self.is_list = isinstance(listed, list)
         self.count = len(listed) if self.is_list else 1
-        commands = expand_schedule(listed, float(scenario.parameters.wrench_timeout))
+        commands = expand_schedule(listed, scenario.parameters.wrench_timeout)
         self.commands = with_contacts(commands, scenario.setup.contacts)
 
-    def _judge(self, scenario: Scenario, change: Callable) -> None:
+    def _judge(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
         # In order of time; those of one time in the order of the list.
         order = sorted(range(len(self.commands)), key=lambda k: self.commands[k].t_ns)
         for k in order:
             command = self.commands[k]
             at_hand = None
-            if command.kind == "set":
+            if command.changes is not None:
                 before, scenario = scenario, scenario.with_changes(command.changes)
                 at_hand = scenario.body_mesh
-                _compile(before, scenario)
+                warm_up_change(before, scenario)
             own = core_command(
                 command,
                 command.t_ns,
@@ -105,36 +117,16 @@ class Scheduled:
             self.entries.append(Entry(own, command.t_ns, command.entry, listed, judged))
 
 
-def _with_mesh(change: Callable, at_hand: BodyMesh | None, changes: dict):
+def _with_mesh(change: Callable[[dict, BodyMesh | None], Setup], at_hand: BodyMesh | None, changes: dict) -> Setup:
     return change(changes, at_hand)
 
 
-def _compile(before: Scenario, after: Scenario) -> None:
-    for old, new in ((before.setup, after.setup), (before.ghost, after.ghost)):
-        if new is not None and (old is None or new.integrator is not old.integrator):
-            try:
-                warm_up(new)
-            except CommandRefused:
-                pass  # what acts when its time comes decides whether it is refused, and that is counted
-
-
-def with_refusal(message: Scheduled, work: Callable[..., None], *arguments: Any) -> None:
-    """Do a message's work; what it raises becomes its refusal."""
-    if message.refusal is None:
-        try:
-            work(*arguments)
-        except CommandRefused as refusal:
-            message.refusal = refusal
-        except InputError as error:
-            message.refusal = CommandRefused("schedule", error.field, error.received, error.accepted)
-
-
-class Beside:
-    """One thread that does what takes long; what it has done comes out in the order in which it was given."""
+class BackgroundThread:
+    """Does what takes long; messages come out in the order in which they were given."""
 
     def __init__(self) -> None:
         self._work: SimpleQueue = SimpleQueue()
-        self._given: deque[tuple[Scheduled, threading.Event]] = deque()
+        self._given: deque[tuple[ScheduleMessage, threading.Event]] = deque()
         self._thread: threading.Thread | None = None
 
     @property
@@ -142,7 +134,7 @@ class Beside:
         """Nothing waits to be done or fetched."""
         return not self._given
 
-    def give(self, message: Scheduled, work: Callable[[], None]) -> None:
+    def give(self, message: ScheduleMessage, work: Callable[[], None]) -> None:
         """Do this work for a message."""
         if self._thread is None:
             # A daemon: the end of the process doesn't wait for a mesh.
@@ -152,7 +144,7 @@ class Beside:
         self._given.append((message, done))
         self._work.put((work, message, done))
 
-    def finished(self) -> Iterator[Scheduled]:
+    def finished(self) -> Iterator[ScheduleMessage]:
         """Messages whose work is done, up to the first whose isn't."""
         while self._given and self._given[0][1].is_set():
             yield self._given.popleft()[0]

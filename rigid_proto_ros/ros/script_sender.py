@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -29,9 +32,11 @@ MAX_UNCONFIRMED = 500
 """Commands sent beyond what the node has reported as received: far below what its queues hold."""
 
 SEND_AHEAD_NS = 60 * 1_000_000_000
-"""Commands to a node that runs go out at most this far ahead of simulated time, so that a client that is ended leaves little
-behind; before it resumes it gets all that its schedule_horizon lets in.
+"""Commands to a node that runs go out at most this far ahead of simulated time, so that a client that is ended leaves
+little behind; before it resumes it gets all that its schedule_horizon lets in.
 """
+
+DEFAULT_HORIZON_S = float(str(PARAMETERS["schedule_horizon"].default))
 
 STALLED_S = 15.0
 """A node that confirms nothing for this long is gone, or receives nothing."""
@@ -40,13 +45,16 @@ STANDSTILL_REPORTS = 3
 """Simulated time that so many reports find unmoved is paused by somebody, or follows a clock that stands."""
 
 BURST_S = 0.5
-"""Reports that have waited in the queue come together: of so many seconds the last one counts; the node makes one a second."""
+"""Reports that have waited in the queue come together: of so many seconds the last one counts; the node
+makes one a second.
+"""
 
 
 @dataclass(frozen=True)
 class Report:
-    """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused ones
-    by reason; told: what the node's log said of them, at most one line a second. last_ns: when the last command acts.
+    """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
+    ones by reason; told: what the node's log said of them, at most one line a second. last_ns: when the last command
+    acts.
     """
 
     sent: dict[str, int]
@@ -59,6 +67,7 @@ class Report:
 
     @property
     def all_in_time(self) -> bool:
+        """Whether none was late or refused."""
         return self.late == 0 and self.refused == 0
 
     @property
@@ -74,7 +83,9 @@ class Report:
 
 
 class ScriptSender(Node):
-    """A client of the node with this name. Raises InputError when it doesn't answer within timeout_s."""
+    """A client of the node with this name. Raises InputError when it doesn't answer within timeout_s; 0
+    waits for ever.
+    """
 
     def __init__(self, node_name: str, timeout_s: float) -> None:
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
@@ -82,7 +93,6 @@ class ScriptSender(Node):
         self._counters: dict[str, str] = {}
         self._refusals: list[str] = []
         self._reports = 0
-        self._simulated_ns: int | None = None
         self._get_parameters: Client | None = None
         publisher = self.create_publisher
         self._topics = {
@@ -111,7 +121,7 @@ class ScriptSender(Node):
             start_ns = self._now_ns() + nanoseconds(lead_s)
         sent = dict.fromkeys(self._topics, 0)
         horizon_s = self.parameter("schedule_horizon")
-        horizon_ns = nanoseconds(PARAMETERS["schedule_horizon"].default if horizon_s is None else float(horizon_s))
+        horizon_ns = nanoseconds(DEFAULT_HORIZON_S if horizon_s is None else float(horizon_s))
         paused = reset
         number = 0
         for message in outgoing(script, start_ns):
@@ -146,7 +156,7 @@ class ScriptSender(Node):
         names = {command.contact for command in script if command.contact}
         return {name: tuple(point) for name in names if len(point := self.parameter(f"contacts.{name}") or ()) == 3}
 
-    def parameter(self, name: str):
+    def parameter(self, name: str) -> Any:
         """The node's value of a parameter; None where it has none of that name."""
         if self._get_parameters is None:
             self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
@@ -161,7 +171,7 @@ class ScriptSender(Node):
         deadline = time.monotonic() + timeout_s
         ready = False
         while not ready:
-            if time.monotonic() > deadline:
+            if timeout_s and time.monotonic() > deadline:
                 raise InputError("--node", self.target, f"a running rigid_body node within {timeout_s:g} s")
             rclpy.spin_once(self, timeout_sec=0.1)
             self._show(f"waiting for {self.target}")
@@ -185,16 +195,16 @@ class ScriptSender(Node):
 
     def _now_ns(self) -> int:
         """Simulated time of a state published from now on."""
-        self._simulated_ns = None
+        stamps: list[int] = []
 
         def on_pose(message: PoseStamped) -> None:
             stamp = message.header.stamp
-            self._simulated_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+            stamps.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
 
         subscription = self.create_subscription(PoseStamped, f"{self.target}/pose", on_pose, 1)
-        self._spin_until(lambda: self._simulated_ns is not None, f"a state on {self.target}/pose")
+        self._spin_until(lambda: stamps, f"a state on {self.target}/pose")
         self.destroy_subscription(subscription)
-        return self._simulated_ns
+        return stamps[0]
 
     def _hold_back(self, number: int, stamp_ns: int, ahead_ns: int) -> None:
         """Wait while too much is unconfirmed, or the command lies further ahead than ``ahead_ns``."""
@@ -218,27 +228,26 @@ class ScriptSender(Node):
         unmoved = 0
         while (before_ns := self._reported_ns()) <= last_ns and unmoved < STANDSTILL_REPORTS:
             self._show(f"all sent, waiting for {last_ns / 1e9:.6g} s of simulated time")
-            number, end = self._reports, time.monotonic() + BURST_S
-            self._spin_until(
-                lambda number=number, end=end: (
-                    self._reported_ns() > last_ns or (self._reports > number and time.monotonic() > end)
-                ),
-                f"a report of {self.target}",
-            )
+            reported = partial(self._has_reported, last_ns, self._reports, time.monotonic() + BURST_S)
+            self._spin_until(reported, f"a report of {self.target}")
             unmoved = unmoved + 1 if self._reported_ns() == before_ns else 0
+
+    def _has_reported(self, last_ns: int, number: int, burst_end: float) -> bool:
+        """A report from after ``last_ns``, or the last one of those that came together."""
+        return self._reported_ns() > last_ns or (self._reports > number and time.monotonic() > burst_end)
 
     def _reported_ns(self) -> int:
         """Simulated time of the last report."""
         return int(self._counters["sim_time_ns"])
 
-    def _call(self, client, request) -> None:
+    def _call(self, client: Client, request: Any) -> None:
         future = client.call_async(request)
         self._spin_until(future.done, f"an answer of {client.srv_name}")
         answer = future.result()
         if not answer.success:
             raise InputError(client.srv_name, answer.message, "success")
 
-    def _spin_until(self, condition, what: str) -> None:
+    def _spin_until(self, condition: Callable[[], object], what: str) -> None:
         deadline = time.monotonic() + STALLED_S
         while not condition():
             if time.monotonic() > deadline:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The end of a process that waits for a signal: asked for from outside or by one of its threads, and never a hang."""
+"""How a process that waits for a signal ends: by request from outside or of one of its threads, and never
+by hanging.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +21,20 @@ TEARDOWN_S = 3.0
 """What the middleware gets to say goodbye in; 0.1 s is usual. Nothing of ours waits for it any more."""
 
 
-class Ending:
-    """Waited for by the main thread; asked for by SIGINT, SIGTERM or ``ask`` of any thread.
+class Shutdown:
+    """Waited for by the main thread; requested by SIGINT, SIGTERM or ``request`` of any thread.
 
-    The wait is one on a file descriptor that the interpreter's own signal handler writes to: it ends whichever thread the
-    system hands the signal to, and, unlike an Event set in a Python handler, takes no lock that the interrupted code could
-    be holding.
+    The wait is for a file descriptor that the interpreter's own signal handler writes to: it ends whichever thread the
+    system delivers the signal to, and, unlike an Event set in a Python handler, takes no lock that the interrupted code
+    could be holding.
     """
 
     def __init__(self) -> None:
-        self._waited, self._asked = socket.socketpair()
-        self._asked.setblocking(False)
+        self._waited, self._request = socket.socketpair()
+        self._request.setblocking(False)
 
-    def __enter__(self) -> Ending:
-        self._wakeup_before = signal.set_wakeup_fd(self._asked.fileno(), warn_on_full_buffer=False)
+    def __enter__(self) -> Shutdown:
+        self._wakeup_before = signal.set_wakeup_fd(self._request.fileno(), warn_on_full_buffer=False)
         self._handlers_before = {n: signal.signal(n, lambda *_: None) for n in (signal.SIGINT, signal.SIGTERM)}
         return self
 
@@ -41,22 +43,24 @@ class Ending:
             signal.signal(number, handler)
         signal.set_wakeup_fd(self._wakeup_before)
 
-    def ask(self) -> None:
+    def request(self) -> None:
         """End the wait, from any thread."""
-        self._asked.send(b"\0")
+        self._request.send(b"\0")
 
     @property
-    def asked(self) -> bool:
-        """Whether the end was asked for."""
+    def requested(self) -> bool:
+        """Whether the shutdown was requested."""
         return bool(select.select([self._waited], [], [], 0.0)[0])
 
     def wait(self) -> None:
-        """Return when the end was asked for."""
+        """Return when the shutdown was requested."""
         select.select([self._waited], [], [])
 
 
 def begin_closing() -> None:
-    """Leave with status 1 and every thread's stack on stderr, should closing what is ours take longer than CLOSING_S."""
+    """Leave with status 1 and every thread's stack on stderr, should closing what is ours take longer
+    than CLOSING_S.
+    """
     faulthandler.dump_traceback_later(CLOSING_S, exit=True)
 
 
@@ -69,8 +73,8 @@ def begin_teardown(status: int) -> None:
 
 
 def leave(status: int) -> NoReturn:
-    """End the process without the interpreter's own teardown: everything is closed, and unloading the middleware and the
-    compiled kernels takes ten times as long as all the closing did, with threads of other libraries still running.
+    """End the process without the interpreter's own teardown: everything is closed, and unloading the middleware and
+    the compiled kernels takes ten times as long as all the closing did, with threads of other libraries still running.
     """
     sys.stdout.flush()
     sys.stderr.flush()

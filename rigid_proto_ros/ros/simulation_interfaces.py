@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: MIT
 """The standard simulator services (simulation_interfaces), where that package is installed.
 
-Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps. There is one body and
-no world, so nothing is spawned, loaded or deleted.
+Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps. There is one body
+and no world, so nothing is spawned, loaded or deleted.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from rclpy.node import Node
+
 from ..base.errors import InputError
-from .flight import Flight
-from .physics_thread import step_over
+from .physics_thread import Call, step_over
+from .simulation_loop import SimulationLoop
 
 SERVICES = (
     ("GetSimulatorFeatures", "get_simulator_features"),
@@ -27,22 +29,21 @@ MAX_STEPS = 1_000_000
 class SimulationInterfaces:
     """Answers the standard services for one node; call ``offer`` once."""
 
-    def __init__(self, node, messages: Any) -> None:
-        self._node = node
+    def __init__(self, loop: SimulationLoop, call: Call, messages: Any) -> None:
+        self._loop = loop
+        self._call = call
         self._messages = messages
         self._stopped = False
 
-    @property
-    def _flight(self) -> Flight:
-        return self._node.flight
-
-    def offer(self, services: Any) -> None:
+    def offer(self, node: Node, services: Any) -> None:
         """Create the services, private to the node."""
         for service_type, name in SERVICES:
-            self._node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
+            node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
 
-    def get_simulator_features(self, request, response):
-        """What is really supported, and nothing else: the features of single scopes mean that a reset takes them alone."""
+    def get_simulator_features(self, _: Any, response: Any) -> Any:
+        """What is really supported, and nothing else: a feature of a single scope would mean that a reset
+        takes it alone.
+        """
         features = self._messages.SimulatorFeatures
         response.features.features = [
             features.SIMULATION_RESET,
@@ -59,30 +60,30 @@ class SimulationInterfaces:
         )
         return response
 
-    def reset_simulation(self, request, response):
+    def reset_simulation(self, request: Any, response: Any) -> Any:
         """Time and state together: SCOPE_ALL, or both scopes; nothing was spawned."""
         both = request.SCOPE_TIME | request.SCOPE_STATE
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_ALL) and request.scope & both != both:
             return self._unsupported(response, f"scope {request.scope}: time and state are reset together")
-        self._node.call(self._flight.reset)
+        self._call(self._loop.reset)
         return self._done(response)
 
     def _state(self) -> int:
         """Stopped is paused at time 0 after a request to stop: nothing else tells the two apart."""
-        states, flight = self._messages.SimulationState, self._flight
-        if not flight.timekeeping.paused:
+        states, loop = self._messages.SimulationState, self._loop
+        if not loop.timekeeping.paused:
             return states.STATE_PLAYING
-        stopped = self._stopped and flight.simulation.time_ns == 0
+        stopped = self._stopped and loop.simulation.time_ns == 0
         return states.STATE_STOPPED if stopped else states.STATE_PAUSED
 
-    def get_simulation_state(self, request, response):
+    def get_simulation_state(self, _: Any, response: Any) -> Any:
         """Playing, paused or stopped."""
         response.state.state = self._state()
         return self._done(response)
 
-    def set_simulation_state(self, request, response):
+    def set_simulation_state(self, request: Any, response: Any) -> Any:
         """Play, pause, or stop, which is to pause and reset."""
-        states, flight = self._messages.SimulationState, self._flight
+        states, loop = self._messages.SimulationState, self._loop
         wanted = request.state.state
         if wanted not in (states.STATE_STOPPED, states.STATE_PLAYING, states.STATE_PAUSED):
             accepted = "0 stopped, 1 playing or 2 paused; end the node by a signal"
@@ -92,15 +93,19 @@ class SimulationInterfaces:
             return response
         self._stopped = wanted == states.STATE_STOPPED
         if self._stopped:
-            self._node.call(lambda: (flight.pause(True), flight.reset()))
+            self._call(self._stop)
         else:
-            self._node.call(lambda: flight.pause(wanted == states.STATE_PAUSED))
+            self._call(lambda: loop.pause(wanted == states.STATE_PAUSED))
         return self._done(response)
 
-    def step_simulation(self, request, response):
+    def _stop(self) -> None:
+        self._loop.pause(True)
+        self._loop.reset()
+
+    def step_simulation(self, request: Any, response: Any) -> Any:
         """Step over publications, while paused."""
-        flight, results = self._flight, self._messages.Result
-        if not flight.timekeeping.paused:
+        loop, results = self._loop, self._messages.Result
+        if not loop.timekeeping.paused:
             response.result.result = results.RESULT_OPERATION_FAILED
             response.result.error_message = "the simulation is running; pause it first"
         elif not 1 <= request.steps <= MAX_STEPS:
@@ -108,8 +113,7 @@ class SimulationInterfaces:
             response.result.error_message = f"{request.steps} steps: 1 to {MAX_STEPS}"
         else:
             try:
-                for _ in range(request.steps):
-                    step_over(self._node.call, flight)
+                step_over(self._call, loop, request.steps)
             except InputError as error:
                 response.result.result = results.RESULT_OPERATION_FAILED
                 response.result.error_message = str(error)
@@ -117,21 +121,21 @@ class SimulationInterfaces:
             return self._done(response)
         return response
 
-    def _done(self, response):
+    def _done(self, response: Any) -> Any:
         response.result.result = self._messages.Result.RESULT_OK
         return response
 
-    def _unsupported(self, response, message: str):
+    def _unsupported(self, response: Any, message: str) -> Any:
         response.result.result = self._messages.Result.RESULT_FEATURE_UNSUPPORTED
         response.result.error_message = message
         return response
 
 
-def offer_simulation_interfaces(node) -> bool:
+def offer_simulation_interfaces(node: Node, loop: SimulationLoop, call: Call) -> bool:
     """Offer the standard services on the node; False where simulation_interfaces isn't installed."""
     try:
         from simulation_interfaces import msg, srv
     except ImportError:
         return False
-    SimulationInterfaces(node, msg).offer(srv)
+    SimulationInterfaces(loop, call, msg).offer(node, srv)
     return True

@@ -20,6 +20,9 @@ from ..motion.state import State
 from ..scene.parameters import Parameters
 from . import qos
 
+Topics = list[tuple[Publisher, Callable[[int, list[float]], Any]]]
+"""A publisher, and how its message is made from time and state."""
+
 
 class StatePublisher:
     """Publishes states of one body. Use ``configure`` for what parameters switch on and off.
@@ -32,7 +35,7 @@ class StatePublisher:
         self._specific_force = specific_force
         self._frames = world_frame, body_frame
 
-        def publisher(message_type, topic):
+        def publisher(message_type: type, topic: str) -> Publisher:
             return node.create_publisher(
                 message_type, f"~/{topic}", qos.own(qos.STATE), qos_overriding_options=qos.OVERRIDABLE
             )
@@ -49,11 +52,12 @@ class StatePublisher:
         self._made_clock: Publisher | None = None
         self._made_tf: Publisher | None = None
         self._tf_message: Any = None
-        self._wanted: list = []
+        self._wanted: Topics = []
 
     def configure(self, parameters: Parameters) -> None:
         """Switch /clock and /tf on and off; runs on the executor's thread."""
-        # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched off.
+        # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched
+        # off.
         if parameters.publish_clock and self._made_clock is None:
             self._made_clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
         if parameters.publish_tf and self._made_tf is None:
@@ -61,7 +65,7 @@ class StatePublisher:
         self._clock = self._made_clock if parameters.publish_clock else None
         self._tf = self._made_tf if parameters.publish_tf else None
 
-    def _tf_publisher(self):
+    def _tf_publisher(self) -> Publisher | None:
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
@@ -70,13 +74,13 @@ class StatePublisher:
         self._tf_message = TFMessage
         return self._node.create_publisher(TFMessage, "/tf", qos.TF)
 
-    def look_for_subscribers(self) -> bool:
-        """Note which topics have subscribers, for ``publish`` to go by; whether any has."""
+    def find_subscribers(self) -> bool:
+        """Note which topics have subscribers, for ``publish``; whether any has."""
         self._wanted = [(p, message) for p, message in self._topics() if p.get_subscription_count()]
         return bool(self._wanted)
 
     def publish(self, state: State) -> None:
-        """Publish one state on every topic that had a subscriber at the last look."""
+        """Publish one state on every topic that had a subscriber when that was last noted."""
         if not self._wanted:
             return
         row = state.row.tolist()
@@ -88,11 +92,11 @@ class StatePublisher:
         for _, message in self._topics():
             message(state.time_ns, state.row.tolist())
 
-    def _topics(self) -> list:
-        topics = [(self._pose, self._pose_message), (self._twist, self._twist_message)]
+    def _topics(self) -> Topics:
+        topics: Topics = [(self._pose, self._pose_message), (self._twist, self._twist_message)]
         topics += [(self._odom, self._odom_message), (self._imu, self._imu_message)]
         if self._clock is not None:
-            topics.insert(0, (self._clock, lambda time_ns, row: cdr.time(time_ns)))
+            topics.insert(0, (self._clock, lambda time_ns, _: cdr.time(time_ns)))
         if self._tf is not None:
             topics.append((self._tf, self._transform))
         return topics
@@ -120,7 +124,7 @@ class StatePublisher:
         felt.x, felt.y, felt.z = self._specific_force().tolist()
         return message
 
-    def _transform(self, time_ns: int, row: list[float]):
+    def _transform(self, time_ns: int, row: list[float]) -> Any:
         transform = TransformStamped()
         transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
         transform.header.frame_id, transform.child_frame_id = self._frames

@@ -8,7 +8,8 @@ from dataclasses import replace
 from ..base.errors import CommandRefused
 from ..motion.frames import parse_frame
 from ..motion.state import State
-from ..simulation.commands import MoveString, WrenchCommand
+from ..scene.scenario import Scenario
+from ..simulation.commands import Command, MoveString, WrenchCommand
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 
@@ -22,7 +23,9 @@ def warm_up(setup: Setup) -> State:
     def wrench(frame: str) -> WrenchCommand:
         return WrenchCommand(False, parse_frame(frame), force, none, 0, frame, b"")
 
-    commands = [wrench(f) for f in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")]
+    commands: list[Command] = [
+        wrench(f) for f in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")
+    ]
     commands.append(MoveString(tuple(setup.initial[:3].tolist())))
     for command in commands:
         trial = Simulation(replace(setup, initial=spinning))
@@ -33,3 +36,13 @@ def warm_up(setup: Setup) -> State:
         for until_ns in (1_000_000, 2_000_001):
             trial.advance(until_ns)
     return trial.state
+
+
+def warm_up_change(before: Scenario, after: Scenario) -> None:
+    """What flies this setup and its ghost after a change of integrator."""
+    for old, new in ((before.setup, after.setup), (before.ghost, after.ghost)):
+        if new is not None and (old is None or new.integrator is not old.integrator):
+            try:
+                warm_up(new)
+            except CommandRefused:
+                pass  # what acts when the change is made decides whether it is refused, and that is counted

@@ -185,6 +185,11 @@ def text(default: str, description: str, *, choices: tuple[str, ...] = (), chang
     return _field(default, Parameter("", "string", default, description, choices=choices, changes=changes))
 
 
+def whole(default: int, description: str, unit: str = "", *, lower: int, upper: int) -> Any:
+    """A whole number."""
+    return _field(default, Parameter("", "integer", default, description, unit, lower, upper))
+
+
 def port(default: int, description: str) -> Any:
     """A port of this machine, set at start."""
     return _field(default, Parameter("", "integer", default, description, "", 1, 65535, changes=READ_ONLY))

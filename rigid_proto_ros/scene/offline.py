@@ -49,6 +49,8 @@ def read_scene(
 def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, object]:
     """The parameters that a scene file gives this node; unknown names as ``read_scene`` has it."""
     scene = read_scene_file(path)
+    if warning := scene.warning(path, "rigid_body"):
+        warn(warning)
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
         if is_ros_parameter(parameter):

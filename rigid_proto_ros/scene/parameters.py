@@ -25,6 +25,7 @@ from .declaration import (
     port,
     switch,
     text,
+    whole,
 )
 
 Vector = tuple[float, float, float]
@@ -187,6 +188,7 @@ class Parameters:
     real_time_factor: float = number(
         1.0, "Simulated seconds per second of the wall clock; 0 runs as fast as possible.", lower=0.0, upper=1e6
     )
+    step_periods: int = whole(1, "Publication periods that ~/step advances by.", lower=1, upper=1_000_000)
     start_paused: bool = switch(False, "Start paused.", changes=READ_ONLY)
     wrench_timeout: float = number(
         1.5,

@@ -2,13 +2,15 @@
 """Scene files: ROS parameter files, read without ROS and typed as rcl types them.
 
 A scene is the same file that starts the node with ``--params-file``. Plain scalars are a bool, an integer (also 0x10
-and 010), a double (also 1e-3, .inf, nan) or else text; quoted ones are text; a list must hold one type, as rcl wants it.
+and 010), a double (also 1e-3, .inf, nan) or else text; quoted ones are text; a list must hold one type, as rcl wants
+it.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,10 +29,21 @@ _HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\
 
 @dataclass
 class SceneFile:
-    """values: parameters by name for the node; wildcard: names that only ``/**`` sections gave."""
+    """values: parameters by name for the node; wildcard: names that only ``/**`` sections gave. has_section: whether
+    any section is for the node; unused: the sections that aren't.
+    """
 
     values: dict[str, object] = field(default_factory=dict)
     wildcard: set[str] = field(default_factory=set)
+    has_section: bool = False
+    unused: list[str] = field(default_factory=list)
+
+    def warning(self, path: str | Path, node_name: str) -> str:
+        """What to say of a file that has sections, and none for this node; else empty."""
+        if self.has_section or not self.unused:
+            return ""
+        names = ", ".join(self.unused[:5])
+        return f"{path}: no section is for /{node_name.lstrip('/')} (it has {names}); /** is for every node"
 
 
 def scalar(text: str):
@@ -61,7 +74,9 @@ def scalar(text: str):
 
 
 def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
-    """Read the sections for this node, later ones winning; raises InputError naming file, line and remedy."""
+    """Read the sections for this node, given with its namespace, later ones winning; raises InputError naming file,
+    line and remedy.
+    """
     return _read_sections(compose_yaml(read_text(Path(path), "a YAML file"), str(path)), str(path), node_name)
 
 
@@ -76,26 +91,45 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
         return scene
     if not isinstance(root, yaml.MappingNode):
         raise _refused(path, root, "a mapping such as rigid_body: {ros__parameters: {...}}")
-    sections = {"/**", node_name, f"/{node_name}", f"/**/{node_name}"}
+    full_name = f"/{node_name.lstrip('/')}"
     named: set[str] = set()
-    for key, section in root.value:
-        name = _name(path, key)
-        if not isinstance(section, yaml.MappingNode):
-            raise _refused(path, section, "a section such as rigid_body: {ros__parameters: {...}}")
-        for inner, parameters in section.value:
-            if _name(path, inner) != "ros__parameters":
-                if isinstance(parameters, yaml.MappingNode):
-                    continue  # a node in a namespace: not this one
-                raise _refused(path, inner, "ros__parameters: under the node's name")
-            values: dict[str, object] = {}
-            _collect(path, parameters, "", values)
-            if name not in sections:
-                continue
-            scene.values.update(values)
-            if name != "/**":
-                named |= values.keys()
+    for name, parameters in _sections(path, root, ""):
+        values: dict[str, object] = {}
+        _collect(path, parameters, "", values)
+        # A section without a namespace is for a node of that name in any.
+        if name != f"/{full_name.rpartition('/')[2]}" and not _section_form(name).match(full_name):
+            scene.unused.append(name)
+            continue
+        scene.has_section = True
+        scene.values.update(values)
+        if name != "/**":
+            named |= values.keys()
     scene.wildcard = scene.values.keys() - named
     return scene
+
+
+def _sections(path: str, tree: yaml.MappingNode, namespace: str) -> Iterator[tuple[str, yaml.Node]]:
+    """The nodes' names, with the namespaces that they are nested in, and what stands under their ros__parameters."""
+    for key, section in tree.value:
+        name = f"{namespace}/{_name(path, key).strip('/')}"
+        if not isinstance(section, yaml.MappingNode):
+            raise _refused(path, section, "a section such as rigid_body: {ros__parameters: {...}}")
+        for inner, content in section.value:
+            if _name(path, inner) == "ros__parameters":
+                yield name, content
+            elif not isinstance(content, yaml.MappingNode):
+                raise _refused(path, inner, "ros__parameters: under the node's name")
+        nested = [pair for pair in section.value if _name(path, pair[0]) != "ros__parameters"]
+        if nested:
+            yield from _sections(path, yaml.MappingNode(section.tag, nested, section.start_mark), name)
+
+
+def _section_form(name: str) -> re.Pattern[str]:
+    """Which full names of nodes a section is for: ``*`` stands for one part of a name, ``**`` for any
+    number of them.
+    """
+    parts = {"*": "/[^/]+", "**": "(/[^/]+)*"}
+    return re.compile("".join(parts.get(part, f"/{re.escape(part)}") for part in name.split("/")[1:]) + r"\Z")
 
 
 def typed_value(text: str, name: str):

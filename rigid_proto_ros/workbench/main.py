@@ -12,7 +12,7 @@ import webbrowser
 from ..base.errors import InputError
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
-from ..ros.shutdown import Ending
+from ..ros.shutdown import Shutdown
 
 PATIENCE_S = 10.0
 """[s] For a node that is said to be running: discovery takes less than one of them."""
@@ -34,14 +34,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--link", default="")
     args = parser.parse_args(argv)
     try:
-        with Ending() as ending:
-            return serve(args, ending)
+        with Shutdown() as shutdown:
+            return serve(args, shutdown)
     except InputError as error:
         print(f"rigid_proto workbench: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 
 
-def serve(args: argparse.Namespace, ending: Ending) -> int:
+def serve(args: argparse.Namespace, shutdown: Shutdown) -> int:
     """Run the page until its end is asked for; open it in a browser where there is a display."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -65,13 +65,13 @@ def serve(args: argparse.Namespace, ending: Ending) -> int:
     running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
     try:
         if args.running:
-            page.link.wait_for_node(PATIENCE_S, lambda: ending.asked)
+            page.link.wait_for_node(PATIENCE_S, lambda: shutdown.requested)
         if args.link:
             page.deliver(page.follow_link, args.link)
         print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
         if args.open and has_display():
             webbrowser.open(address)
-        ending.wait()
+        shutdown.wait()
     finally:
         running.cancel()
         page.deliver(page.show_ended)

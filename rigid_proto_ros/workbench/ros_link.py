@@ -28,8 +28,8 @@ from std_srvs.srv import SetBool, Trigger
 from ..base.errors import InputError
 from ..messages import cdr
 from ..ros import qos
+from ..ros.command_queue import Unserved
 from ..ros.parameter_server import ros_parameter
-from ..ros.polled_subscription import TakenByHand
 from ..scene.parameters import parameter_named
 
 _TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
@@ -77,7 +77,7 @@ class RosLink:
         self._services = {name: self.node.create_client(Trigger, f"{self.target}/{name}") for name in _TRIGGERS}
         self._services["pause"] = self.node.create_client(SetBool, f"{self.target}/pause")
         self._set = self.node.create_client(SetParametersAtomically, f"{self.target}/set_parameters_atomically")
-        self._by_hand = TakenByHand()
+        self._by_hand = Unserved()
         self._taken: dict[str, object] = {}
         self._served: list = []
         self._poses: dict[int, PoseStamped] = {}

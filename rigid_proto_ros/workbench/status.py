@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from ..ros.troubles import grown, serious_troubles
+from ..ros.diagnostic_warnings import command_warnings, increase
 
 SILENT_S = 2.5
 """[s] Without a state or a report: a node that lives sends a report every second."""
@@ -33,8 +33,8 @@ class Status:
         last, self._last = self._last, values
         self.heard(now_s)
         if last:
-            said = serious_troubles(last, values)
-            lost_s = grown("real_time_lost_s", last, values)
+            said = command_warnings(last, values)
+            lost_s = increase("real_time_lost_s", last, values)
             if lost_s > SLOW:
                 said.append(f"too much to compute here: {lost_s:.2g} s behind real time")
             self._troubles |= dict.fromkeys(said, now_s + SHOWN_S)

@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
-from rigid_proto_ros.ros.message_bytes import read_wrench_stamped  # noqa: E402
+from rigid_proto_ros.ros.command_intake import read_wrench_stamped  # noqa: E402
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=40)
 stamps = st.integers(0, 2**31 * 10**9 - 1)

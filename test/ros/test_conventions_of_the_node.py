@@ -242,27 +242,24 @@ def test_what_the_command_line_gives_is_for_all_bodies_and_comes_after_their_fil
 TWO_IN_ONE = """
 import rclpy
 from rigid_proto_ros.ros.node import RigidBodyNode
-from rigid_proto_ros.ros.parameter_server import given_parameters
 from rigid_proto_ros.ros.physics_thread import PhysicsThread
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.motion.frames import parse_frame
 import time
 
 rclpy.init()
-nodes = [RigidBodyNode(node_name=n, parameter_overrides=given_parameters(v)) for n, v in (
+thread = PhysicsThread()
+nodes = [RigidBodyNode(thread, v, node_name=n) for n, v in (
     ("one", {"mesh": "t_handle", "contacts.tip": [0.0, 0.0, 0.07]}), ("two", {"mesh": "hammer"}))]
-thread = PhysicsThread([node.flight for node in nodes])
-for node in nodes:
-    node.thread = thread
-thread.start()
+thread.start([node.loop for node in nodes])
 frame = "world@tip;impulse"
 command = WrenchCommand(False, parse_frame(frame, {"tip"}), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, frame, b"")
-nodes[0].call(lambda: nodes[0].flight.simulation.submit(command))
-while nodes[0].flight.simulation.events.count == 0 or nodes[1].flight.simulation.time_ns == 0:
+nodes[0].call(lambda: nodes[0].loop.simulation.submit(command))
+while nodes[0].loop.simulation.events.count == 0 or nodes[1].loop.simulation.time_ns == 0:
     time.sleep(0.01)
 thread.stop()
-print(nodes[0].flight.simulation.events.count, nodes[1].flight.simulation.events.count)
-print(nodes[0].flight.simulation.state.linear_velocity[0] > 0, nodes[1].flight.simulation.state.linear_velocity.any())
+print(nodes[0].loop.simulation.events.count, nodes[1].loop.simulation.events.count)
+print(nodes[0].loop.simulation.state.linear_velocity[0] > 0, nodes[1].loop.simulation.state.linear_velocity.any())
 print([n.get_fully_qualified_name() for n in nodes])
 """
 

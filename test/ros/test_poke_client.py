@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: MIT
 """poke_client: every entry of a script, sent by the real client to a real node, and what it says of what went wrong."""
 
+import signal
 import subprocess
 import threading
+import time
 
 import numpy as np
 import pytest
 from command_rig import stamp_ns
-from ros_process import READY_S, command, from_source, run
+from conftest import held_domain
+from ros_process import READY_S, RosProcess, catches, command, from_source, run, running_node
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import rotate
@@ -285,3 +288,20 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(r
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]
     finally:
         slow.close()
+
+
+def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_environment, tmp_path):
+    script = tmp_path / "poke.yaml"
+    script.write_text("- {t: 0.1, at: com, impulse: [0.001, 0.0, 0.0]}\n")
+    with held_domain() as domain:
+        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
+        arguments = (script, "--reset", "--timeout", "0")
+        client = RosProcess("poke_client", *arguments, environment=environment, log=tmp_path / "client")
+        while not catches(client.pid, signal.SIGINT):
+            assert client.process.poll() is None, client.errors
+            time.sleep(0.02)
+        time.sleep(1.0)
+        assert client.process.poll() is None, client.errors
+        with running_node(environment=environment, log=tmp_path / "node"):
+            assert client.process.wait(READY_S) == 0, client.errors
+        assert "sent 1 poke; 0 late, 0 refused" in client.output

@@ -84,9 +84,7 @@ def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tm
 
 def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environment, tmp_path):
     recorder = BagRecorder(ros_environment)
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(scene_path("t_handle").read_text().replace("rigid_body:", "other:"))
-    arguments = ["--ros-args", "--params-file", scene, "-r", "__node:=other"]
+    arguments = ["--ros-args", "--params-file", scene_path("t_handle"), "-r", "__node:=other"]
     other = BagRecorder(ros_environment, name="other")
     with (
         RosClient(ros_environment, "/other") as client,

@@ -113,10 +113,10 @@ def test_the_transform_is_the_pose(monkeypatch):
     state = State(3 * SECOND + 7, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
     states.pack_all(state)
     assert not published
-    assert states.look_for_subscribers()
+    assert states.find_subscribers()
     states.publish(state)
     states.configure(Parameters())
-    states.look_for_subscribers()
+    states.find_subscribers()
     states.publish(state)
     (transform,) = published[0].transforms
     assert len(published) == 1

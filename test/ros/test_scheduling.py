@@ -12,8 +12,8 @@ import pytest
 pytest.importorskip("rclpy")
 
 from rigid_proto_ros.messages import cdr
-from rigid_proto_ros.ros import command_intake, scheduling
-from rigid_proto_ros.ros.flight import Flight
+from rigid_proto_ros.ros import command_intake, command_queue, warm_up
+from rigid_proto_ros.ros.simulation_loop import SimulationLoop
 from rigid_proto_ros.scene import scenario
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.observer import Observer
@@ -39,35 +39,22 @@ class Subscription:
         return (self.queue.popleft(), {}) if self.queue else None
 
 
-class NoGaps:
-    def __init__(self, subscription) -> None:
-        pass
-
-    def before(self, number) -> int:
-        return 0
-
-    def emptied(self) -> bool:
-        return False
-
-
 class Rig:
     """A flight with its intake, and no ROS graph."""
 
     def __init__(self, monkeypatch) -> None:
-        monkeypatch.setattr(command_intake, "SequenceGaps", NoGaps)
+        monkeypatch.setattr(command_queue, "_event", lambda subscription, kind: None)
         self.topics: dict[str, Subscription] = {}
         self.published: list[int] = []
-        self.flight = Flight(
+        self.loop = SimulationLoop(
             make_scenario({"mesh": "t_handle", "publish_rate": 1000.0, "real_time_factor": 0.0}),
             Observer(),
             lambda state: self.published.append(state.time_ns),
-            lambda wall_ns, whole: self.intake.take(
-                self.flight.simulation, self.flight.scenario, wall_ns, self.flight.catch_up, True
-            ),
+            lambda wall_ns, all_topics: self.intake.take(wall_ns, True),
             print,
         )
-        self.intake = command_intake.CommandIntake(self, ("world", "rigid_body"), self.change, None)
-        self.flight.start()
+        self.intake = command_intake.CommandIntake(self, self.loop, ("world", "rigid_body"), self.change, None)
+        self.loop.start()
 
     def get_logger(self):
         return None
@@ -76,8 +63,8 @@ class Rig:
         return self.topics.setdefault(topic.removeprefix("~/"), Subscription())
 
     def change(self, changes: dict, at_hand):
-        self.flight.change(self.flight.scenario.with_changes(changes, at_hand=at_hand))
-        return self.flight.scenario.setup
+        self.loop.change(self.loop.scenario.with_changes(changes, at_hand=at_hand))
+        return self.loop.scenario.setup
 
     def schedule(self, text: str) -> None:
         self.topics["schedule"].queue.append(cdr.string(text))
@@ -86,7 +73,7 @@ class Rig:
         for _ in range(1_000_000):
             if condition():
                 return
-            self.flight.tick()
+            self.loop.tick()
         raise AssertionError("it never came")
 
 
@@ -110,9 +97,9 @@ def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_th
     assert rig.intake.received["schedule"] == 0
     may_load.set()
     rig.tick_until(lambda: rig.intake.received["schedule"] == 1)
-    assert not rig.flight.simulation.refused
+    assert not rig.loop.simulation.refused
     rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
-    rig.tick_until(lambda: rig.flight.scenario.parameters.mesh == "book")
+    rig.tick_until(lambda: rig.loop.scenario.values["mesh"] == "book")
     assert loaded_by == ["schedule"] * 2
 
 
@@ -124,16 +111,16 @@ def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_b
         compiled_by.append((threading.current_thread().name, setup.integrator.name))
         may_compile.wait()
 
-    monkeypatch.setattr(scheduling, "warm_up", slow)
+    monkeypatch.setattr(warm_up, "warm_up", slow)
     rig.schedule('{"t": 0, "set": {"integrator": "rk4"}}')
     rig.schedule('{"t": 0, "set": {"gravity": [0, 0, -1]}}')
     rig.tick_until(lambda: compiled_by)
     before = len(rig.published)
     rig.tick_until(lambda: len(rig.published) >= before + 200)
-    assert rig.flight.scenario.parameters.integrator == "auto"
+    assert rig.loop.scenario.values["integrator"] == "auto"
     may_compile.set()
     # What was scheduled after it is taken after it.
     rig.tick_until(lambda: rig.intake.received["schedule"] == 2)
-    rig.tick_until(lambda: rig.flight.scenario.parameters.gravity == [0.0, 0.0, -1.0])
-    assert rig.flight.scenario.parameters.integrator == "rk4"
+    rig.tick_until(lambda: rig.loop.scenario.values["gravity"] == [0.0, 0.0, -1.0])
+    assert rig.loop.scenario.values["integrator"] == "rk4"
     assert compiled_by == [("schedule", "rk4")]

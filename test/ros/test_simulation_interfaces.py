@@ -31,20 +31,20 @@ class Node:
     """A flight on a real physics thread, without ROS."""
 
     def __init__(self) -> None:
-        from rigid_proto_ros.ros.flight import Flight
         from rigid_proto_ros.ros.physics_thread import PhysicsThread
+        from rigid_proto_ros.ros.simulation_loop import SimulationLoop
         from rigid_proto_ros.scene.scenario import make_scenario
         from rigid_proto_ros.simulation.observer import Observer
 
         scenario = make_scenario({"initial.angular_velocity": [0.1, 3.0, 0.1], "start_paused": True})
-        self.flight = Flight(
+        self.loop = SimulationLoop(
             scenario, Observer(), lambda state: None, lambda wall_ns, whole: False, lambda message: None
         )
-        self.thread = PhysicsThread([self.flight])
-        self.thread.start()
+        self.thread = PhysicsThread()
+        self.thread.start([self.loop])
 
     def call(self, function):
-        return self.thread.call(self.flight, function)
+        return self.thread.call(self.loop, function)
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def services():
     from rigid_proto_ros.ros.simulation_interfaces import SimulationInterfaces
 
     node = Node()
-    yield SimulationInterfaces(node, MESSAGES), node
+    yield SimulationInterfaces(node.loop, node.call, MESSAGES), node
     node.thread.stop()
 
 
@@ -101,7 +101,7 @@ def test_what_is_listed_is_served_and_nothing_else_is(services):
 def test_steps_are_publications_and_need_a_pause(services):
     answer, node = services
     assert answer.step_simulation(SimpleNamespace(steps=5), response()).result.result == OK
-    assert node.flight.simulation.time_ns == 50_000_000
+    assert node.loop.simulation.time_ns == 50_000_000
     assert answer.step_simulation(SimpleNamespace(steps=0), response()).result.result == FAILED
     answer.set_simulation_state(state(1), response())
     assert answer.step_simulation(SimpleNamespace(steps=1), response()).result.result == FAILED
@@ -115,7 +115,7 @@ def test_states_play_pause_and_stop(services):
     assert answer.get_simulation_state(None, response()).state.state == 1
     assert answer.set_simulation_state(state(0), response()).result.result == OK
     assert answer.get_simulation_state(None, response()).state.state == 0
-    assert node.flight.simulation.time_ns == 0
+    assert node.loop.simulation.time_ns == 0
     assert answer.set_simulation_state(state(0), response()).result.result == ALREADY
     # Stopped may be paused: that begins it without a step. Then it is no longer where a stop has put it.
     assert answer.set_simulation_state(state(2), response()).result.result == OK
@@ -132,14 +132,14 @@ def test_time_and_state_are_reset_together_or_not_at_all(services):
     answer, node = services
     for scope, result in ((0, OK), (255, OK), (3, OK), (1, UNSUPPORTED), (2, UNSUPPORTED), (4, UNSUPPORTED)):
         answer.step_simulation(SimpleNamespace(steps=3), response())
-        reached = node.flight.simulation.time_ns
+        reached = node.loop.simulation.time_ns
         request = SimpleNamespace(scope=scope, **SCOPES)
         assert answer.reset_simulation(request, response()).result.result == result
-        assert node.flight.simulation.time_ns == (0 if result == OK else reached)
+        assert node.loop.simulation.time_ns == (0 if result == OK else reached)
 
 
 def test_without_the_package_nothing_is_offered(monkeypatch):
     from rigid_proto_ros.ros.simulation_interfaces import offer_simulation_interfaces
 
     monkeypatch.setitem(sys.modules, "simulation_interfaces", None)
-    assert offer_simulation_interfaces(None) is False
+    assert offer_simulation_interfaces(None, None, None) is False

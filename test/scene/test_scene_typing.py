@@ -5,7 +5,10 @@ import os
 
 import pytest
 
+from rigid_proto_ros.base.bundled import scene_names, scene_path
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.ros.arguments import given_arguments
+from rigid_proto_ros.scene.offline import scene_values
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scalar
 
 SCALARS = (
@@ -82,6 +85,43 @@ other: {ros__parameters: {mass: 9.0}}
     scene = read_scene_text(text)
     assert scene.values == {"mass": 3.0, "initial.position": [1.0, 2.0, 3.0], "contacts.tip": [0.0, 0.0, 1.0]}
     assert scene.wildcard == {"initial.position"}
+
+
+NAMESPACED = """
+/**: {ros__parameters: {mass: 1.0}}
+lab: {tool: {ros__parameters: {density: 2.0}}, "*": {ros__parameters: {step: 0.5}}}
+/*/tool: {ros__parameters: {accuracy: 0.5}}
+/other/tool: {ros__parameters: {scale: 3.0}}
+"""
+
+
+def test_a_section_is_for_the_nodes_that_rcl_gives_it_to():
+    assert read_scene_text(NAMESPACED, node_name="lab/tool").values == {
+        "mass": 1.0,
+        "density": 2.0,
+        "step": 0.5,
+        "accuracy": 0.5,
+    }
+    assert read_scene_text(NAMESPACED, node_name="tool").values == {"mass": 1.0}
+    assert read_scene_text("tool: {ros__parameters: {mass: 1.0}}", node_name="lab/tool").values == {"mass": 1.0}
+
+
+def test_a_file_without_a_section_for_the_node_is_warned_of(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text("rigid_body: {ros__parameters: {mass: 1.0}}\n")
+    told: list[str] = []
+    given = given_arguments(["node", "--ros-args", "--params-file", str(path)], "lab/drone", told.append)
+    assert given == {}
+    assert told == [f"{path}: no section is for /lab/drone (it has /rigid_body); /** is for every node"]
+    assert given_arguments(["node", "--ros-args", "--params-file", str(path)], "rigid_body", told.append)
+    path.write_text("drone: {ros__parameters: {mass: 1.0}}\n")
+    assert scene_values(path, told.append) == {}
+    assert len(told) == 2 and "/rigid_body" in told[1]
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_a_bundled_scene_is_for_a_node_of_any_name(name):
+    assert read_scene_file(scene_path(name), "lab/drone").values == read_scene_file(scene_path(name)).values != {}
 
 
 def test_a_mixed_list_is_refused_with_file_line_and_remedy(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigid_proto_ros.ros.troubles import troubles
+from rigid_proto_ros.ros.diagnostic_warnings import warnings_since
 from rigid_proto_ros.workbench.status import SHOWN_S, SILENT_S, Status
 
 CALM = {
@@ -33,7 +33,7 @@ def after(**changes: object) -> str:
 
 def test_states_published_late_are_no_matter_of_the_pages_user() -> None:
     assert "⚠" not in after(overruns=30, real_time_lost_s=0.05)
-    assert troubles(CALM, {**CALM, "overruns": "30"}) == ["30 states published late"]
+    assert warnings_since(CALM, {**CALM, "overruns": "30"}) == ["30 states published late"]
 
 
 @pytest.mark.parametrize(

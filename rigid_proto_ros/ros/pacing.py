@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""How far a simulation is advanced, and when: by the clock that simulated time follows, and by the time that a tick may
+take.
+
+Simulated time follows its clock from an anchor, never by adding up periods, so that a late wake-up isn't carried on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..scene.scenario import publication_ns
+from ..simulation.simulation import Simulation
+
+WORK_NS = 8_000_000
+"""[ns of wall time] A tick advances no longer than this before it lets commands and requests in."""
+
+FIRST_STEPS, FIRST_NS = 1000, 1_000_000
+"""The first slice has room for so many fixed steps, at 0.1 to 10 µs each, and isn't longer than this [ns]: integrators
+that choose their own steps take up to some thousands in it.
+"""
+
+GROWTH = 4
+
+LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
+"""A message's stamp counts seconds in 32 bits."""
+
+MAX_LAG_NS = 250_000_000
+"""A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
+
+
+@dataclass
+class Timekeeping:
+    """overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up."""
+
+    overruns: int = 0
+    real_time_lost_s: float = 0.0
+    paused: bool = False
+
+
+class WorkBudget:
+    """The time that one tick may spend on the motion, which is advanced in slices: they grow while they are cheap and
+    shrink when they turn out expensive. The motion doesn't depend on them, so they may follow the wall clock.
+    """
+
+    def __init__(self) -> None:
+        self._slice_ns = 0
+        self._events = -1
+        self._end_ns = 0
+
+    def begin_tick(self) -> None:
+        """The time for this tick's work begins."""
+        self._end_ns = time.monotonic_ns() + WORK_NS
+
+    def advance(self, simulation: Simulation, until_ns: int) -> bool:
+        """Advance towards ``until_ns``, as far as the tick's time allows; whether it came there or failed."""
+        while simulation.time_ns < until_ns and not simulation.failure:
+            if self._events != simulation.events.count:
+                # Whatever happened may have changed what a second costs.
+                self._events = simulation.events.count
+                self._slice_ns = min(FIRST_STEPS * simulation.setup.step_ns, FIRST_NS)
+            rest_ns = until_ns - simulation.time_ns
+            began_ns = time.monotonic_ns()
+            if began_ns >= self._end_ns:
+                return False
+            simulation.advance(simulation.time_ns + min(rest_ns, self._slice_ns))
+            took_ns = time.monotonic_ns() - began_ns
+            if GROWTH * GROWTH * took_ns < WORK_NS:
+                if rest_ns > self._slice_ns:
+                    self._slice_ns *= GROWTH
+            elif took_ns > WORK_NS // 2:
+                self._slice_ns = max(1, min(rest_ns, self._slice_ns) * (WORK_NS // 4) // took_ns)
+        return True
+
+
+class Publications:
+    """The times of publications at ``rate`` a simulated second; ``next_ns`` is the next one's."""
+
+    def __init__(self, rate: float) -> None:
+        self.rate = rate
+        self._number = 0
+
+    @property
+    def next_ns(self) -> int:
+        """Simulated time of the next publication [ns]."""
+        return publication_ns(self._number, self.rate)
+
+    def made(self) -> None:
+        """The next one is made."""
+        self._number += 1
+
+    def restart(self) -> None:
+        """The next one is that of time 0."""
+        self._number = 0
+
+    def find_after(self, now_ns: int) -> None:
+        """The next one is the first after ``now_ns``."""
+        self._number = max(0, int(now_ns * 1e-9 * self.rate) - 1)
+        while self.next_ns <= now_ns:
+            self._number += 1
+
+    def pass_over(self, present_ns: int) -> None:
+        """Make none up to the present; one that is next already stays so."""
+        numerator, denominator = self.rate.as_integer_ratio()
+        # One early, and then on: the estimate is floored and publications are rounded.
+        self._number = max(self._number, present_ns * numerator // (1_000_000_000 * denominator) - 1)
+        while self.next_ns <= present_ns:
+            self._number += 1
+
+
+class Pace:
+    """The simulated time that a clock asks for: the wall clock times ``factor``, or ``followed()``, a clock in
+    nanoseconds that isn't the wall's. factor 0: as fast as it goes. anchored_ns: what the clock showed at the anchor.
+    """
+
+    def __init__(self, factor: float, followed: Callable[[], int] | None = None) -> None:
+        self.factor = factor
+        self.followed = followed
+        self.anchor(0)
+
+    def anchor(self, simulated_ns: int) -> None:
+        """From now on simulated time goes on from ``simulated_ns``."""
+        self.anchored_ns = self.followed() if self.followed else time.monotonic_ns()
+        self._last_reading_ns = self.anchored_ns
+        self._anchor_simulated_ns = simulated_ns
+
+    def present_ns(self, reached_ns: int, next_publication_ns: int, timekeeping: Timekeeping) -> int:
+        """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted."""
+        if self.followed:
+            return self._followed_present_ns(reached_ns)
+        if self.factor == 0.0:
+            return next_publication_ns
+        present_ns = self._anchor_simulated_ns + int((time.monotonic_ns() - self.anchored_ns) * self.factor)
+        expected_ns = max(reached_ns, next_publication_ns)
+        lag_ns = (present_ns - expected_ns) / self.factor
+        if lag_ns > MAX_LAG_NS:
+            timekeeping.real_time_lost_s += lag_ns * 1e-9
+            timekeeping.overruns += 1
+            self.anchor(expected_ns)
+            present_ns = expected_ns
+        return present_ns
+
+    def _followed_present_ns(self, reached_ns: int) -> int:
+        assert self.followed
+        reading_ns = self.followed()
+        if self.anchored_ns == 0 or reading_ns < self._last_reading_ns:
+            # It hasn't begun before, or was set back: its steps count from here, simulated time goes on.
+            self.anchor(reached_ns)
+        self._last_reading_ns = reading_ns
+        return max(reached_ns, self._anchor_simulated_ns + reading_ns - self.anchored_ns)
+
+    def wall_ns(self, simulated_ns: int) -> int:
+        """When the wall clock gets to a simulated time."""
+        return self.anchored_ns + int((simulated_ns - self._anchor_simulated_ns) / self.factor) + 1

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""What goes wrong in flight is said where a ROS user hears it: in the node's log, in its diagnostics, in its parameters."""
+
+from __future__ import annotations
+
+import resource
+
+from command_rig import NodeProcess, RosClient
+
+
+def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
+    rig.do("advertise", topic=rig.name("string/target"), type="PointStamped", wait=False, best_effort=True)
+    try:
+        said = "a publisher on /rigid_body/string/target offers incompatible QoS (last policy: RELIABILITY)"
+        rig.until(lambda: said in rig.node_process.log.read_text(), "a warning")
+    finally:
+        rig.advertise("string/target")
+
+
+def test_real_time_that_is_given_up_is_warned_of_with_its_share_and_not_every_second(rig):
+    said = "of real time given up"
+    before = rig.node_process.log.read_text().count(said)
+    # 10⁹ steps a second: some hundred times more than there is time for.
+    rig.set(integrator="rk4", step=1e-9)
+    lost_s = float(rig.diagnostics()["real_time_lost_s"])
+    rig.until(lambda: float(rig.diagnostics()["real_time_lost_s"]) > lost_s + 2.0, "two seconds lost")
+    assert 1 <= rig.node_process.log.read_text().count(said) - before <= 2
+
+
+def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_another_begins(
+    ros_environment, tmp_path
+):
+    path = tmp_path / "flight.mcap"
+    node = NodeProcess(ros_environment, tmp_path / "node", {"record": str(path), "publish_rate": 1000.0})
+    unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    try:
+        with RosClient(ros_environment) as client:
+            client.watch_diagnostics()
+            assert client.diagnostics()["recording"] == str(path)
+            # As on a full disk: no file of this process grows beyond some kilobytes more.
+            resource.prlimit(node.pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 50_000, unlimited[1]))
+            client.until(lambda: "recording stopped" in client.diagnostics()["message"], "a warning")
+            report = client.diagnostics()
+            assert (report["level"], report["recording"]) == (1, "")
+            assert client.get("record") == {"record": ""}
+            assert "[ERROR]" in node.log.read_text() and "recording stopped" in node.log.read_text()
+            resource.prlimit(node.pid, resource.RLIMIT_FSIZE, unlimited)
+            again = tmp_path / "again.mcap"
+            assert client.set(record=str(again)) == [[True, ""]]
+            report = client.diagnostics()
+            assert "recording stopped" not in report["message"]
+            assert report["recording"] == str(again)
+    finally:
+        assert node.stop() == 0, node.log.read_text()

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""However much a publication costs, the physics thread comes back soon: the motion is advanced in slices, to the same bits."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from flights import SECOND, wrench
+
+from rigid_proto_ros.ros.pacing import WorkBudget
+from rigid_proto_ros.ros.simulation_loop import SimulationLoop
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.simulation import Simulation
+
+ENDLESS = {
+    "integrator": "rk4",
+    "step": 1e-9,
+    "publish_rate": 1e-6,
+    "real_time_factor": 0.0,
+    "initial.angular_velocity": [0.1, 0.2, 12.0],
+}
+"""10¹⁵ steps to the next publication: years."""
+
+
+class Rig:
+    """A flight whose publications and commands are at hand."""
+
+    def __init__(self, values: dict) -> None:
+        self.published: list[int] = []
+        self.commands: list = []
+        scenario = make_scenario(values)
+        self.loop = SimulationLoop(scenario, Observer(), lambda s: self.published.append(s.time_ns), self.take, print)
+        self.loop.start()
+
+    def take(self, wall_ns: int, all_topics: bool) -> bool:
+        if self.commands:
+            self.loop.catch_up()
+        while self.commands:
+            self.loop.simulation.submit(self.commands.pop())
+        return False
+
+
+def test_a_tick_ends_long_before_a_publication_that_is_years_away():
+    rig = Rig(ENDLESS)
+    for _ in range(5):
+        rig.loop.tick()
+    assert rig.published == [0]
+    assert 0 < rig.loop.simulation.time_ns < SECOND
+    assert rig.loop.next_wake_ns() == 0
+
+
+def test_commands_and_requests_get_in_meanwhile():
+    rig = Rig(ENDLESS)
+    rig.commands.append(wrench("world", (1e-3, 0.0, 0.0)))
+    for _ in range(3):
+        rig.loop.tick()
+    assert rig.loop.simulation.events.count == 1
+    rig.loop.prepare_request()
+    rig.loop.pause(True)
+    reached_ns = rig.loop.simulation.time_ns
+    rig.loop.tick()
+    assert rig.loop.simulation.time_ns == reached_ns
+
+
+def test_the_way_to_a_command_that_was_not_finished_in_its_tick_goes_on_in_the_next():
+    rig = Rig({**ENDLESS, "real_time_factor": 1000.0})
+    rig.loop.tick()
+    rig.commands.append(wrench("world", (1e-3, 0.0, 0.0)))
+    rig.loop.tick()
+    assert rig.loop.next_wake_ns() == 0
+    reached_ns = rig.loop.simulation.time_ns
+    rig.loop.tick()
+    assert rig.loop.simulation.time_ns > reached_ns
+    assert rig.published == [0]
+
+
+def test_a_step_that_takes_years_is_begun_and_given_up_by_resuming():
+    rig = Rig({**ENDLESS, "start_paused": True})
+    rig.loop.tick()
+    assert not rig.loop.step()
+    begun_ns = rig.loop.simulation.time_ns
+    rig.loop.tick()
+    assert rig.loop.stepping
+    assert rig.loop.simulation.time_ns > begun_ns
+    # States of the middle of a step are nobody's business.
+    assert set(rig.published) <= {0}
+    rig.loop.pause(False)
+    assert not rig.loop.stepping
+
+
+@pytest.mark.parametrize("listeners", [True, False])
+def test_a_flight_pauses_at_the_last_time_that_a_stamp_can_say(monkeypatch, listeners):
+    monkeypatch.setattr("rigid_proto_ros.ros.simulation_loop.LAST_STAMP_NS", 3 * SECOND)
+    rig = Rig({"real_time_factor": 0.0 if listeners else 1e6, "publish_rate": 1.0})
+    rig.loop._anybody_listens = lambda: listeners
+    while not rig.loop.timekeeping.paused:
+        rig.loop.tick()
+    assert "the largest that a stamp can hold" in rig.loop.simulation.failure
+    assert rig.loop.simulation.time_ns <= 3 * SECOND
+    assert max(rig.published, default=0) <= 3 * SECOND
+    rig.loop.reset()
+    assert not rig.loop.simulation.failure
+
+
+def test_without_listeners_a_motion_that_is_too_dear_gives_time_up_and_says_so(monkeypatch):
+    rig = Rig({**ENDLESS, "publish_rate": 1000.0, "real_time_factor": 1.0})
+    monkeypatch.setattr("rigid_proto_ros.ros.pacing.MAX_LAG_NS", 10_000_000)
+    rig.loop._anybody_listens = lambda: False
+    while rig.loop.timekeeping.real_time_lost_s == 0.0:
+        rig.loop.tick()
+    assert rig.loop.simulation.time_ns > 0
+
+
+@pytest.mark.parametrize("integrator", ["auto", "rk4", "taylor"])
+def test_slices_give_the_same_bits(integrator):
+    values = {"integrator": integrator, "step": 1e-4, "initial.angular_velocity": [0.1, 0.2, 12.0]}
+    whole, sliced = (Simulation(make_scenario(values).setup) for _ in range(2))
+    budget = WorkBudget()
+    for simulation in (whole, sliced):
+        simulation.submit(wrench("body", (1e-3, 2e-3, 0.0), (1e-4, 0.0, 0.0)), SECOND // 3)
+    whole.advance(SECOND)
+    ticks = 0
+    while sliced.time_ns < SECOND:
+        budget.begin_tick()
+        budget.advance(sliced, SECOND)
+        ticks += 1
+    assert sliced.state.sha256() == whole.state.sha256()
+    assert (sliced.steps, sliced.force_evaluations) == (whole.steps, whole.force_evaluations)
+
+
+def test_while_commands_come_they_are_taken_once_more_shortly_before_each_publication(monkeypatch):
+    now = [10**12]
+    monkeypatch.setattr("rigid_proto_ros.ros.pacing.time.monotonic_ns", lambda: now[0])
+    rig = Rig({"publish_rate": 1000.0})
+    rig.lively = True
+    rig.loop._take_commands = lambda wall_ns, all_topics: rig.lively
+    wakes = []
+    for _ in range(6):
+        rig.loop.tick()
+        now[0] = max(now[0], rig.loop.next_wake_ns())
+        wakes.append(now[0] - 10**12)
+    assert [round(w / 1e5) for w in wakes] == [8, 10, 18, 20, 28, 30]
+    rig.lively = False
+    for _ in range(2):
+        rig.loop.tick()
+        now[0] = max(now[0], rig.loop.next_wake_ns())
+    assert round((now[0] - 10**12) / 1e6) == 5
