@@ -99,7 +99,7 @@ def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_th
     rig.tick_until(lambda: rig.intake.received["schedule"] == 1)
     assert not rig.loop.simulation.refused
     rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
-    rig.tick_until(lambda: rig.loop.scenario.values["mesh"] == "book")
+    rig.tick_until(lambda: rig.loop.scenario.parameters.mesh == "book")
     assert loaded_by == ["schedule"] * 2
 
 
@@ -117,10 +117,10 @@ def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_b
     rig.tick_until(lambda: compiled_by)
     before = len(rig.published)
     rig.tick_until(lambda: len(rig.published) >= before + 200)
-    assert rig.loop.scenario.values["integrator"] == "auto"
+    assert rig.loop.scenario.parameters.integrator == "auto"
     may_compile.set()
     # What was scheduled after it is taken after it.
     rig.tick_until(lambda: rig.intake.received["schedule"] == 2)
-    rig.tick_until(lambda: rig.loop.scenario.values["gravity"] == [0.0, 0.0, -1.0])
-    assert rig.loop.scenario.values["integrator"] == "rk4"
+    rig.tick_until(lambda: rig.loop.scenario.parameters.gravity == (0.0, 0.0, -1.0))
+    assert rig.loop.scenario.parameters.integrator == "rk4"
     assert compiled_by == [("schedule", "rk4")]
