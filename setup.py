@@ -19,13 +19,15 @@ SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
+# COLLADA and 3MF files through trimesh, the hull, and the union of overlapping parts.
+MESHES = ["pycollada>=0.8", "networkx>=3", "lxml>=5", "scipy>=1.11", "manifold3d>=3.1,<4"]
 TEST = [
     "pytest>=8",
     "hypothesis>=6.100",
     "mpmath>=1.3",
     "scipy>=1.11",
     "psutil>=5.9",
-    "manifold3d>=3.1,<4",
+    *MESHES,
     *MCAP,
     "mcap-ros2-support>=0.5",
     "playwright>=1.50",
@@ -52,6 +54,7 @@ setup(
     install_requires=["numpy>=1.26", "numba>=0.59", "trimesh>=4.4", "PyYAML>=6.0"],
     extras_require={
         "ros": ROS,
+        "meshes": MESHES,
         "rerun": RERUN,
         "mcap": MCAP,
         "workbench": WORKBENCH,

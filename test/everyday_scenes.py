@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 from feature_scenes import Scene, numbers_of
 
-from rigid_proto_ros.mesh.reading import bundled_names, load_mesh
+from rigid_proto_ros.mesh.locate import bundled_names
+from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.scene.scenario import make_scenario
 
 SPEEDS = (0.0, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0)

@@ -42,7 +42,7 @@ ALLOWED = {
     "scipy": ("mesh.hull", "sweep.sampling"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),
-    "ament_index_python": ("mesh.reading", "ros"),  # package:// URIs
+    "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser
     "mcap": ("session.mcap_file",),

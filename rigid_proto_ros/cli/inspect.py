@@ -18,7 +18,8 @@ from ..mass.export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.from_mesh import FALLBACKS, mesh_body
 from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify
 from ..mass.properties import scale_vector
-from ..mesh.reading import MAX_TRIANGLES, load_mesh, resolve_mesh
+from ..mesh.locate import resolve_mesh
+from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .inspect_report import print_diagnoses, print_report
 
 DENSITY = 1000.0

@@ -16,8 +16,8 @@ from ..mesh.hull import box_surface, convex_hull
 from ..mesh.reading import Mesh, load_mesh
 from .moments import Moments, referenced_vertices
 from .properties import MeshMoments
-from .repair import repair_surface
-from .verdict import WARNING, Finding, Verdict, judge_surface
+from .repair import CRACK, repair_surface, weld_cracks
+from .verdict import INFO, UNREFERENCED, WARNING, Finding, Verdict, judge_surface
 
 FALLBACKS = ("", "hull", "box")
 """What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""
@@ -55,9 +55,12 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> 
         raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
-    verdict, known = _judged(mesh)
-    vertices, triangles, polygon_starts = mesh.vertices, mesh.triangles, mesh.polygon_starts
-    remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, verdict)
+    judged = _judged(mesh)
+    verdict, known = judged.verdict, judged.moments
+    vertices, triangles, polygon_starts = mesh.vertices, judged.triangles, judged.polygon_starts
+    if verdict.usable and not np.isfinite(vertices).all():  # vertices that no face uses
+        vertices = np.where(np.isfinite(vertices).all(axis=1)[:, None], vertices, vertices[triangles[0, 0]])
+    remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, judged)
     if repair and verdict.usable and _wants_repair(verdict):
         triangles, polygon_starts, done = repair_surface(vertices, triangles, polygon_starts)
         known, remember = {}, None
@@ -100,23 +103,52 @@ def _key(mesh: Mesh) -> str:
     return f"{mesh.sha256}-{mesh.path.rpartition('.')[2].lower()}-body"
 
 
-def _judged(mesh: Mesh) -> tuple[Verdict, dict[str, Moments]]:
+@dataclass(frozen=True)
+class _Judged:
+    """The verdict on a mesh, the triangles that it holds for (cracks of rounding's size welded), and known moments."""
+
+    verdict: Verdict
+    triangles: np.ndarray
+    polygon_starts: np.ndarray | None
+    welded: bool
+    moments: dict[str, Moments]
+
+
+def _judged(mesh: Mesh) -> _Judged:
     """The verdict on the mesh and what is known of its moments, from the cache or anew."""
     kept = mesh_cache.load_json(_key(mesh))
     if kept is not None:
         try:
             findings = [Finding(**finding) for finding in kept["verdict"].pop("findings")]
             moments = {name: Moments.from_dict(value) for name, value in kept["moments"].items()}
-            return Verdict(findings=findings, **kept["verdict"]), moments
+            triangles, starts = mesh.triangles, mesh.polygon_starts
+            if kept["welded"]:
+                triangles, starts, _ = weld_cracks(mesh.vertices, triangles, starts)
+            return _Judged(Verdict(findings=findings, **kept["verdict"]), triangles, starts, kept["welded"], moments)
         except (KeyError, TypeError, ValueError, AttributeError):
             pass
-    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
-    _keep(mesh, verdict, {})
-    return verdict, {}
+    judged = _judged_anew(mesh)
+    _keep(mesh, judged, {})
+    return judged
 
 
-def _keep(mesh: Mesh, verdict: Verdict, moments: dict[str, Moments]) -> None:
+def _judged_anew(mesh: Mesh) -> _Judged:
+    verdict, topology = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    if topology is not None and verdict.usable and len(topology.boundary):
+        triangles, starts, done = weld_cracks(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+        if done:
+            # Vertices that others now stand for belong to faces all the same.
+            spare = [finding for finding in verdict.findings if finding.code == UNREFERENCED]
+            verdict, _ = judge_surface(mesh.vertices, triangles, starts)
+            verdict.findings[:] = spare + [finding for finding in verdict.findings if finding.code != UNREFERENCED]
+            verdict.findings.insert(0, Finding("welded", INFO, f"{done}, less than {CRACK:g} of the diagonal"))
+            return _Judged(verdict, triangles, starts, True, {})
+    return _Judged(verdict, mesh.triangles, mesh.polygon_starts, False, {})
+
+
+def _keep(mesh: Mesh, judged: _Judged, moments: dict[str, Moments]) -> None:
     if mesh_cache.is_passing(mesh.path):
         return
     known = {name: value.as_dict() for name, value in moments.items()}
-    mesh_cache.store_json(_key(mesh), {"verdict": dataclasses.asdict(verdict), "moments": known})
+    entry = {"verdict": dataclasses.asdict(judged.verdict), "moments": known, "welded": judged.welded}
+    mesh_cache.store_json(_key(mesh), entry)

@@ -16,7 +16,7 @@ from .model_difference import ModelDifference, model_difference
 from .moments import referenced_vertices
 from .properties import INERTIA_MODELS, MassProperties, scale_vector
 from .tensor import degenerate_pairs, equimomental_shapes, principal_axes
-from .verdict import WARNING, Finding, unit_suspicion
+from .verdict import WARNING, Finding, stated_unit, unit_suspicion
 
 MODELS = tuple(model for model in INERTIA_MODELS if model != "explicit")
 JSON_KEYS = (
@@ -65,7 +65,8 @@ def inspect_mesh(
 ) -> Inspection:
     """Mass properties of every model that ``body`` can have, and the remarks that belong to them."""
     s = scale_vector(scale)
-    findings = list(body.verdict.findings)
+    unit = stated_unit(body.mesh.unit)
+    findings = [*([unit] if unit else []), *body.verdict.findings]
     if not body.verdict.usable:
         refusal = InputError(body.mesh.name, body.verdict.reason)
         nowhere = np.full(3, np.nan)

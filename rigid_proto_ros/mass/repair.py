@@ -14,6 +14,9 @@ from ..mesh.nesting import component_nesting
 from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent
 from .verdict import MAX_NESTED_COMPONENTS
 
+CRACK = 1e-12
+"""Rim vertices closer than this part of the diagonal are one even where no repair is asked for: rounding put them
+apart."""
 WELD = 1e-5
 """Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""
 
@@ -90,41 +93,58 @@ def _drop_copies(surface: Surface) -> list[str]:
     return done
 
 
+_SWEEP = np.array([0.8163, 0.3719, 0.4421])  # along no rim's plane: few points share a place along it
+
+
 @njit(cache=True, nogil=True)
 def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target: np.ndarray) -> None:
-    """For points (k, 3), visited by ascending x, the first point within ``tolerance`` as target (k,)."""
+    """For points (k, 3), visited in order along _SWEEP, the first point within ``tolerance`` as target (k,)."""
+    rounding = 0.0
+    for k in range(3):
+        rounding = max(rounding, 1e-14 * np.max(np.abs(points[:, k])))
     for i in range(order.shape[0]):
         a = order[i]
         if target[a] != a:
             continue
         for j in range(i + 1, order.shape[0]):
             b = order[j]
-            if points[b, 0] - points[a, 0] > tolerance:
+            dx, dy, dz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+            if dx * _SWEEP[0] + dy * _SWEEP[1] + dz * _SWEEP[2] > 1.01 * tolerance + rounding:
                 break
-            if target[b] == b:
-                dx, dy, dz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
-                if dx * dx + dy * dy + dz * dz <= tolerance * tolerance:
-                    target[b] = a
+            if target[b] == b and dx * dx + dy * dy + dz * dz <= tolerance * tolerance:
+                target[b] = a
 
 
-def _weld_rims(surface: Surface) -> list[str]:
+def weld_cracks(
+    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Triangles with rim vertices that only rounding put apart as one, polygon starts, and what was done or ""."""
+    surface = Surface(vertices, triangles, polygon_starts)
+    done = _weld_rims(surface, CRACK)
+    return surface.triangles, surface.polygon_starts, "".join(done)
+
+
+def _weld_rims(surface: Surface, part: float = WELD) -> list[str]:
+    """Let triangles use one number for rim vertices closer than ``part`` of the diagonal."""
     topology = surface.topology()
     rim = np.unique(topology.boundary[:, :2])
     if not len(rim):
         return []
     points = surface.vertices[rim]
     used = surface.vertices[surface.triangles.ravel()]
-    tolerance = WELD * float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+    tolerance = part * float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
     target = np.arange(len(rim))
-    _near_pairs(points, np.argsort(points[:, 0], kind="stable"), tolerance, target)
+    _near_pairs(points, np.argsort(points @ _SWEEP, kind="stable"), tolerance, target)
     moved = int(np.count_nonzero(target != np.arange(len(rim))))
     if not moved:
         return []
     far = float(np.max(np.linalg.norm(points - points[target], axis=1)))
     number = np.arange(len(surface.vertices))
     number[rim] = rim[target]
-    surface.triangles = number[topology.corners]
-    flat = surface.triangles
+    # Corners that aren't moved keep their own numbers, also where several stand at one place.
+    moves = number[topology.corners] != topology.corners
+    surface.triangles = np.where(moves, number[topology.corners], surface.triangles)
+    flat = np.where(moves, surface.triangles, topology.corners)
     surface.drop((flat[:, 0] == flat[:, 1]) | (flat[:, 1] == flat[:, 2]) | (flat[:, 2] == flat[:, 0]))
     return [f"welded {moved} rim vertices, the farthest by {far:.2g}"]
 

@@ -14,6 +14,7 @@ from ..mesh.topology import Components, Topology, component_sums, joined_sets, m
 from .moments import solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
+UNREFERENCED = "unreferenced_vertices"
 MAX_NESTED_COMPONENTS = 2000
 """Above this many components their mutual position isn't examined: the tables grow with the square."""
 THIN = 1e-6
@@ -22,8 +23,9 @@ NO_VOLUME = 1e-14
 """V/(area·diagonal) below which the surface encloses nothing: both sides coincide to rounding."""
 NONPLANAR = 1e-9
 """Largest distance of a corner from its polygon's plane, over the mesh's diagonal, that counts as planar."""
-LARGE_M, SMALL_M = 50.0, 1e-3
-"""Longest sides [m] outside which millimetres taken for metres, or the reverse, are suspected."""
+LARGE_M, SMALL_M = 5.0, 1e-3
+"""Longest sides [m] outside which another unit is suspected: few bodies that one pokes are longer, and every part of
+5 mm to 5 m drawn in millimetres is."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +66,27 @@ class Verdict:
 def unit_suspicion(longest_side: float) -> Finding | None:
     """A remark when a body of ``longest_side`` [m] looks as if its file weren't in metres."""
     if longest_side > LARGE_M:
-        message = f"the body is {longest_side:.4g} m across; if the file is in millimetres, use --scale 0.001 (scale)"
+        units = f"{longest_side:.4g} mm if the file is in millimetres (--scale 0.001)"
+        if longest_side < 100.0 * LARGE_M:
+            units += f", {longest_side:.4g} cm if in centimetres (--scale 0.01)"
+        message = f"the body is {longest_side:.4g} m across; it would be {units} (scale)"
         return Finding("unit_suspicion", WARNING, message)
     if longest_side < SMALL_M:
-        message = (
-            f"the body is {longest_side:.4g} m across; if the file isn't in metres, set the unit with --scale (scale)"
-        )
+        larger = f"it would be {1000.0 * longest_side:.4g} m if its lengths were divided by 1000 once too often"
+        message = f"the body is {longest_side:.4g} m across; {larger} (--scale 1000) (scale)"
         return Finding("unit_suspicion", WARNING, message)
     return None
+
+
+def stated_unit(unit: float) -> Finding | None:
+    """A remark when a mesh's file says that its unit is ``unit`` metres."""
+    if unit == 1.0:
+        return None
+    name = {1e-6: "micrometre", 1e-3: "millimetre", 1e-2: "centimetre", 0.0254: "inch", 0.3048: "foot"}.get(unit)
+    said = f"{unit:g} m" + (f" (a {name})" if name else "")
+    return Finding(
+        "stated_unit", INFO, f"the file says that its unit is {said}: coordinates have been converted to metres"
+    )
 
 
 def _count(number: int, noun: str) -> str:
@@ -224,7 +239,11 @@ def judge_surface(
     diagonal = 2.0 * float(np.linalg.norm(half))
     if extent.unused:
         spare = "1 vertex belongs" if extent.unused == 1 else f"{extent.unused} vertices belong"
-        verdict.add("unreferenced_vertices", INFO, f"{spare} to no face; that carries no mass")
+        message = f"{spare} to no face; that carries no mass"
+        lost = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
+        if lost:
+            message += f"; {lost} of them are not finite and taken to lie at the first face's first corner"
+        verdict.add(UNREFERENCED, INFO, message)
     if diagonal == 0.0:
         verdict.usable = False
         verdict.add("zero_volume", ERROR, "all vertices lie in one point")

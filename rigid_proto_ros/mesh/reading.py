@@ -1,33 +1,40 @@
 # SPDX-License-Identifier: MIT
-"""Meshes from files: by path, ``package://`` URI or bundled name. The only module that may import trimesh."""
+"""Meshes from files, by our own readers, and by trimesh for other formats: the only module that may import it."""
 
 from __future__ import annotations
 
+import bz2
+import gzip
 import hashlib
+import io
+import lzma
 import re
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ..base.bounded_file import read_bounded
-from ..base.bundled import PACKAGE_FOLDER
 from ..base.compilation import njit
 from ..base.errors import MeshError
-from ..base.nearest_name import did_you_mean
 from . import cache as mesh_cache
+from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
 from .stl import is_ascii_stl, read_stl
 
-BODIES = PACKAGE_FOLDER / "bodies"
-"""Folder of the bundled meshes."""
 OWN_FORMATS = ("obj", "off", "ply", "stl")
 """Formats read here: trimesh 5.2 misreads some of them (interleaved negative .obj indices, tab-separated .obj, quad
 .off, strips in .ply), joins polygons' triangles, and takes several times as long."""
-FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
-"""All readable formats; those beyond OWN_FORMATS go through trimesh, which may ask for further packages."""
+FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae", "zae")
+"""All readable formats; those beyond OWN_FORMATS go through trimesh, which takes the extra [meshes] for
+the last three.
+"""
+PACKED = ("gz", "bz2")
+"""Endings of compressed files; before them stands the format's own, as in part.stl.gz."""
 MAX_TRIANGLES = 20_000_000
 """Default limit: about 1.5 GB of arrays."""
 BYTES_PER_TRIANGLE = 400
@@ -42,7 +49,9 @@ class Mesh:
 
     vertices (n, 3) float64 in the file's order, unreferenced ones counted. triangles (m, 3) int64; a polygon's fan
     triangles follow each other: polygon k is triangles[polygon_starts[k]:polygon_starts[k + 1]]; polygon_starts is
-    None when every face is a triangle. sha256 is the hex digest of the file's bytes, path its absolute path.
+    None when every face is a triangle. sha256 is the hex digest of the file's bytes, and of those of every other file
+    that was read with it; path its absolute path. unit: metres that the file says its unit has, by which the vertices
+    have been multiplied; 1 when it says nothing.
     """
 
     name: str
@@ -51,6 +60,7 @@ class Mesh:
     triangles: np.ndarray
     polygon_starts: np.ndarray | None
     sha256: str
+    unit: float = 1.0
 
     @property
     def polygons(self) -> int:
@@ -58,66 +68,15 @@ class Mesh:
         return len(self.triangles) if self.polygon_starts is None else len(self.polygon_starts) - 1
 
 
-def bundled_names() -> tuple[str, ...]:
-    """Names of the meshes that come with the package."""
-    return tuple(sorted(path.stem for path in BODIES.glob("*.obj")))
+@dataclass
+class _Content:
+    """What was read: arrays as in ``Mesh``, and ``files``: name and hash of every other file that it took."""
 
-
-def _package_folder(package: str) -> Path | None:
-    """Share folder of a ROS package, or this package's own folder for its own name."""
-    try:
-        from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-
-        try:
-            return Path(get_package_share_directory(package))
-        except (PackageNotFoundError, ValueError, OSError):  # OSError: no ROS environment is set up
-            pass
-    except ImportError:
-        pass
-    return PACKAGE_FOLDER if package == "rigid_proto_ros" else None
-
-
-def resolve_mesh(name: str) -> Path:
-    """The file that ``name`` (a path, ``package://package/path`` or a bundled name) stands for.
-
-    Raises MeshError when there is none, with the bundled names and the one most like it.
-    """
-    try:
-        return _found_mesh(name)
-    except (OSError, RuntimeError) as error:  # a name too long, a folder that may not be read, a user's home unknown
-        reason = getattr(error, "strerror", None) or str(error).rstrip(".")
-        raise MeshError(
-            "mesh", name, f"a file that can be read, package://<package>/<path>, or a bundled name ({reason})"
-        ) from None
-
-
-def _found_mesh(name: str) -> Path:
-    if name.startswith("package://"):
-        package, _, inside = name[len("package://") :].partition("/")
-        folder = _package_folder(package)
-        if folder is None:
-            raise MeshError("mesh", f"the package {package!r} of {name!r} was not found")
-        candidates = [folder / inside]
-        if package == "rigid_proto_ros":
-            candidates.append(PACKAGE_FOLDER / inside)
-        for path in candidates:
-            if path.is_file():
-                return path.resolve()
-        raise MeshError("mesh", f"there is no file {str(candidates[0])!r} in the package")
-    name = name.removeprefix("file://")
-    path = Path(name).expanduser()
-    if path.is_file():
-        return path.resolve()
-    bundled = BODIES / f"{name}.obj"
-    if name and "/" not in name and bundled.is_file():
-        return bundled.resolve()
-    if path.is_dir():
-        raise MeshError("mesh", f"{name!r} is a folder, not a mesh file")
-    names = bundled_names()
-    siblings = [p.name for p in path.parent.iterdir() if p.is_file()] if path.parent.is_dir() and "/" in name else []
-    hint = did_you_mean(path.name, [*names, *siblings])
-    known = f"the bundled meshes are {', '.join(names)}"
-    raise MeshError("mesh", f"there is no file and no bundled mesh {name!r}; {' '.join(filter(None, [hint, known]))}")
+    vertices: np.ndarray
+    triangles: np.ndarray
+    polygon_starts: np.ndarray | None = None
+    unit: float = 1.0
+    files: tuple[tuple[str, str], ...] = ()
 
 
 @njit(cache=True, nogil=True)
@@ -167,69 +126,195 @@ def _sniff(data: bytes) -> str:
     return ""
 
 
-def _read(data: bytes, path: Path, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Vertices, triangles and polygon starts of a file's bytes, by its extension."""
-    suffix = path.suffix.lower().lstrip(".")
-    if suffix not in FORMATS:
-        raise MeshError("mesh", f"{path.name!r} has none of the endings .{', .'.join(FORMATS)}")
+def _formats(path: Path) -> tuple[str, str]:
+    """(format, packing or "") by the file's endings; raises MeshError for one that can't be read."""
+    endings = [ending.lower().lstrip(".") for ending in path.suffixes[-2:]]
+    packing = endings.pop() if endings and endings[-1] in PACKED else ""
+    if not endings or endings[-1] not in FORMATS:
+        accepted = f"{', .'.join(FORMATS)}, each also with .{' or .'.join(PACKED)} behind it"
+        raise MeshError("mesh", f"{path.name!r} has none of the endings .{accepted}")
+    return endings[-1], packing
+
+
+def _unpacked(data: bytes, packing: str, name: str, max_bytes: int) -> bytes:
+    """The content of a compressed file, of at most ``max_bytes``."""
+    opened = gzip.open if packing == "gz" else bz2.open
+    try:
+        with opened(io.BytesIO(data), "rb") as stream:
+            content = stream.read(max_bytes + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise MeshError(name, f"the compressed content can't be read ({error})") from None
+    if len(content) > max_bytes:
+        raise MeshError(name, f"the content has more than {max_bytes} bytes; --max-triangles raises the limit")
+    return content
+
+
+def _read(data: bytes, path: Path, max_triangles: int) -> _Content:
+    """The content of a file's bytes, by its endings."""
+    suffix, packing = _formats(path)
+    if packing:
+        data = _unpacked(data, packing, path.name, BYTES_PER_TRIANGLE * max_triangles)
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
     found = _sniff(data)
     if found and found != suffix and suffix in OWN_FORMATS:
         raise MeshError(path.name, f"the content looks like .{found}, not .{suffix}; rename the file")
-    if suffix == "stl":
-        vertices, triangles = read_stl(data, path.name, max_triangles)
-        return vertices, triangles, None
     if suffix not in OWN_FORMATS:
-        return *_read_with_trimesh(path, max_triangles), None
-    reader = {"obj": read_obj, "off": read_off, "ply": read_ply}[suffix]
-    vertices, corners, starts = reader(data, path.name, max_triangles)
-    if len(corners) - 2 * (len(starts) - 1) > max_triangles:
-        count = len(corners) - 2 * (len(starts) - 1)
-        raise MeshError(path.name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
-    return vertices, *fan_polygons(corners, starts)
+        content = _read_with_trimesh(data, suffix, path, BYTES_PER_TRIANGLE * max_triangles)
+    elif suffix == "stl":
+        content = _Content(*read_stl(data, path.name, max_triangles))
+    else:
+        reader = {"obj": read_obj, "off": read_off, "ply": read_ply}[suffix]
+        vertices, corners, starts = reader(data, path.name, max_triangles)
+        _check_triangles(len(corners) - 2 * (len(starts) - 1), max_triangles, path.name)
+        content = _Content(vertices, *fan_polygons(corners, starts))
+    _check_triangles(len(content.triangles), max_triangles, path.name)
+    return content
 
 
-def _read_with_trimesh(path: Path, max_triangles: int) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and triangles of the scene in a file that trimesh reads, its nodes' transforms applied."""
+def _check_triangles(count: int, max_triangles: int, name: str) -> None:
+    if count > max_triangles:
+        raise MeshError(name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
+
+
+_UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
+
+
+def _unit(text: str | None, name: str) -> float:
+    """Metres in the unit that trimesh names: one of 3MF's words, "millimeters", or "0.01 * meters" of a
+    COLLADA file.
+    """
+    if text is None:
+        return 1.0
+    number, star, word = text.rpartition("*")
+    try:
+        unit = _UNITS[word.strip().removesuffix("s").replace("inche", "inch").replace("feet", "foot")]
+        unit *= float(number) if star else 1.0
+    except (KeyError, ValueError):
+        raise MeshError(name, f"unit {text}", f"a file in one of {', '.join(_UNITS)}") from None
+    if not 1e-9 <= unit <= 1e9:
+        raise MeshError(name, f"a unit of {unit:g} m", "a unit of 1e-9 m to 1e9 m")
+    return unit
+
+
+def _check_archive(data: bytes, name: str, max_bytes: int) -> None:
+    """Refuse an archive whose files, unpacked, are larger than a mesh of the limit can be."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except (zipfile.BadZipFile, OSError, ValueError, lzma.LZMAError) as error:
+        raise MeshError(name, f"the archive can't be read ({error})") from None
+    if size > max_bytes:
+        raise MeshError(name, f"{size} bytes unpacked are more than {max_bytes}; --max-triangles raises the limit")
+
+
+def _read_with_trimesh(data: bytes, suffix: str, path: Path, max_bytes: int) -> _Content:
+    """The scene in a file that trimesh reads, its nodes' transforms applied, in metres where it says its unit."""
     try:
         import trimesh
     except ImportError:
         raise MeshError("mesh", path.name, "trimesh installed for this format: pip install trimesh") from None
+    if suffix in ("3mf", "zae"):
+        _check_archive(data, path.name, max_bytes)
+    files: dict[str, str] = {}
+
+    class Beside(trimesh.resolvers.FilePathResolver):
+        """Files beside the mesh's own, their content noted."""
+
+        def get(self, name: str) -> bytes:
+            content: bytes = super().get(name)
+            files[str(name)] = hashlib.sha256(content).hexdigest()
+            return content
+
     try:
-        mesh = trimesh.load(path, process=False, maintain_order=True, skip_materials=True, force="mesh")
+        scene = trimesh.load_scene(
+            io.BytesIO(data),
+            file_type=suffix,
+            resolver=Beside(str(path)),
+            process=False,
+            maintain_order=True,
+            skip_materials=True,
+        )
+        mesh = scene.to_mesh()
         vertices = np.array(mesh.vertices, dtype=np.float64)
         triangles = np.array(mesh.faces, dtype=np.int64)
+        units = {geometry.units for geometry in scene.geometry.values()}
+    except ImportError as error:
+        missing = f"this format needs {error.name}: pip install 'rigid_proto_ros[meshes]', or pip install {error.name}"
+        raise MeshError(path.name, missing) from None
     except Exception as error:  # noqa: BLE001 - a foreign reader fails in as many ways as files are broken
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise MeshError(path.name, f"trimesh {trimesh.__version__} can't read the file ({reason})") from None
-    if len(triangles) > max_triangles:
-        raise MeshError(
-            path.name, f"{len(triangles)} triangles are more than {max_triangles}; --max-triangles raises the limit"
-        )
-    return vertices, triangles
+    unit = 1.0
+    if suffix not in ("glb", "gltf"):  # these are in metres by definition
+        if len(units) > 1:
+            raise MeshError(path.name, f"its parts have different units: {', '.join(map(str, units))}")
+        unit = _unit(next(iter(units), None), path.name)
+        vertices *= unit
+    return _Content(vertices, triangles, None, unit, tuple(sorted(files.items())))
 
 
-def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES) -> Mesh:
-    """The mesh that ``name`` stands for, exactly as the file has it.
+def _with_files(sha256: str, files: tuple[tuple[str, str], ...]) -> str:
+    """The hash of a file that took others, named with their hashes; its own when it took none."""
+    if not files:
+        return sha256
+    return hashlib.sha256(repr((sha256, files)).encode()).hexdigest()
+
+
+def _files_now(path: Path, names: list[str]) -> tuple[tuple[str, str], ...]:
+    """Names and hashes of the files beside ``path`` as they are now; one that can't be read has the hash ""."""
+    found = []
+    for name in names:
+        try:
+            found.append((name, hashlib.sha256((path.parent / name).read_bytes()).hexdigest()))
+        except OSError:
+            found.append((name, ""))
+    return tuple(found)
+
+
+def _from_cache(key: str, path: Path) -> _Content | None:
+    """What is kept under a file's hash, if the other files that it took are as they were."""
+    index = mesh_cache.load_json(key) or {}
+    files = _files_now(path, [str(name) for name in index.get("files", [])])
+    kept = mesh_cache.load_arrays(_with_files(key, files))
+    if kept is None or not {"vertices", "triangles", "unit"} <= kept.keys():
+        return None
+    return _Content(kept["vertices"], kept["triangles"], kept.get("polygon_starts"), float(kept["unit"]), files)
+
+
+def _to_cache(key: str, content: _Content) -> None:
+    polygons = {} if content.polygon_starts is None else {"polygon_starts": content.polygon_starts}
+    if content.files:
+        mesh_cache.store_json(key, {"files": [name for name, _ in content.files]})
+    arrays = {"vertices": content.vertices, "triangles": content.triangles, "unit": np.array(content.unit), **polygons}
+    mesh_cache.store_arrays(_with_files(key, content.files), **arrays)
+
+
+def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES, search: Search = NOWHERE_ELSE) -> Mesh:
+    """The mesh that ``name`` stands for, exactly as the file has it but for the unit that it states.
 
     ``max_triangles`` guards against files that would fill the memory. A large file is parsed once and then read from
     the cache by its content's hash. Raises MeshError naming the file and what is wrong with it.
     """
-    path = resolve_mesh(name)
+    path = resolve_mesh(name, search)
     kind = f"a mesh of {max_triangles} triangles (--max-triangles raises the limit)"
     data = read_bounded(path, BYTES_PER_TRIANGLE * max_triangles, "mesh", kind)
     sha256 = hashlib.sha256(data).hexdigest()
-    key = f"{sha256}-{path.suffix.lower().lstrip('.')}"
+    key = f"{sha256}-{''.join(path.suffixes[-2:]).lower().lstrip('.')}"
     cached = len(data) >= CACHED_SIZE and not mesh_cache.is_passing(path)
-    kept = mesh_cache.load_arrays(key) if cached else None
-    if kept is not None and len(kept["triangles"]) <= max_triangles:
-        vertices, triangles, polygon_starts = kept["vertices"], kept["triangles"], kept.get("polygon_starts")
-    else:
-        vertices, triangles, polygon_starts = _read(data, path, max_triangles)
+    content = _from_cache(key, path) if cached else None
+    if content is None or len(content.triangles) > max_triangles:
+        content = _read(data, path, max_triangles)
         if cached:
-            polygons = {} if polygon_starts is None else {"polygon_starts": polygon_starts}
-            mesh_cache.store_arrays(key, vertices=vertices, triangles=triangles, **polygons)
-    if len(triangles) == 0:
+            _to_cache(key, content)
+    if len(content.triangles) == 0:
         raise MeshError(path.name, "the file has no faces")
-    return Mesh(path.stem, str(path), vertices, triangles, polygon_starts, sha256)
+    return Mesh(
+        path.stem,
+        str(path),
+        content.vertices,
+        content.triangles,
+        content.polygon_starts,
+        _with_files(sha256, content.files),
+        content.unit,
+    )

@@ -18,7 +18,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.output_file import output_file
 from ..base.provenance import cpu, versions
-from ..mesh.reading import resolve_mesh
+from ..mesh.locate import resolve_mesh
 from ..messages import cdr, session_messages
 from ..motion.body import Body
 from ..motion.loads import Load

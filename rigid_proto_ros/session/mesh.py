@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..base.errors import InputError, MeshError
-from ..mesh.reading import Mesh, bundled_names, load_mesh
+from ..mesh.locate import bundled_names
+from ..mesh.reading import Mesh, load_mesh
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 

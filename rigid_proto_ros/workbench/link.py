@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..base.errors import InputError
-from ..mesh.reading import bundled_names
+from ..mesh.locate import bundled_names
 from ..scene.command_codec import flow
 from ..scene.parameters import PARAMETERS, convert_all
 from ..scene.scenario import scene_text

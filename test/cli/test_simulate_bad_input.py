@@ -13,7 +13,7 @@ from ros_process import READY_S, refusal, run
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.cli.main import main as rigid_proto
-from rigid_proto_ros.mesh.reading import resolve_mesh
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
 from rigid_proto_ros.ros.main import main as rigid_body_node
 from rigid_proto_ros.ros.poke_client import main as poke_client

@@ -7,7 +7,7 @@ from flights import SECOND, bundled_body, flight, spinning, wrench
 from reference_motion import angle_between, free_motion
 
 from rigid_proto_ros.mass.properties import MeshMoments
-from rigid_proto_ros.mesh.reading import bundled_names
+from rigid_proto_ros.mesh.locate import bundled_names
 from rigid_proto_ros.motion.body import make_body
 
 # Check case 2, a tumbling brick without torque: Jackson, Shelton, Jackson, Castro, Noble, "Further Development of

@@ -13,8 +13,9 @@ from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh import reading as mesh_io
+from rigid_proto_ros.mesh.locate import bundled_names
 from rigid_proto_ros.mesh.numbers_in_text import read_numbers
-from rigid_proto_ros.mesh.reading import bundled_names, load_mesh
+from rigid_proto_ros.mesh.reading import load_mesh
 
 
 def load(tmp_path, name: str, data: bytes):

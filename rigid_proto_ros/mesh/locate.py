@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Which file a mesh's name stands for: a path, a ``package://`` or ``model://`` URI, or a bundled name."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
+
+from ..base.bundled import PACKAGE_FOLDER
+from ..base.errors import MeshError
+from ..base.nearest_name import did_you_mean
+
+BODIES = PACKAGE_FOLDER / "bodies"
+"""Folder of the bundled meshes."""
+RESOURCE_PATHS = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "ROS_PACKAGE_PATH")
+"""Environment variables with folders, colon separated, in which Gazebo and ROS look for models and packages."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where else to look: ``near``, the folder of the file that names the mesh, from which relative paths count and
+    packages are looked for upwards; ``folders`` that hold packages or models, or are one themselves."""
+
+    near: Path | None = None
+    folders: tuple[Path, ...] = ()
+
+
+NOWHERE_ELSE = Search()
+
+
+def bundled_names() -> tuple[str, ...]:
+    """Names of the meshes that come with the package."""
+    return tuple(sorted(path.stem for path in BODIES.glob("*.obj")))
+
+
+def _installed_package(package: str) -> Path | None:
+    """Share folder of a ROS package, or this package's own folder for its own name."""
+    try:
+        from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+
+        try:
+            return Path(get_package_share_directory(package))
+        except (PackageNotFoundError, ValueError, OSError):  # OSError: no ROS environment is set up
+            pass
+    except ImportError:
+        pass
+    return PACKAGE_FOLDER if package == "rigid_proto_ros" else None
+
+
+def _names_itself(folder: Path, package: str) -> bool:
+    """Whether the folder is called ``package``, or its package.xml is."""
+    if folder.name == package:
+        return True
+    try:
+        text = (folder / "package.xml").read_text("utf-8", "replace")
+    except OSError:
+        return False
+    found = re.search(r"<name>\s*([^<\s]+)\s*</name>", text)
+    return found is not None and found.group(1) == package
+
+
+def _package_folders(package: str, search: Search) -> Iterator[Path]:
+    """Folders that may be the package or model: those asked for, then installed ones, then upwards from the file."""
+    environment = [Path(part) for name in RESOURCE_PATHS for part in os.environ.get(name, "").split(":") if part]
+    for folder in (*search.folders, *environment):
+        if _names_itself(folder.absolute(), package):
+            yield folder
+        yield folder / package
+    installed = _installed_package(package)
+    if installed is not None:
+        yield installed
+        if package == "rigid_proto_ros":
+            yield PACKAGE_FOLDER
+    if search.near is not None:
+        near = search.near.absolute()
+        for folder in (near, *near.parents):
+            if _names_itself(folder, package):
+                yield folder
+            yield folder / package
+
+
+def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
+    """The file that ``name`` (a path, ``package://package/path``, ``model://model/path`` or a bundled name) stands for.
+
+    Raises MeshError when there is none, with the bundled names and the one most like it.
+    """
+    try:
+        return _found_mesh(name, search)
+    except (OSError, RuntimeError, ValueError) as error:
+        # a name too long or with a NUL, a folder that may not be read, a user's home unknown
+        reason = getattr(error, "strerror", None) or str(error).rstrip(".")
+        raise MeshError(
+            "mesh", name, f"a file that can be read, package://<package>/<path>, or a bundled name ({reason})"
+        ) from None
+
+
+def _found_mesh(name: str, search: Search) -> Path:
+    scheme, colon, rest = name.partition("://")
+    if colon and scheme in ("package", "model"):
+        return _in_package(name, *rest.partition("/")[::2], search)
+    if colon and scheme not in ("file", ""):
+        raise MeshError("mesh", name, "a path, file://, package://, model:// or a bundled name")
+    name = rest if colon else name
+    path = Path(name).expanduser()
+    if search.near is not None and (search.near / path).is_file():
+        return (search.near / path).resolve()
+    if path.is_file():
+        return path.resolve()
+    bundled = BODIES / f"{name}.obj"
+    if name and "/" not in name and bundled.is_file():
+        return bundled.resolve()
+    if path.is_dir():
+        raise MeshError("mesh", f"{name!r} is a folder, not a mesh file")
+    names = bundled_names()
+    siblings = [p.name for p in path.parent.iterdir() if p.is_file()] if path.parent.is_dir() and "/" in name else []
+    hint = did_you_mean(path.name, [*names, *siblings])
+    known = f"the bundled meshes are {', '.join(names)}"
+    raise MeshError("mesh", f"there is no file and no bundled mesh {name!r}; {' '.join(filter(None, [hint, known]))}")
+
+
+def _in_package(name: str, package: str, inside: str, search: Search) -> Path:
+    """The file ``inside`` a package or model; a folder of that name without the file isn't the last word."""
+    missing: Path | None = None
+    for folder in _package_folders(package, search):
+        for path in dict.fromkeys((folder / inside, folder / unquote(inside))):
+            if path.is_file():
+                return path.resolve()
+        if missing is None and folder.is_dir():
+            missing = folder / inside
+    if missing is not None:
+        raise MeshError("mesh", f"there is no file {str(missing)!r} in the package")
+    where = f", and none above {str(search.near)!r}; --package-path DIR says where it is" if search.near else ""
+    raise MeshError("mesh", f"the package {package!r} of {name!r} was not found{where}")

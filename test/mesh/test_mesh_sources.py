@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""What comes with a mesh's bytes: files that they take, units that they state, packing, cracks of rounding's size."""
+
+import bz2
+import gzip
+import io
+import json
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+from mass_solids import box, sphere
+from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, ply, stl
+
+from rigid_proto_ros.base.errors import MeshError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.inspection import inspect_mesh
+from rigid_proto_ros.mass.verdict import unit_suspicion
+from rigid_proto_ros.mesh import reading
+from rigid_proto_ros.mesh.reading import Mesh, load_mesh
+
+
+def volume(path) -> float:
+    return mesh_body(load_mesh(str(path))).moments.moments("solid").measure
+
+
+def write_gltf(folder, vertices: np.ndarray) -> None:
+    """model.gltf and model.bin of a cube; the .gltf is the same for any vertices."""
+    points, indices = vertices.astype("<f4").tobytes(), CUBE_TRIANGLES.astype("<u2").tobytes()
+    views = [
+        {"buffer": 0, "byteOffset": 0, "byteLength": len(points)},
+        {"buffer": 0, "byteOffset": len(points), "byteLength": len(indices)},
+    ]
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [9, 9, 9]},
+        {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
+    ]
+    model = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}], "accessors": accessors,
+        "bufferViews": views, "buffers": [{"uri": "model.bin", "byteLength": len(points) + len(indices)}],
+    }  # fmt: skip
+    folder.mkdir(exist_ok=True)
+    (folder / "model.gltf").write_text(json.dumps(model))
+    (folder / "model.bin").write_bytes(points + indices)
+
+
+@pytest.mark.parametrize("size", [1, 10**6])
+def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch, size):
+    pytest.importorskip("trimesh")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
+    monkeypatch.setattr(reading, "CACHED_SIZE", size)
+    for name, scale, expected in (("a", 1.0, 1.0), ("b", 2.0, 8.0), ("a", 1.0, 1.0), ("a", 3.0, 27.0)):
+        write_gltf(tmp_path / name, scale * CUBE_VERTICES)
+        assert volume(tmp_path / name / "model.gltf") == pytest.approx(expected, rel=1e-12)
+    assert volume(tmp_path / "a" / "model.gltf") == pytest.approx(27.0, rel=1e-12)
+    (tmp_path / "a" / "model.bin").unlink()
+    with pytest.raises(MeshError):
+        volume(tmp_path / "a" / "model.gltf")
+
+
+def dae(unit: str) -> bytes:
+    trimesh = pytest.importorskip("trimesh")
+    pytest.importorskip("collada")
+    text = trimesh.Trimesh(CUBE_VERTICES, CUBE_TRIANGLES, process=False).export(file_type="dae")
+    text = text.decode() if isinstance(text, bytes) else text
+    assert "<asset>" in text
+    head, _, tail = text.partition("<asset>")
+    import re
+
+    tail = re.sub(r"<unit[^>]*/>", "", tail)
+    return f"{head}<asset>{tail.replace('</asset>', unit + '</asset>', 1)}".encode()
+
+
+def threemf(unit: str) -> bytes:
+    pytest.importorskip("trimesh")
+    pytest.importorskip("networkx")
+    pytest.importorskip("lxml")
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in CUBE_VERTICES)
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in CUBE_TRIANGLES)
+    model = (
+        f'<?xml version="1.0"?><model {unit} xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1" type="model"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>'
+        '</resources><build><item objectid="1"/></build></model>'
+    )
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    return packed.getvalue()
+
+
+UNITS = [
+    ("a.dae", lambda: dae('<unit name="millimeter" meter="0.001"/>'), 1e-3),
+    ("b.dae", lambda: dae('<unit name="inch" meter="0.0254"/>'), 0.0254),
+    ("c.dae", lambda: dae('<unit name="meter" meter="1"/>'), 1.0),
+    ("a.3mf", lambda: threemf(""), 1e-3),
+    ("b.3mf", lambda: threemf('unit="centimeter"'), 1e-2),
+    ("c.3mf", lambda: threemf('unit="inch"'), 0.0254),
+    ("d.3mf", lambda: threemf('unit="meter"'), 1.0),
+]
+
+
+@pytest.mark.parametrize(("name", "make", "unit"), UNITS, ids=[row[0] for row in UNITS])
+def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, make, unit):
+    (tmp_path / name).write_bytes(make())
+    mesh = load_mesh(str(tmp_path / name))
+    assert mesh.unit == unit
+    inspection = inspect_mesh(mesh_body(mesh))
+    assert inspection.volume == pytest.approx(unit**3, rel=1e-12)
+    said = [finding.message for finding in inspection.findings if finding.code == "stated_unit"]
+    assert (len(said) == 1 and f"{unit:g} m" in said[0]) if unit != 1.0 else not said
+
+
+@pytest.mark.parametrize(
+    ("side", "words"), [(20.0, "20 mm if the file is in millimetres (--scale 0.001)"), (3000.0, "3000 mm"), (5e-5, "0.05 m")]
+)  # fmt: skip
+def test_a_size_that_no_metre_file_has_names_the_unit_that_makes_sense(side, words):
+    assert words in unit_suspicion(side).message
+
+
+def packed(kind: str, data: bytes) -> bytes:
+    return gzip.compress(data) if kind == "gz" else bz2.compress(data)
+
+
+@pytest.mark.parametrize("kind", ["gz", "bz2"])
+def test_packed_files_of_every_own_format_open(tmp_path, kind):
+    for name, data in (("a.stl", stl()), ("a.obj", obj()), ("a.ply", ply())):
+        (tmp_path / f"{name}.{kind}").write_bytes(packed(kind, data))
+        assert volume(tmp_path / f"{name}.{kind}") == 1.0
+
+
+def test_a_packed_dae_and_a_zae_open(tmp_path):
+    text = dae('<unit meter="0.01"/>')
+    (tmp_path / "a.dae.gz").write_bytes(gzip.compress(text))
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as made:
+        made.writestr("a.dae", text)
+    (tmp_path / "a.zae").write_bytes(archive.getvalue())
+    assert volume(tmp_path / "a.dae.gz") == pytest.approx(1e-6, rel=1e-12)
+    assert volume(tmp_path / "a.zae") == pytest.approx(1e-6, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("a.stl.gz", gzip.compress(stl())[:-9], "compressed content"),
+        ("a.obj.gz", b"no gzip", "compressed content"),
+        ("a.obj.bz2", b"no bzip2", "compressed content"),
+        ("bomb.obj.gz", gzip.compress(b"\n" * 10**6), "more than"),
+        ("a.gz", gzip.compress(stl()), "endings"),
+        ("a.3mf", b"PK\3\4no archive", "archive"),
+    ],
+)
+def test_packed_files_that_cannot_be_read_say_so(tmp_path, name, data, words):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(MeshError, match=words):
+        load_mesh(str(tmp_path / name), max_triangles=100)
+
+
+def made(vertices, triangles) -> Mesh:
+    name = str(hash((vertices.tobytes(), triangles.tobytes())))
+    return Mesh("made", "/made.obj", vertices, triangles, None, name)
+
+
+@pytest.fixture
+def no_cache(monkeypatch):
+    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+
+
+def test_cracks_below_1e_12_of_the_diagonal_are_welded_and_said(no_cache):
+    vertices, triangles = sphere(10)
+    soup = vertices[triangles].reshape(-1, 3)
+    for size, closed in ((1e-13, True), (1e-9, False)):
+        torn = soup + np.random.default_rng(1).uniform(-size, size, soup.shape)
+        body = mesh_body(made(torn, np.arange(len(torn)).reshape(-1, 3)))
+        assert body.verdict.closed == closed
+        if closed:
+            (finding,) = body.verdict.findings
+            assert (finding.code, finding.severity) == ("welded", "info")
+            whole = mesh_body(made(vertices, triangles)).moments.moments("solid").measure
+            assert body.moments.moments("solid").measure == pytest.approx(whole, rel=1e-12)
+
+
+def test_welded_cracks_come_from_the_cache_alike(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
+    vertices, triangles = sphere(6)
+    soup = vertices[triangles].reshape(-1, 3)
+    torn = soup + np.random.default_rng(1).uniform(-1e-14, 1e-14, soup.shape)
+    first, again = (mesh_body(made(torn, np.arange(len(torn)).reshape(-1, 3))) for _ in range(2))
+    assert again.verdict == first.verdict and np.array_equal(again.triangles, first.triangles)
+    assert again.moments.moments("solid").measure == first.moments.moments("solid").measure
+
+
+def test_an_open_tube_says_what_it_is_with_caps(no_cache):
+    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    vertices = np.concatenate([np.column_stack([ring, np.full(64, z)]) for z in (-0.5, 0.5)])
+    i, j = np.arange(64), (np.arange(64) + 1) % 64
+    tube = np.concatenate([np.stack([i, j, 64 + j], axis=1), np.stack([i, 64 + j, 64 + i], axis=1)])
+    reason = mesh_body(made(vertices, tube)).verdict.reason
+    assert "flat caps over the holes give 3.14" in reason  # 64 sides: 3.137
+    assert "2.09 to 2.09" not in reason and "volume unknown" in reason
+
+
+def test_a_refusal_never_prints_a_range_of_equal_ends(no_cache):
+    rng = np.random.default_rng(3)
+    vertices, triangles = box((1.0, 2.0, 3.0), 6)
+    for count in range(1, 30):
+        hole = rng.choice(len(triangles), count, replace=False)
+        reason = mesh_body(made(vertices, np.delete(triangles, hole, axis=0))).verdict.reason
+        if "ambiguous" in reason:
+            low, high = reason.partition("ambiguous: ")[2].split(",")[0].split(" to ")
+            assert low != high
+        assert "flat caps over the holes give" in reason
+
+
+def test_nan_in_a_vertex_that_no_face_uses_is_no_harm(tmp_path, capsys):
+    (tmp_path / "a.obj").write_bytes(b"v nan 0 inf\n" + obj(faces=CUBE_TRIANGLES + 1))
+    assert main(["inspect", str(tmp_path / "a.obj"), "--json", "--verify"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["volume"] == 1.0 and report["models"]["points"]["mass"] == 1000.0
+    (finding,) = report["verdict"]
+    assert finding["code"] == "unreferenced_vertices" and "not finite" in finding["message"]
+
+
+def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path):
+    for order, word in (("<", "little"), (">", "big")):
+        header = f"ply\nformat binary_{word}_endian 1.0\nelement vertex 8\n"
+        header += "".join(f"property double {axis}\n" for axis in "xyz")
+        header += "element face 6\nproperty list uint int vertex_indices\nproperty uchar flags\n"
+        header += "property list uchar float texcoord\nend_header\n"
+        body = b"".join(struct.pack(f"{order}3d", *v) for v in CUBE_VERTICES)
+        for quad in CUBE_QUADS:
+            body += struct.pack(f"{order}I4iBB8f", 4, *quad, 7, 8, *[0.5] * 8)
+        (tmp_path / f"{word}.ply").write_bytes(header.encode() + body)
+        assert volume(tmp_path / f"{word}.ply") == 1.0
+        (tmp_path / "cut.ply").write_bytes((header.encode() + body)[:-3])
+        with pytest.raises(MeshError, match="truncated"):
+            volume(tmp_path / "cut.ply")
+
+
+def test_a_ply_whose_faces_name_fractions_of_vertices_is_refused(tmp_path):
+    text = ply().replace(b"3 0 1 3", b"3 0 1.5 3", 1).replace(b"list uchar int", b"list uchar float")
+    (tmp_path / "a.ply").write_bytes(text)
+    with pytest.raises(MeshError, match=r"vertex 1\.5"):
+        volume(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("long.off", b"OFF\n" + b"9" * 4300 + b" 12 0\n"),
+        ("nul.obj", b"#" * 5000 + b"\nv 0 0 \0\0\0\nf 1 1 1\n"),
+        ("nul.off", b"OFF\n3 1 0\n0 0 0\n\0\0\0 0 0\n1 1 1\n3 0 1 2\n"),
+        ("nul.ply", ply().replace(b"element face", b"elem\0\0ent face", 1)),
+    ],
+)
+def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data):
+    (tmp_path / name).write_bytes(data)
+    assert main(["inspect", str(tmp_path / name)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and all(c.isprintable() or c == "\n" for c in err)
