@@ -21,7 +21,7 @@ WELD = 1e-5
 """Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""
 
 
-class Surface:
+class RepairedSurface:
     """Triangles (m, 3) over vertices (n, 3) with polygon_starts (p + 1,) or None, changed step by step."""
 
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None) -> None:
@@ -64,7 +64,7 @@ def repair_surface(
     vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
     """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was."""
-    surface = Surface(vertices, triangles, polygon_starts)
+    surface = RepairedSurface(vertices, triangles, polygon_starts)
     done = [
         *_drop_copies(surface),
         *_weld_rims(surface),
@@ -75,7 +75,7 @@ def repair_surface(
     return surface.triangles, surface.polygon_starts, tuple(done)
 
 
-def _drop_copies(surface: Surface) -> list[str]:
+def _drop_copies(surface: RepairedSurface) -> list[str]:
     topology = surface.topology()
     done = []
     if topology.duplicates.any():
@@ -119,12 +119,12 @@ def weld_cracks(
     vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray | None, str]:
     """Triangles with rim vertices that only rounding put apart as one, polygon starts, and what was done or ""."""
-    surface = Surface(vertices, triangles, polygon_starts)
+    surface = RepairedSurface(vertices, triangles, polygon_starts)
     done = _weld_rims(surface, CRACK)
     return surface.triangles, surface.polygon_starts, "".join(done)
 
 
-def _weld_rims(surface: Surface, part: float = WELD) -> list[str]:
+def _weld_rims(surface: RepairedSurface, part: float = WELD) -> list[str]:
     """Let triangles use one number for rim vertices closer than ``part`` of the diagonal."""
     topology = surface.topology()
     rim = np.unique(topology.boundary[:, :2])
@@ -194,7 +194,7 @@ def _parities(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, in
     return parity, parent, contradictions
 
 
-def _orient(surface: Surface) -> list[str]:
+def _orient(surface: RepairedSurface) -> list[str]:
     topology = surface.topology()
     if topology.flipped == 0:
         return []
@@ -208,7 +208,7 @@ def _orient(surface: Surface) -> list[str]:
     return [f"turned {int(np.count_nonzero(turn))} faces to agree with their neighbours"]
 
 
-def _cap_holes(surface: Surface) -> list[str]:
+def _cap_holes(surface: RepairedSurface) -> list[str]:
     """Close each rim with one polygon; rims that meet in a vertex are walked one after the other."""
     topology = surface.topology()
     rim = topology.boundary
@@ -243,7 +243,7 @@ def _cap_holes(surface: Surface) -> list[str]:
     return [f"capped {caps} holes with {len(rim)} {edges}"] if caps else []
 
 
-def _turn_outward(surface: Surface) -> list[str]:
+def _turn_outward(surface: RepairedSurface) -> list[str]:
     """Outermost components outward, those inside one of them inward, and so on by parity."""
     topology = surface.topology()
     if topology.unbalanced or topology.components > MAX_NESTED_COMPONENTS:

@@ -13,7 +13,7 @@ from mesh_files import CUBE_QUADS, CUBE_VERTICES, moebius, obj
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
-from rigid_proto_ros.mass.repair import Surface
+from rigid_proto_ros.mass.repair import RepairedSurface
 from rigid_proto_ros.mass.verdict import judge_surface, unit_suspicion
 from rigid_proto_ros.mesh import nesting as mesh_topology_nesting
 from rigid_proto_ros.mesh.hull import box_surface, convex_hull
@@ -173,7 +173,7 @@ def test_repair_of_bodies_wound_apart(meshes):
 
 def test_repair_turns_polygons_as_a_whole(meshes):
     mesh = load_mesh(str(meshes / "sword_quads.obj"))
-    surface = Surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    surface = RepairedSurface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
     chosen = np.random.default_rng(3).random(mesh.polygons) < 0.25
     surface.turn(np.repeat(chosen, np.diff(mesh.polygon_starts)))
     broken = dataclasses.replace(mesh, triangles=surface.triangles, sha256="broken")
