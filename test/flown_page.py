@@ -168,34 +168,28 @@ class FlownLink:
         self._deliver(self._on_scene, self.scenario.text)
 
 
-class FlownPage:
-    """A user at the page, by its own callbacks. All times are simulated."""
+class PageInProcess:
+    """A page with its server, in this process. ``do`` runs a function on the page's thread. said: what it says in its corner."""
 
     def __init__(self, lesson: str = "", anew: bool = False) -> None:
         from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
-        from rigid_proto_ros.ros.warm_up import warm_up
         from rigid_proto_ros.workbench.page import Page
         from rigid_proto_ros.workbench.server import make_server
 
-        warm_up(make_scenario({}).setup)  # compiled on the page's thread, kernels would let its socket time out
         self.server = make_server(LOOPBACK, any_free_port(), lambda link: None)
         self.page: Page = self.do(lambda: Page(self.server, "/rigid_body", "http://here", lesson, anew))
-        self.link: FlownLink = self.page.link
         self.said: list[str] = []
-        self.page.say = self.said.append
+        self.page.announcements.say = self.said.append
         self.running = asyncio.run_coroutine_threadsafe(self.page.run(), self.page.loop)
-        self._socket = bare_page(self.server.get_port())
-        self.browser = self._socket.__enter__()
-        self.until(lambda: self.page.scenario is not None, "scene")
-        self.fly(0.0)
 
     def end(self) -> None:
+        """As the page's process ends."""
         from rigid_proto_ros.workbench.server import stop_server
 
-        self._socket.__exit__(None, None, None)
-        self.running.cancel()
-        stop_server(self.server)
-        self.page.close()
+        if not self.running.cancelled():
+            self.running.cancel()
+            stop_server(self.server)
+            self.page.close()
 
     def do(self, function: Callable):
         async def done():
@@ -210,6 +204,25 @@ class FlownPage:
             assert time.monotonic() < deadline, f"no {what}; said {self.said}"
             time.sleep(0.005)
         return found
+
+
+class FlownPage(PageInProcess):
+    """A user at the page, by its own callbacks. All times are simulated."""
+
+    def __init__(self, lesson: str = "", anew: bool = False) -> None:
+        from rigid_proto_ros.ros.warm_up import warm_up
+
+        warm_up(make_scenario({}).setup)  # compiled on the page's thread, kernels would let its socket time out
+        super().__init__(lesson, anew)
+        self.link: FlownLink = self.page.link
+        self._socket = bare_page(self.server.get_port())
+        self.browser = self._socket.__enter__()
+        self.until(lambda: self.page.scenes.scenario is not None, "scene")
+        self.fly(0.0)
+
+    def end(self) -> None:
+        self._socket.__exit__(None, None, None)
+        super().end()
 
     # What a user does
 
@@ -230,8 +243,12 @@ class FlownPage:
 
         def shown() -> bool:
             page, link = self.page, self.link
-            at = page.state is not None and page.state.time_ns == link.rows[-1][0] and not page._events
-            return at and not page._scenes.busy and page.scenario.parameters == link.scenario.parameters
+            at = (
+                page.follower.state is not None
+                and page.follower.state.time_ns == link.rows[-1][0]
+                and not page.follower.waiting
+            )
+            return at and not page.scenes.busy and page.scenes.scenario.values == link.scenario.values
 
         self.until(shown, "page that has heard all")
 
@@ -270,7 +287,7 @@ class FlownPage:
             await asyncio.sleep(0.01)
 
         self.do(update)
-        self.until(lambda: not self.page.busy, "node that has taken it")
+        self.until(lambda: not (self.page.announcements.activity or self.page.node.busy), "node that has taken it")
         self.settle()
 
     def pick(self, title: str) -> None:
@@ -280,7 +297,7 @@ class FlownPage:
 
     def click(self, mesh_point, direction=None) -> None:
         """Click on the body, as it is drawn, where it has this point; direction of the view (3,) [world]."""
-        state, body = self.page.state, self.page.scenario.setup.body
+        state, body = self.page.follower.state, self.page.scenes.scenario.setup.body
         view = self.page.view
         seen = DrawnPose(0.0, state.position, state.orientation_xyzw, view.origin.copy(), view.unit)
         point = state.position + state.rotation @ body.point(tuple(mesh_point))
@@ -290,7 +307,7 @@ class FlownPage:
 
     def grab(self, mesh_point) -> np.ndarray:
         """Press on the body at this point; where that is (3,) [world]."""
-        state, body, view = self.page.state, self.page.scenario.setup.body, self.page.view
+        state, body, view = self.page.follower.state, self.page.scenes.scenario.setup.body, self.page.view
         place = state.position + state.rotation @ body.point(tuple(mesh_point))
         drawn = (place - view.origin) / view.unit
         self.do(lambda: self.page.pointer.grab(1, drawn, drawn))

@@ -12,7 +12,7 @@ from pathlib import Path
 from rigid_proto_ros.cli.main import main as rigid_proto
 
 HERE = Path(__file__).resolve().parent
-SIZE = "1280x720"
+SIZE = "1280x800"
 
 
 def draw(page: Path) -> int:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Colours, names and units of what is shown, the same on the interactive page and in Rerun.
 
-Colours are RGB of 0 to 255. Vectors in principal axes have components 1, 2, 3 in ascending order of the principal moments.
+Colours are RGB of 0 to 255. Vectors in principal axes have components 1, 2, 3 in ascending order of the principal
+moments.
 """
 
 from __future__ import annotations

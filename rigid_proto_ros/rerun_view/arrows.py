@@ -43,11 +43,11 @@ class ArrowScale:
         """Of the force arrow and the torque arrow [m]; 0 where there is none."""
         impulsive = load.kind == "impulse"
         references = (self.impulse, self.angular_impulse) if impulsive else (self.force, self.torque)
-        magnitudes = (float(np.linalg.norm(load.force)), float(np.linalg.norm(load.torque)))
-        return tuple(
-            float(arrow_length(magnitude, reference, self.size)) if magnitude > 0.0 else 0.0
-            for magnitude, reference in zip(magnitudes, references, strict=True)
-        )
+        return self._length(load.force, references[0]), self._length(load.torque, references[1])
+
+    def _length(self, vector: np.ndarray, reference: float) -> float:
+        magnitude = float(np.linalg.norm(vector))
+        return float(arrow_length(magnitude, reference, self.size)) if magnitude > 0.0 else 0.0
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Energies and angular momentum of many states at once, for plots.
 
-States are rows (n, 13) in ``simulation/observer.py``'s ``STATE_FIELDS`` order: COM position, attitude xyzw, COM velocity (world),
-angular velocity (body axes).
+States are rows (n, 13) in ``simulation/observer.py``'s ``STATE_FIELDS`` order: COM position, attitude xyzw, COM
+velocity (world), angular velocity (body axes).
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ def record_ensemble(path: str, flights: list[Flight], name: str) -> None:
             times = time_columns(flight.times_ns, flight.times_ns)
             rows = flight.states
             stream.send(entity, times, rr.Transform3D.columns(translation=rows[:, 0:3], quaternion=rows[:, 3:7]))
-            if flight.vertices is None:
+            if flight.vertices is None or flight.triangles is None:
                 sphere = rr.Points3D([[0.0, 0.0, 0.0]], radii=[0.02], colors=[colour[:3]], labels=[flight.label])
                 stream.log_static(f"{entity}/centre", sphere)
                 continue

@@ -112,3 +112,8 @@ SERIES = {
     POSITION: (("x", RED), ("y", GREEN), ("z", BLUE)),
 }
 """Per plotted entity the names and colours of its scalars, in the order in which they are logged."""
+
+
+def axis_ends(plot: str) -> str:
+    """Where the ends of a plot's value axis are logged, for viewers of a flight that goes on."""
+    return f"{plot}/axis_ends"

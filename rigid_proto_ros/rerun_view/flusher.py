@@ -14,12 +14,12 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..simulation.mailbox import Block, Mailbox, Mark
+from .rerun_internals import forget_closed_recordings
 from .streams import (
     FileStream,
     LiveServer,
     LiveStream,
     end_without_waiting,
-    forget_closed_recordings,
 )
 from .writer import SceneWriter
 
@@ -121,7 +121,8 @@ class Flusher:
         self._finish_file()
         if self.server is not None:
             for stream in self._writer.streams:
-                self.server.end_run(stream)
+                if isinstance(stream, LiveStream):
+                    self.server.end_run(stream)
             if not self.server.close():
                 end_without_waiting()
 
@@ -198,7 +199,7 @@ class Flusher:
         writer.streams.clear()
         writer.restart()
         for stream in streams:
-            if isinstance(stream, LiveStream):
+            if isinstance(stream, LiveStream) and self.server is not None:
                 live = self.server.open_run(self.run_id, self.run_name)
                 self.server.end_run(stream)
                 writer.attach(live)

@@ -46,7 +46,9 @@ SKEWED = 0.1
 
 
 def skewed(inertia: np.ndarray) -> bool:
-    """Whether the principal axes of a tensor (3, 3) are clearly others than its own axes, so that products of inertia tell."""
+    """Whether the principal axes of a tensor (3, 3) are clearly others than its own axes, so that
+    products of inertia tell.
+    """
     products = np.abs(inertia - np.diag(np.diag(inertia))).max()
     return bool(products > SKEWED * max(np.ptp(np.linalg.eigvalsh(inertia)), 1e-300))
 

@@ -56,6 +56,13 @@ def record_inspection(path: str, inspection: Inspection) -> None:
     recording.disconnect()
 
 
+def _box(inspection: Inspection) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the bounding box; a mesh that has none has nothing to show."""
+    if inspection.lower is None or inspection.upper is None:
+        raise InputError("mesh", inspection.body.mesh.name, "a mesh with vertices")
+    return inspection.lower, inspection.upper
+
+
 def _log_shapes(recording: Any, inspection: Inspection) -> None:
     import rerun as rr
 
@@ -64,7 +71,8 @@ def _log_shapes(recording: Any, inspection: Inspection) -> None:
     moments, axes = principal_axes(chosen.inertia)
     sides, semi_axes = equimomental_shapes(chosen.mass, moments)
     quaternion = rr.Quaternion(xyzw=np.roll(quaternion_wxyz(axes), -1))
-    size = float(np.linalg.norm(inspection.upper - inspection.lower))
+    lower, upper = _box(inspection)
+    size = float(np.linalg.norm(upper - lower))
     triangles = inspection.body.triangles
     if np.prod(inspection.scale) < 0.0:
         triangles = triangles[:, [0, 2, 1]]
@@ -91,8 +99,8 @@ def _log_shapes(recording: Any, inspection: Inspection) -> None:
     recording.log(
         "world/bounding_box",
         rr.Boxes3D(
-            mins=[inspection.lower - center],
-            sizes=[inspection.upper - inspection.lower],
+            mins=[lower - center],
+            sizes=[upper - lower],
             colors=SHAPE_COLORS["bounding_box"],
             fill_mode="majorwireframe",
             labels="bounding box",
@@ -139,7 +147,8 @@ def _log_differences(recording: Any, inspection: Inspection) -> None:
     )
     remarks = "\n".join(f"* {finding.severity}: {finding.message}" for finding in inspection.findings) or "* none"
     text = (
-        f"# {inspection.body.mesh.name}\n\nmass {chosen.mass:.6g} kg, centre of mass {center} m ({inspection.model})\n\n"
+        f"# {inspection.body.mesh.name}\n\n"
+        f"mass {chosen.mass:.6g} kg, centre of mass {center} m ({inspection.model})\n\n"
         "| model | principal moments off by | axes turned by | COM offset | largest entry off by |\n"
         f"|---|---|---|---|---|\n{rows}\n\nRemarks\n\n{remarks}\n"
     )
@@ -153,8 +162,9 @@ def _blueprint(inspection: Inspection) -> Any:
     import rerun.blueprint as rrb
 
     names = ", ".join(MODEL_NAMES.get(name, name) for name in model_differences(inspection))
-    size = float(np.linalg.norm(inspection.upper - inspection.lower))
-    middle = 0.5 * (inspection.lower + inspection.upper) - inspection.chosen.center_of_mass
+    lower, upper = _box(inspection)
+    size = float(np.linalg.norm(upper - lower))
+    middle = 0.5 * (lower + upper) - inspection.chosen.center_of_mass
     eye = rrb.EyeControls3D(position=middle + size * np.array([1.25, -1.1, 0.75]), look_target=middle)
     return rrb.Blueprint(
         rrb.Horizontal(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import rerun as rr
 import rerun.blueprint as rrb
 
 from . import appearance
@@ -16,6 +17,14 @@ TRAIL_SECONDS = 3.0
 """[simulated s] Length of the trail shown behind the body."""
 
 HERPOLHODE_SECONDS = 20.0
+
+PLOTTED_SECONDS = 20.0
+"""[simulated s] Of the plots of a flight that goes on; those of a recording that has ended show all of it."""
+
+LEGEND_ROOM = 0.45
+"""Width left free for the legend at the right end of a plot, in widths of the curves; the longest takes
+.42 of a small plot.
+"""
 
 BACKGROUND = (24, 27, 34)
 
@@ -29,15 +38,21 @@ PATH_SIZES = 4.5
 
 @dataclass(frozen=True)
 class Subject:
-    """What a flight is about, so what is shown of it first. ghost: another body beside it. falls: under gravity, on no string.
-    tied: to a string from the start. dropped_term: its motion lacks ω × Iω. skewed: its principal axes aren't those of its drawing,
-    as the box around it shows."""
+    """What a flight is about, so what is shown of it first. ghost: another body beside it. falls: under gravity, on no
+    string. tied: to a string from the start. dropped_term: its motion lacks ω × Iω. skewed: its principal axes aren't
+    those of its drawing, as the box around it shows.
+    """
 
     ghost: bool = False
     falls: bool = False
     tied: bool = False
     dropped_term: bool = False
     skewed: bool = False
+
+    @property
+    def boxed(self) -> bool:
+        """Whether the bounding box is shown around the body."""
+        return self.ghost or self.skewed
 
 
 @dataclass(frozen=True)
@@ -57,8 +72,13 @@ class PlotViews:
 
     def plot(self, entity: str) -> Any:
         """Scalars of one entity over time."""
-        legend = rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=len(e.SERIES[entity]) > 1 or entity == e.ENERGY)
-        view = rrb.TimeSeriesView(origin="/" + entity, name=TITLES[entity], plot_legend=legend)
+        view = rrb.TimeSeriesView(
+            origin="/" + entity,
+            name=TITLES[entity],
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(e.SERIES[entity]) > 1),
+            axis_x=time_axis(),
+            time_ranges=_up_to_cursor(rrb.TimeRangeBoundary.infinite()),
+        )
         self.made.setdefault(entity, []).append(view)
         return view
 
@@ -84,8 +104,7 @@ TITLES = {
 def layout(size: float, initial_view: str, subject: Subject) -> Layout:
     """For a body of this size [m]: three tabs, ``initial_view`` in front."""
     plots = PlotViews()
-    boxed = subject.ghost or subject.skewed
-    lesson_hides = tuple(entity for entity in LESSON if not (boxed and entity == e.BOUNDING_BOX))
+    lesson_hides = tuple(entity for entity in LESSON if not (subject.boxed and entity == e.BOUNDING_BOX))
     flights = (
         flight_view(size, "Flight", lesson_hides, subject),
         flight_view(size, "All shapes", DEBUGGING, subject),
@@ -133,10 +152,10 @@ def lesson(flight: Any, subject: Subject, plots: PlotViews) -> Any:
     else:
         beside = [poinsot_view(), e.ANGULAR_VELOCITY_PRINCIPAL, e.ANGULAR_MOMENTUM, e.ENERGY]
     views = [plots.plot(view) if isinstance(view, str) else view for view in beside]
-    shares = [2] * len(views) if isinstance(beside[0], str) else [3, *[2] * (len(views) - 1)]
     return rrb.Horizontal(
-        rrb.Vertical(flight, command_view(), row_shares=[6, 1]),
-        rrb.Vertical(*views, row_shares=shares),
+        rrb.Vertical(flight, command_view(), row_shares=[5, 1]),
+        # Nearly equal shares: a smaller plot has no room for the four lines of a legend.
+        rrb.Vertical(*views, row_shares=[4 if isinstance(view, str) else 5 for view in beside]),
         column_shares=[3, 2],
         name="Lesson",
     )
@@ -194,24 +213,36 @@ def poinsot_view() -> Any:
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=[2.5, -2.0, 1.0], look_target=[0.0, 0.0, -0.4], eye_up=[0.0, 0.0, 1.0]
+            kind=rrb.Eye3DKind.Orbital,
+            position=[2.8, -2.25, 1.1],
+            look_target=[0.0, 0.0, -0.45],
+            eye_up=[0.0, 0.0, 1.0],
         ),
         overrides={"/" + e.POINSOT_HERPOLHODE: [_last_seconds(HERPOLHODE_SECONDS)]},
     )
 
 
 def _last_seconds(seconds: float) -> Any:
-    """Shows what was logged in the last seconds before the cursor, on either timeline."""
+    """Shows what was logged in the last seconds before the cursor."""
+    return _up_to_cursor(rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds))
+
+
+def _up_to_cursor(start: Any) -> Any:
+    """What was logged from ``start`` to the cursor, on either timeline."""
+    end = rrb.TimeRangeBoundary.cursor_relative()
     return rrb.VisibleTimeRanges(
-        [
-            rrb.VisibleTimeRange(
-                timeline,
-                start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
-                end=rrb.TimeRangeBoundary.cursor_relative(),
-            )
-            for timeline in (e.SIM_TIME, e.ROS_TIME)
-        ]
+        [rrb.VisibleTimeRange(timeline, start=start, end=end) for timeline in (e.SIM_TIME, e.ROS_TIME)]
     )
+
+
+def time_axis(duration_s: float | None = None) -> Any:
+    """Time axis of the plots of a run that has ended after ``duration_s``, or that goes on. Curves end at the cursor,
+    and room for the legend follows. Ends relative to the cursor hold on both timelines, absolute ones on one alone.
+    """
+    boundary = rrb.TimeRangeBoundary
+    start = boundary.cursor_relative(seconds=-PLOTTED_SECONDS) if duration_s is None else boundary.infinite()
+    room_s = LEGEND_ROOM * (PLOTTED_SECONDS if duration_s is None else duration_s)
+    return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=boundary.cursor_relative(seconds=room_s)))
 
 
 def command_view() -> Any:

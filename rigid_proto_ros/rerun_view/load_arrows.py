@@ -115,5 +115,6 @@ class LoadArrows:
             if (not self._acting and not samples.showing) or only not in ("", kind):
                 continue
             index = 1 + PARTS.index(part)
-            arrows = [shown[index] for shown in self._acting.values() if shown[0] == kind and shown[index] is not None]
+            shown = [acting[index] for acting in self._acting.values() if acting[0] == kind]
+            arrows = [arrow for arrow in shown if isinstance(arrow, Arrow)]
             samples.add(times_ns, walls, rows, arrows)

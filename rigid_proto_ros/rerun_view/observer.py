@@ -34,8 +34,9 @@ INITIAL_VIEWS = ("lesson", "debugging", "plain")
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
 LIVE_MEMORY_LIMIT = "32MiB"
-"""What the server keeps for viewers that come late, a minute at 1 kHz; the oldest is dropped first. It takes about twice
-that of this process's memory."""
+"""What the server keeps for viewers that come late, a minute at 1 kHz; the oldest is dropped first. It takes about
+twice that of this process's memory.
+"""
 
 _REMEMBERED = ("started", "mesh_changed", "body_changed", "scene_changed", "string_changed", "ghost_began")
 """What a recording that is switched on later must know."""
@@ -56,7 +57,7 @@ class RerunObserver(Observer):
     Raises InputError for a file that can't be written, a port that is taken, an unknown viewer, and without rerun-sdk.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (each has a default, and callers name them)
         self,
         record: str = "",
         viewer: str = "none",
@@ -149,7 +150,7 @@ class RerunObserver(Observer):
         self._mark(time_ns, "refused", reason, message)
 
     def status(self, time_ns: int, track: str, value: str) -> None:
-        """Note that a lane of the state line changes."""
+        """Note that a track of the state timeline changes."""
         self._mark(time_ns, "status", track, value)
 
     def effort(self, time_ns: int, steps: int, force_evaluations: int) -> None:
@@ -246,11 +247,10 @@ class RerunObserver(Observer):
             elif viewer == "native" and viewers.has_display():
                 self._processes.append(viewers.open_native(self.live_address))
             elif viewer == "native":
-                # Without --connect the program takes the server at its usual port for a viewer, and pours what it
-                # reads there back into it.
-                self._report(
-                    f"no display for the viewer; open one elsewhere on this machine: rerun --connect {self.live_address}"
-                )
+                # Without --connect the program takes the server at its usual port for a viewer, and feeds the stream
+                # back into itself.
+                command = f"rerun --connect {self.live_address}"
+                self._report(f"no display for the viewer; open one elsewhere on this machine: {command}")
         except OSError as error:
             self.web_address = ""
             self._report(f"no viewer: {error}")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What a small plot shows of its values: the power of ten that goes to its title, and the range of its axis.
 
-uPlot writes ticks in full, "0.00000012" or "7,200,000", into a column of fixed width, which cuts off what is longer. Ticks of
-values between 1 and 1000 always fit.
+uPlot writes ticks in full, "0.00000012" or "7,200,000", into a column of fixed width, which cuts off what is longer.
+Ticks of values between 1 and 1000 always fit.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True)
 class PlotRange:
-    """Values are plotted divided by 10**exponent (a multiple of 3), on an axis from ``low`` to ``high`` in these units."""
+    """Values are plotted divided by 10**exponent (a multiple of 3), on an axis from ``low`` to ``high``
+    in these units.
+    """
 
     exponent: int
     low: float
@@ -59,7 +61,31 @@ def plot_range(values: np.ndarray, least: float = 0.0) -> PlotRange:
     return PlotRange(exponent, round(low, 9), round(high, 9))
 
 
+TICKS_IN_SMALL_PLOT = 5.0
+"""Rerun numbers ticks at one power of ten, the least of which no more than these fit between the ends of
+a small plot.
+"""
+
+BEYOND_TICK = 0.06
+"""Of the axis, between its end and a tick whose number is to be read."""
+
+
+def with_two_ticks(low: float, high: float) -> tuple[float, float]:
+    """An axis, widened at one end where fewer than two of the ticks that Rerun numbers would lie on it."""
+    step = nice_step((high - low) / TICKS_IN_SMALL_PLOT, (1.0,))
+    first, last = math.ceil(low / step), math.floor(high / step)
+    if last > first:
+        return low, high
+    # One tick or none: up or down to the next ones, whichever is nearer.
+    up, down = step * (first + 1), step * (last - 1)
+    if up - high <= low - down:
+        return low, up + BEYOND_TICK * (up - low)
+    return down - BEYOND_TICK * (high - down), high
+
+
 def nice_step(length: float, steps: tuple[float, ...] = (1.0, 2.0, 5.0)) -> float:
-    """The next above a positive length, or equal to it, of ``steps`` (ascending, from 1 to below 10) times a power of ten."""
+    """The next above a positive length, or equal to it, of ``steps`` (ascending, from 1 to below 10)
+    times a power of ten.
+    """
     power = 10.0 ** math.floor(math.log10(length))
     return next(step * power for step in (*steps, 10.0) if step * power >= length * (1.0 - 1e-12))

@@ -12,7 +12,7 @@ from ..simulation.observer import BodySnapshot
 from . import entities as e
 from .columns import Send, scalar_columns, time_columns
 from .derived import angle_to, derive
-from .plot_range import plot_range
+from .plot_range import plot_range, with_two_ticks
 
 
 class Ranges:
@@ -29,9 +29,11 @@ class Ranges:
             self._found[entity] = (min(low, float(finite.min())), max(high, float(finite.max())))
 
     def axes(self) -> dict[str, tuple[float, float]]:
-        """Ends of the axis by entity, so that no curve lies on the frame's edge and rounding doesn't fill the plot."""
+        """Ends of the axis by entity: no curve lies on the frame's edge, rounding doesn't fill the plot,
+        two ticks have numbers.
+        """
         return {
-            entity: plot_range(np.array(found), LEAST_ANGLE if entity in ANGLES else 0.0).bounds
+            entity: with_two_ticks(*plot_range(np.array(found), LEAST_ANGLE if entity in ANGLES else 0.0).bounds)
             for entity, found in self._found.items()
         }
 
@@ -65,6 +67,7 @@ class Plots:
         """Send the rates collected so far."""
         if self._efforts:
             times_ns, walls, *rates = zip(*self._efforts, strict=True)
+            self._ranges.note(e.EFFORT, np.column_stack(rates))
             send(e.EFFORT, time_columns(np.array(times_ns), np.array(walls)), scalar_columns(np.column_stack(rates)))
             self._efforts.clear()
 
@@ -84,6 +87,7 @@ class Plots:
         if self._momentum_at_start is None:
             self._momentum_at_start = L[0].copy()
         plotted = {
+            e.DRIFT: self._drift(energies, L, disturbed),
             e.ENERGY: energies,
             e.ANGULAR_MOMENTUM: np.column_stack([L, np.linalg.norm(L, axis=1)]),
             e.ANGULAR_MOMENTUM_ANGLE: np.degrees(angle_to(self._momentum_at_start, L))[:, np.newaxis],
@@ -94,7 +98,6 @@ class Plots:
         for entity, values in plotted.items():
             self._ranges.note(entity, values)
             send(entity, times, scalar_columns(values))
-        send(e.DRIFT, times, scalar_columns(self._drift(energies, L, disturbed)))
         return L
 
     def _drift(self, energies: np.ndarray, L: np.ndarray, disturbed: np.ndarray) -> np.ndarray:

@@ -39,12 +39,14 @@ class PoinsotPicture:
     def __init__(self) -> None:
         self._ticks = Ticks(RATE)
         self._redraw = Ticks(REDRAWN_PER_S)
-        self._frame: PrincipalFrame | None = None
+        self._frame = PrincipalFrame.of(np.eye(3))
+        self._has_body = False
         self._drawn: tuple[float, np.ndarray] | None = None
 
     def change_body(self, time_ns: int, wall_ns: int, body: BodySnapshot, send: Send) -> None:
         """Another tensor: another ellipsoid, in other axes. At this scale it is the same for every spin."""
         self._frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
+        self._has_body = True
         self._drawn = None
         times = one_time(time_ns, wall_ns)
         moments = self._frame.moments
@@ -64,7 +66,7 @@ class PoinsotPicture:
     def rows(self, times_ns: np.ndarray, walls: np.ndarray, rows: np.ndarray, L: np.ndarray, send: Send) -> None:
         """States (n, 13) with their angular momenta (n, 3) in world axes."""
         chosen = self._ticks.choose(times_ns)
-        if not len(chosen) or self._frame is None:
+        if not len(chosen) or not self._has_body:
             return
         times_ns, walls, rows, L = times_ns[chosen], walls[chosen], rows[chosen], L[chosen]
         w = np.einsum("ij,ni->nj", self._frame.axes, rows[:, 10:13])

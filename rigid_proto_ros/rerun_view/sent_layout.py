@@ -6,14 +6,11 @@ A layout costs two threads of the SDK and a third of a megabyte that a live serv
 
 from __future__ import annotations
 
-from typing import Any
-
 import rerun as rr
 import rerun.blueprint as rrb
-import rerun_bindings
-from rerun.recording_stream import RecordingStream
 
-from .layout import Layout, Subject, camera, layout
+from .layout import Layout, Subject, camera, layout, time_axis
+from .rerun_internals import BlueprintStream
 
 
 class SentLayout:
@@ -23,54 +20,43 @@ class SentLayout:
         self._application_id = application_id
         self._size = 0.0
         self._subject = Subject()
-        self._layout: Layout | None = None
-        self._stream: RecordingStream | None = None
-        self._messages: Any = None
+        self._sent: tuple[Layout, BlueprintStream] | None = None
 
     def fit(self, recording: rr.RecordingStream, size: float, initial_view: str, subject: Subject) -> None:
         """Send what is needed for a body of this size [m]; nothing while the size is similar.
 
-        A ghost that comes or goes brings another layout; the rest of what a flight is about is that of its beginning, for a
-        viewer's own arrangement isn't to be taken away in mid-flight.
+        A ghost that comes or goes brings another layout; the rest of what a flight is about is that of its beginning,
+        for a viewer's own arrangement isn't to be taken away in mid-flight.
         """
-        if self._layout is not None and subject.ghost == self._subject.ghost and 0.5 <= size / self._size <= 2.0:
+        other_ghost = subject.ghost != self._subject.ghost
+        if self._sent is not None and not other_ghost and 0.5 <= size / self._size <= 2.0:
             return
-        if self._layout is None or subject.ghost != self._subject.ghost:
-            self._begin(layout(size, initial_view, subject))
+        if self._sent is None or other_ghost:
+            self.close()
+            made = layout(size, initial_view, subject)
+            self._sent = made, BlueprintStream(self._application_id, made.blueprint)
             self._subject = subject
         else:
-            for view in self._layout.flights:
-                self._stream.log(f"{view.blueprint_path()}/EyeControls3D", camera(size, self._subject))
+            made, stream = self._sent
+            for view in made.flights:
+                stream.log(f"{view.blueprint_path()}/EyeControls3D", camera(size, self._subject))
         self._size = size
-        self._send(recording)
+        self._sent[1].send(recording)
 
-    def fit_axes(self, recording: rr.RecordingStream, axes: dict[str, tuple[float, float]]) -> None:
-        """Give plots axes from and to, by entity, in a recording that is complete."""
-        if self._layout is None:
+    def fit_axes(self, recording: rr.RecordingStream, axes: dict[str, tuple[float, float]], duration_s: float) -> None:
+        """Give plots axes from and to, by entity, in a recording that is complete and this long [simulated s]."""
+        if self._sent is None:
             return
-        for entity, ends in axes.items():
-            for view in self._layout.plots.get(entity, ()):
-                self._stream.log(f"{view.blueprint_path()}/ScalarAxis", rrb.ScalarAxis(range=ends))
-        self._send(recording)
-
-    def _send(self, recording: rr.RecordingStream) -> None:
-        # What rr.send_blueprint does too, but that keeps a stream of every layout for ever.
-        rerun_bindings.send_blueprint(self._messages, True, True, recording=recording.to_native())
+        made, stream = self._sent
+        for entity, views in made.plots.items():
+            for view in views:
+                stream.log(f"{view.blueprint_path()}/TimeAxis", time_axis(duration_s))
+                if entity in axes:
+                    stream.log(f"{view.blueprint_path()}/ScalarAxis", rrb.ScalarAxis(range=axes[entity]))
+        stream.send(recording)
 
     def close(self) -> None:
         """Let go of the SDK's threads."""
-        if self._stream is not None:
-            self._stream.disconnect()
-        self._stream = self._messages = self._layout = None
-
-    def _begin(self, made: Layout) -> None:
-        self.close()
-        self._layout = made
-        self._stream = RecordingStream._from_native(
-            rerun_bindings.new_blueprint(
-                application_id=self._application_id, make_default=False, make_thread_default=False, default_enabled=True
-            )
-        )
-        self._stream.set_time("blueprint", sequence=0)
-        made.blueprint._log_to_stream(self._stream)
-        self._messages = self._stream.memory_recording().storage
+        if self._sent is not None:
+            self._sent[1].close()
+        self._sent = None

@@ -85,10 +85,10 @@ def record(
     runs: list[RecordedSession],
     path: str | Path,
     given: Scenario | None = None,
-    progress: Callable[[float, float], None] = lambda done, total: None,
+    progress: Callable[[float, float], None] = lambda *_: None,
 ) -> None:
-    """Play all runs of a session into a recording, .rrd or .mcap; given: the scene of a session that lacks it. ``progress`` is
-    called with (states told, all states).
+    """Play all runs of a session into a recording, .rrd or .mcap; given: the scene of a session that lacks it.
+    ``progress`` is called with (states told, all states).
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
@@ -102,9 +102,13 @@ def record(
         for number, session in enumerate(runs):
             if number:
                 recorder.reset()
-            play(session, recorder, given, lambda done, _, before=before: progress(before + done, total))
+            play(session, recorder, given, _after(before, total, progress))
             before += len(session.times)
     finally:
         recorder.close()
     if error := getattr(recorder, "error", ""):
         raise InputError("--record", str(path), f"a file that can be written ({error})")
+
+
+def _after(before: int, total: int, progress: Callable[[float, float], None]) -> Callable[[float, float], None]:
+    return lambda done, _: progress(before + done, total)

@@ -21,7 +21,6 @@ from . import entities as e
 from .ports import LOOPBACK, any_free_port
 from .reader import read_session
 from .rrd_file import whole_part
-from .tabs import bring_to_front
 from .viewers import ViewerProcess, open_headless
 
 START_TIMEOUT_S = 60.0
@@ -48,7 +47,7 @@ def take_picture(
     picture: str | Path,
     view: str = "",
     size: tuple[int, int] = (1600, 900),
-    progress: Callable[[float, float], None] = lambda done, total: None,
+    progress: Callable[[float, float], None] = lambda *_: None,
 ) -> None:
     """Write a .png of the recording at simulated time ``at_s``: the whole layout, its tab of this name, or the view.
     ``progress`` is called with (stages done, all stages).
@@ -188,6 +187,41 @@ def _without_empty_top(png: bytes) -> bytes:
         kept = io.BytesIO()
         image.crop((0, max(0, top - 8), image.width, image.height)).save(kept, format="png")
     return kept.getvalue()
+
+
+def bring_to_front(client: Any, name: str) -> str | None:
+    """The id of the view of this name, in front now; None for a name of a whole tab, such as ``Lesson``.
+
+    Case doesn't matter; of views with equal names that of the tab in front comes first. Raises InputError with the
+    names there are.
+    """
+    blueprint = client.get_blueprint(of="recording").blueprint
+    views = {f"view/{view.view_id}": view.name for view in client.get_state().views}
+    found = _walk(blueprint, f"container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}", views, ())
+    path = next((path for path, called in found if called.lower() == name.strip().lower()), None)
+    if path is None:
+        raise InputError("--view", name, "one of " + ", ".join(sorted({called for _, called in found})))
+    for parent, child in zip(path[:-1], path[1:], strict=True):
+        container = blueprint["/" + parent]["ContainerBlueprint"]
+        if container["container_kind"] == "Tabs":
+            container["active_tab"] = child
+    client.set_blueprint(blueprint, of="recording")
+    return path[-1].removeprefix("view/") if path[-1] in views else None
+
+
+def _walk(
+    blueprint: dict[str, Any], node: str, views: dict[str, str], above: tuple[str, ...]
+) -> list[tuple[tuple[str, ...], str]]:
+    """(path from the root, name) of everything that has a name at or below ``node``, what is in front first."""
+    path = (*above, node)
+    if node in views:
+        return [(path, views[node])]
+    container = blueprint.get("/" + node, {}).get("ContainerBlueprint", {})
+    found = [(path, container["display_name"])] if "display_name" in container else []
+    contents = container.get("contents", [])
+    for child in sorted(contents, key=lambda child: child != container.get("active_tab")):
+        found += _walk(blueprint, child, views, path)
+    return found
 
 
 def is_blank(png: bytes) -> bool:

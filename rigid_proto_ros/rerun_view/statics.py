@@ -16,10 +16,10 @@ from . import entities as e
 from .columns import one_time
 from .inertia_shapes import PrincipalFrame, bounding_box
 from .load_arrows import PARTS, load_entity
+from .motion_picture import TRAIL_RADIUS
 from .streams import Stream
 from .surface_normals import shaded_surface
 
-TRAIL_RADIUS = 0.004
 AXIS_LENGTH = 0.25
 """In body sizes."""
 
@@ -27,7 +27,9 @@ INVISIBLE = 1e-9
 """A scale that nobody sees; the viewer refuses 0, which has no inverse."""
 
 LIVE_NUMBERS_MAX = 4_000_000
-"""[bytes] of a mesh's exact numbers that viewers are sent too; larger ones would push the flight out of the live server."""
+"""[bytes] of a mesh's exact numbers that viewers are sent too; larger ones would push the flight out of
+the live server.
+"""
 
 VIEW_PER_REACH = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
@@ -44,6 +46,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         self.surface: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.points = np.zeros((0, 3)) if self.vertices is None else self.vertices
         if self.vertices is not None and self.triangles is not None and len(self.triangles):
             self.surface = shaded_surface(self.vertices, self.triangles)
 
@@ -60,7 +63,7 @@ class Scene:
     def size(self, body: BodySnapshot) -> float:
         """A length [m] that stands for the body: the diagonal of its box, or of the box of equal inertia."""
         if self.surface is not None:
-            extent = np.ptp(self.vertices, axis=0) * np.abs(body.scale)
+            extent = np.ptp(self.points, axis=0) * np.abs(body.scale)
         else:
             extent = PrincipalFrame.of(np.asarray(body.inertia, dtype=float)).box_sides(body.mass)
         return float(np.linalg.norm(extent)) or 1.0
@@ -69,12 +72,17 @@ class Scene:
         """The vertex (3,) farthest from the COM [m, body axes from the COM], whose path is drawn."""
         if self.surface is None:
             return None
-        at = self.vertices * body.scale - body.center_of_mass
+        at = self.points * body.scale - body.center_of_mass
         return at[np.argmax(np.einsum("ij,ij->i", at, at))]
 
-    def view_size(self, body: BodySnapshot) -> float:
-        """The length [m] that the camera must keep in sight: bodies are shown around their COM, wherever it lies."""
+    def view_size(self, body: BodySnapshot, boxed: bool = False) -> float:
+        """The length [m] that the camera must keep in sight: bodies are shown around their COM, wherever it lies.
+        boxed: the bounding box too.
+        """
         tip = self.farthest_point(body)
+        if boxed and self.surface is not None:
+            centre, half = bounding_box(self.points, body.scale, body.center_of_mass)
+            tip = np.abs(centre) + half
         reach = 0.0 if tip is None else float(np.linalg.norm(tip))
         return max(self.size(body), VIEW_PER_REACH * reach)
 
@@ -116,7 +124,7 @@ def send_scene(stream: Stream, scene: Scene, mesh_number: int) -> None:
 
 def send_mesh(stream: Stream, scene: Scene, number: int) -> None:
     """The mesh of a run that already had ``number`` others."""
-    if scene.surface is None:
+    if scene.surface is None or scene.vertices is None or scene.triangles is None:
         return
     stream.log_static(mesh_entity(number), drawn_mesh(scene.surface, (*appearance.BODY_COLOUR, 255)))
     if stream.may_skip and scene.vertices.nbytes + scene.triangles.nbytes > LIVE_NUMBERS_MAX:
@@ -136,6 +144,9 @@ def send_styles(stream: Stream, size: float) -> None:
     for entity, series in e.SERIES.items():
         names, colours = zip(*series, strict=True)
         stream.log_static(entity, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
+        if stream.may_skip and entity != e.STRING_ENERGY:  # which is drawn among the other energies
+            unseen = rr.SeriesLines(names=["", ""], colors=[(0, 0, 0, 0)] * 2)
+            stream.log_static(e.axis_ends(entity), unseen)
     axes = np.eye(3) * AXIS_LENGTH * size
     stream.log_static(
         e.BODY_AXES,
@@ -191,7 +202,7 @@ def send_body(
     mesh_place = rr.Transform3D.columns(translation=[-body.center_of_mass], scale=[body.scale])
     stream.send(mesh_entity(mesh_number), times, mesh_place)
     if scene is not None and scene.surface is not None:
-        centre, half = bounding_box(scene.vertices, body.scale, body.center_of_mass)
+        centre, half = bounding_box(scene.points, body.scale, body.center_of_mass)
         stream.send(e.BOUNDING_BOX, times, rr.Boxes3D.columns(centers=[centre], half_sizes=[half]))
     frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
     turn = rr.Transform3D.columns(mat3x3=[frame.axes])
@@ -199,7 +210,7 @@ def send_body(
     ellipsoid = rr.Ellipsoids3D.columns(half_sizes=[frame.ellipsoid_semi_axes(body.mass)])
     stream.send(e.INERTIA_BOX, times, [*box, *turn])
     stream.send(e.INERTIA_ELLIPSOID, times, [*ellipsoid, *turn])
-    numbers = {
+    numbers: dict[str, Any] = {
         "mass": [float(body.mass)],
         "center_of_mass": np.asarray(body.center_of_mass, dtype=np.float64),
         "inertia": np.asarray(body.inertia, dtype=np.float64).ravel(),

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import rerun as rr
-import rerun_bindings
 
 from ..base.errors import InputError
 from ..base.output_file import output_file
@@ -95,8 +94,8 @@ class Stream(ABC):
 class FileStream(Stream):
     """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
 
-    open_ended: nobody knows how long the run will be, so the file gets no index: the library would gather that in memory,
-    3 kB for each piece that it writes, 200 MB an hour.
+    open_ended: nobody knows how long the run will be, so the file gets no index: the library would gather that in
+    memory, 3 kB for each piece that it writes, 200 MB an hour.
     """
 
     def __init__(self, path: Path, recording_id: str, name: str, open_ended: bool = False) -> None:
@@ -143,7 +142,9 @@ class LiveStream(Stream):
     may_skip = True
 
     def flush(self) -> None:
-        """Ask whether the server has taken everything. It waits for its slowest viewer, and so would all that is sent."""
+        """Ask whether the server has taken everything. It waits for its slowest viewer, and so would all
+        that is sent.
+        """
         try:
             self.recording.flush(timeout_sec=TAKEN_S)
             self.behind = False
@@ -189,21 +190,6 @@ class LiveServer:
         for thread in self._leaving:
             thread.join(max(0.0, deadline - time.monotonic()))
         return not any(thread.is_alive() for thread in self._leaving)
-
-
-def forget_closed_recordings() -> None:
-    """Give back threads and memory of recordings that are closed; the library itself keeps them until the end.
-
-    Waits for all others to take what they were sent.
-    """
-    users_own = rr.get_global_data_recording()
-    try:
-        rerun_bindings.flush_and_cleanup_orphaned_recordings()
-    except RuntimeError:
-        # Some other recording of this process can't be flushed; another time.
-        pass
-    if users_own is not None:
-        rr.set_global_data_recording(users_own)
 
 
 def end_without_waiting() -> None:

@@ -16,19 +16,18 @@ from ..simulation.mailbox import Block, Mark
 from ..simulation.observer import BodySnapshot
 from . import appearance
 from . import entities as e
-from .arrows import ArrowScale, arrow_length
+from .arrows import ArrowScale
 from .columns import Ticks, one_time, scalar_columns, time_columns
-from .derived import rotation_matrices, to_world
-from .ghost import Ghost
+from .disturbances import Disturbances
+from .ghost_picture import GhostPicture
 from .inertia_shapes import skewed
 from .layout import Subject
 from .load_arrows import LoadArrows
-from .logged_text import Words
+from .motion_picture import MotionPicture, ShownBody
 from .plots import Plots, Ranges
 from .poinsot_picture import PoinsotPicture
-from .state_timeline import Lanes
+from .run_log import StateTimeline, TextLog
 from .statics import (
-    TRAIL_RADIUS,
     Scene,
     drawn_mesh,
     hide_mesh,
@@ -39,13 +38,9 @@ from .statics import (
 )
 from .streams import Stream
 from .string_picture import StringPicture
-from .trail import Trail
 
 PICTURE_RATE = 250
 """[1/s, simulated] of what is only looked at, plots and arrows: the states themselves are all logged, exactly."""
-
-MIDDLING_SPIN = 5.0
-"""[rad/s] whose arrow is of middling length."""
 
 PICTURES_WAIT_NS = 700_000_000
 """Plots and pictures of a file go out at the first flush after this; a kill -9 loses a second of them at most."""
@@ -55,9 +50,6 @@ PICTURES_WAITING = 1000
 
 REPEATED_ROWS = 16384
 """After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
-
-MOTION_ARROWS = 0.7
-"""Length of the arrows of ω and L against those of loads."""
 
 
 class SceneWriter:
@@ -75,6 +67,22 @@ class SceneWriter:
         self._ghost_body: BodySnapshot | None = None
         self._scene_in_force = ""
         self._rows_since_repeat = 0
+        self._along_with_rows: dict[str, Callable[[Mark], None]] = {
+            "load_began": self._load_began,
+            "load_ended": self._load_ended,
+            "string_changed": self._string_changed,
+            "scene_changed": self._scene_changed,
+            "status": self._status,
+            "effort": self._effort,
+            "event": self._event,
+            "refused": self._refused,
+        }
+        self._between_rows: dict[str, Callable[[Mark], None]] = {
+            "started": self._started,
+            "mesh_changed": self._mesh_changed,
+            "body_changed": self._body_changed,
+            "ghost_began": self._ghost_began,
+        }
         self.restart()
 
     # What holds for a whole run
@@ -88,19 +96,16 @@ class SceneWriter:
         self._mesh_number = 0
         self._began_wall_ns = time.time_ns()
         self._ticks = Ticks(PICTURE_RATE)
-        self._trail = Trail()
-        self._com_trail = Trail()
+        self._motion = MotionPicture()
         self._ranges = Ranges()
         self._plots = Plots(self._ranges)
         self._poinsot = PoinsotPicture()
         self._loads = LoadArrows()
-        self._ghost = Ghost(self._ranges)
-        self._words = Words()
+        self._ghost = GhostPicture(self._ranges)
+        self._text_log = TextLog()
         self._string = StringPicture(self._ranges)
-        self._lanes = Lanes()
-        self._load_changes: list[tuple[int, bool]] = []
-        self._acted = self._touched = False
-        self._disturbed_unseen = 0
+        self._state_timeline = StateTimeline()
+        self._disturbances = Disturbances()
         self._pictured: list[tuple[np.ndarray, ...]] = []
         self._tell_body()
 
@@ -123,11 +128,12 @@ class SceneWriter:
     def _repeat(self, stream: Stream) -> None:
         """What is only said when it changes."""
         now, wall = self._last_time_ns, time.time_ns()
-        send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
-        self._poinsot.change_body(now, wall, self._body, stream.send)
+        if self._body is not None:
+            send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
+            self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
             self._ghost.change(now, wall, self._ghost_body, stream.send)
-        self._lanes.repeat(now, wall, stream.send)
+        self._state_timeline.repeat(now, wall, stream.send)
 
     def _repeat_for_viewers(self, rows: int) -> None:
         """The live server drops the oldest, so what was said long ago is lost on viewers that come late."""
@@ -152,16 +158,16 @@ class SceneWriter:
             self._show_loads(block, shown, mark.after_rows)
             shown = mark.after_rows
             self._note_time(mark.time_ns)
-            handler = _ALONG_WITH_ROWS.get(mark.kind)
+            handler = self._along_with_rows.get(mark.kind)
             if handler is not None:
-                handler(self, mark)
+                handler(mark)
                 continue
             self._send_upto(block, sent, shown)
             self.send_pictures()
             sent = shown
-            handler = _BETWEEN_ROWS.get(mark.kind)
+            handler = self._between_rows.get(mark.kind)
             if handler is not None:
-                handler(self, mark)
+                handler(mark)
             else:
                 on_mark(mark)
         self._show_loads(block, shown, block.count)
@@ -185,8 +191,8 @@ class SceneWriter:
         self._loads.send(self._send)
         self._string.send(self._send)
         self._plots.send_effort(self._send)
-        self._words.send(self._send)
-        self._lanes.send(self._send)
+        self._text_log.send(self._send)
+        self._state_timeline.send(self._send)
 
     # Marks that don't concern the rows before them
 
@@ -200,13 +206,13 @@ class SceneWriter:
 
     def _loads_changed(self, mark: Mark) -> None:
         kinds = self._loads.kinds_acting
-        self._load_changes.append((mark.after_rows, bool(kinds) or self._string.tied))
-        self._lane(mark, "loads", " + ".join(kinds) or "none")
+        self._disturbances.load_changed(mark.after_rows, bool(kinds) or self._string.tied)
+        self._track_changed(mark, "loads", " + ".join(kinds) or "none")
 
     def _string_changed(self, mark: Mark) -> None:
         (string,) = mark.content
         self._string.change(mark.time_ns, mark.wall_ns, string)
-        self._load_changes.append((mark.after_rows, bool(self._loads.kinds_acting) or string is not None))
+        self._disturbances.load_changed(mark.after_rows, bool(self._loads.kinds_acting) or string is not None)
 
     def _scene_changed(self, mark: Mark) -> None:
         (self._scene_in_force,) = mark.content
@@ -215,19 +221,19 @@ class SceneWriter:
             self._send(e.SCENE_IN_FORCE, one_time(mark.time_ns, mark.wall_ns), document)
 
     def _status(self, mark: Mark) -> None:
-        self._lane(mark, *mark.content)
+        self._track_changed(mark, *mark.content)
 
     def _effort(self, mark: Mark) -> None:
         self._plots.effort(mark.time_ns, mark.wall_ns, *mark.content)
 
     def _event(self, mark: Mark) -> None:
-        self._words.event(mark.time_ns, mark.wall_ns, *mark.content)
+        self._text_log.event(mark.time_ns, mark.wall_ns, *mark.content)
 
     def _refused(self, mark: Mark) -> None:
-        self._words.refusal(mark.time_ns, mark.wall_ns, *mark.content)
+        self._text_log.refusal(mark.time_ns, mark.wall_ns, *mark.content)
 
-    def _lane(self, mark: Mark, track: str, value: str) -> None:
-        self._lanes.change(mark.time_ns, mark.wall_ns, track, value)
+    def _track_changed(self, mark: Mark, track: str, value: str) -> None:
+        self._state_timeline.change(mark.time_ns, mark.wall_ns, track, value)
 
     # Marks that change what rows mean
 
@@ -267,15 +273,16 @@ class SceneWriter:
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
         if before is None:
-            self._lane(mark, "loads", "none")
-        self._lane(mark, "inertia_model", self._body.inertia_model)
-        self._lane(mark, "integrator", self._body.integrator + ("" if self._body.gyroscopic else ", not gyroscopic"))
+            self._track_changed(mark, "loads", "none")
+        self._track_changed(mark, "inertia_model", self._body.inertia_model)
+        self._track_changed(
+            mark, "integrator", self._body.integrator + ("" if self._body.gyroscopic else ", not gyroscopic")
+        )
 
     def _tell_body(self) -> None:
         if self._body is None:
             return
         self._size = self._scene.size(self._body) if self._scene is not None else 1.0
-        self._view_size = self._scene.view_size(self._body) if self._scene is not None else self._size
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
         self._string.size = self._size
@@ -291,7 +298,11 @@ class SceneWriter:
 
     def _send_styles(self, stream: Stream) -> None:
         send_styles(stream, self._size)
-        stream.send_layout(self._view_size, self._initial_view, self._subject())
+        subject = self._subject()
+        view_size = self._size
+        if self._scene is not None and self._body is not None:
+            view_size = self._scene.view_size(self._body, subject.boxed)
+        stream.send_layout(view_size, self._initial_view, subject)
 
     def _subject(self) -> Subject:
         """What the flight is about."""
@@ -308,8 +319,18 @@ class SceneWriter:
         return Subject(self._ghost_body is not None, falls, tied, dropped_term, is_skewed)
 
     def fit_axes(self, stream: Stream) -> None:
-        """Tell a stream that nobody watches yet how large its plotted values have been."""
-        stream.layout.fit_axes(stream.recording, self._ranges.axes())
+        """Tell a stream that nobody watches yet how large its plotted values have been, and how long the run."""
+        stream.layout.fit_axes(stream.recording, self._ranges.axes(), 1e-9 * self._last_time_ns)
+
+    def _send_axis_ends(self, times: list[Any]) -> None:
+        """Viewers of a flight that goes on fit axes to what is plotted: unseen points widen them. An axis given by the
+        layout would undo, at each of its changes, whatever somebody has arranged.
+        """
+        viewers = [stream for stream in self._row_streams() if stream.may_skip]
+        if viewers:
+            for entity, ends in self._ranges.axes().items():
+                for stream in viewers:
+                    stream.send(e.axis_ends(entity), times, scalar_columns(np.array([ends])))
 
     def _send_ghost_mesh(self, stream: Stream) -> None:
         if self._scene is not None and self._scene.surface is not None and not stream.knows_ghost:
@@ -320,7 +341,7 @@ class SceneWriter:
 
     def _write_rows(self, block: Block, begin: int, end: int) -> None:
         """Pose, exact state, plots and pictures of rows begin..end, which all belong to the present body."""
-        disturbed = self._disturbed(begin, end)
+        disturbed = self._disturbances.rows(begin, end)
         if begin == end:
             return
         times_ns, walls, rows = block.times[begin:end], block.walls[begin:end], block.rows[begin:end]
@@ -336,7 +357,7 @@ class SceneWriter:
         if self._body is None:
             return
         chosen = self._ticks.choose(times_ns)
-        disturbed = self._gathered(disturbed, chosen)
+        disturbed = self._disturbances.gathered(disturbed, chosen)
         if len(chosen):
             self._pictured.append((times_ns[chosen], walls[chosen], rows[chosen], disturbed))
         if self._pictured and self._pictures_are_due():
@@ -350,56 +371,17 @@ class SceneWriter:
 
     def send_pictures(self) -> None:
         """Plots, arrows and Poinsot's picture of the states since they were sent before, all of the present body."""
-        if not self._pictured:
+        body = self._body
+        if not self._pictured or body is None:
             return
         times_ns, walls, rows, disturbed = (np.concatenate(columns) for columns in zip(*self._pictured, strict=True))
         self._pictured.clear()
         times = time_columns(times_ns, walls)
-        L = self._plots.rows(times, rows, self._body, disturbed, self._send_rows)
+        L = self._plots.rows(times, rows, body, disturbed, self._send_rows)
+        self._send_axis_ends(one_time(times_ns[-1], walls[-1]))
         self._poinsot.rows(times_ns, walls, rows, L, self._send_rows)
-        self._write_pictures(times, times_ns, rows, L)
-
-    def _disturbed(self, begin: int, end: int) -> np.ndarray:
-        """Per row begin..end, whether a load acts there or did since the row before."""
-        disturbed = np.empty(end - begin, dtype=bool)
-        at = 0
-        for after_rows, acts in self._load_changes:
-            disturbed[at : after_rows - begin] = self._acted
-            at, self._acted = after_rows - begin, acts
-        disturbed[at:] = self._acted
-        for first_after in [0] * self._touched + [after_rows - begin for after_rows, _ in self._load_changes]:
-            disturbed[first_after : first_after + 1] = True
-        # What began or ended after the last of these rows concerns the next one too.
-        self._touched = (self._touched and begin == end) or any(after >= end for after, _ in self._load_changes)
-        self._load_changes.clear()
-        return disturbed
-
-    def _gathered(self, disturbed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Per chosen row, whether a load acted at any row since the one chosen before."""
-        so_far = np.cumsum(disturbed) + self._disturbed_unseen
-        at_chosen = so_far[chosen]
-        self._disturbed_unseen = int(so_far[-1] - at_chosen[-1]) if len(chosen) else int(so_far[-1])
-        return np.diff(at_chosen, prepend=0) > 0
-
-    def _write_pictures(self, times: list[Any], times_ns: np.ndarray, rows: np.ndarray, L: np.ndarray) -> None:
-        """Arrows of ω and L at the COM, and the trail: a dense line along the path of the farthest vertex."""
-        w = to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
-        spin_of_middling = MIDDLING_SPIN * float(np.trace(self._body.inertia)) / 3.0
-        for entity, vectors, reference in (
-            (e.ANGULAR_VELOCITY, w, MIDDLING_SPIN),
-            (e.MOMENTUM, L, spin_of_middling),
-        ):
-            # None at rest: one of no length would still have its name written beside it.
-            turns = vectors.any(axis=1)
-            drawn = rr.Arrows3D.columns(vectors=_drawn(vectors[turns], reference, self._size))
-            self._send_rows(entity, times, drawn.partition(turns.astype(int)))
-        if self._tip is not None:
-            spacing = 1.5 * TRAIL_RADIUS * self._size
-            points, counts = self._trail.between(times_ns, rows, self._tip, spacing)
-            self._send_rows(e.TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
-            if rows[:, 7:10].any():
-                points, counts = self._com_trail.between(times_ns, rows, np.zeros(3), spacing)
-                self._send_rows(e.COM_TRAIL, times, rr.Points3D.columns(positions=points).partition(counts))
+        shown = ShownBody(self._size, float(np.trace(body.inertia)) / 3.0, self._tip)
+        self._motion.rows(times, times_ns, rows, L, shown, self._send_rows)
 
     def _row_streams(self) -> list[Stream]:
         return [s for s in self._listening() if not (self._skip_live and s.may_skip)]
@@ -417,28 +399,3 @@ class SceneWriter:
     def _send(self, entity: str, times: list[Any], columns: Any) -> None:
         for stream in self._listening():
             stream.send(entity, times, columns)
-
-
-def _drawn(vectors: np.ndarray, reference: float, size: float) -> np.ndarray:
-    """Vectors (n, 3) in their directions, with lengths for the eye."""
-    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
-    lengths = np.where(norms > 0.0, MOTION_ARROWS * arrow_length(norms, reference, size), 0.0)
-    return vectors * np.divide(lengths, norms, out=np.zeros_like(norms), where=norms > 0.0)
-
-
-_ALONG_WITH_ROWS = {
-    "load_began": SceneWriter._load_began,
-    "load_ended": SceneWriter._load_ended,
-    "string_changed": SceneWriter._string_changed,
-    "scene_changed": SceneWriter._scene_changed,
-    "status": SceneWriter._status,
-    "effort": SceneWriter._effort,
-    "event": SceneWriter._event,
-    "refused": SceneWriter._refused,
-}
-_BETWEEN_ROWS = {
-    "started": SceneWriter._started,
-    "mesh_changed": SceneWriter._mesh_changed,
-    "body_changed": SceneWriter._body_changed,
-    "ghost_began": SceneWriter._ghost_began,
-}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,9 @@ from ..simulation.setup import Setup
 from ..simulation.string_control import StringControl
 
 SHOWN_AT_LEAST_NS = 800_000_000
-"""[ns, of a body that flies in real time] A poke is over before a page has drawn it twice; its arrow stays this long."""
+"""[ns, of a body that flies in real time] A poke is over before a page has drawn it twice; its arrow
+stays this long.
+"""
 
 SHORTEST, LONGEST = 0.3, 1.0
 """Arrow lengths in body sizes: that of a vanishing and of an infinite force."""
@@ -31,8 +34,9 @@ SHORTEST, LONGEST = 0.3, 1.0
 
 @dataclass(frozen=True)
 class Hit:
-    """The last poke: where it attacks (3,) [m, world], the unit direction of its force (3,) [world], its strength as text,
-    and its age, 0 as it begins and 1 when it is forgotten."""
+    """The last poke: where it attacks (3,) [m, world], the unit direction of its force (3,) [world], its strength as
+    text, and its age, 0 as it begins and 1 when it is forgotten.
+    """
 
     point: np.ndarray
     direction: np.ndarray
@@ -89,7 +93,7 @@ class Acting:
 
     def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:
         setup, frame, held = scenario.setup, command.frame, command.held
-        load = settle(frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
+        load = settle(frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), state)
         if held:
             self._acting = [acting for acting in self._acting if not acting.held]
             lasting_ns = setup.wrench_timeout_ns or 1 << 62
@@ -107,10 +111,10 @@ class Acting:
     def string_ends(self, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray] | None:
         """Knot and free end (3,) in the world, or None."""
         tied = self.string
-        if tied is not None and tied.release_ns is not None and state.time_ns >= tied.release_ns:
+        if self._control is None or tied is None:
+            return None
+        if tied.release_ns is not None and state.time_ns >= tied.release_ns:
             self._control.release()
-            tied = None
-        if tied is None:
             return None
         state = _not_before(tied, state)
         hand = tied.free_end(state.time_ns)
@@ -124,8 +128,8 @@ class Acting:
     def arrows(self, setup: Setup, state: State, size: float) -> list[tuple[np.ndarray, np.ndarray]]:
         """Point of attack and drawn vector (3,) [m, world] of each force; ``size`` is the body's.
 
-        An arrow ends at the point where the force attacks. Its length grows with the force, without end but bounded: it is
-        half-way at what moves the body by its own size within a second from rest.
+        An arrow ends at the point where the force attacks. Its length grows with the force, without end but bounded: it
+        is half-way at what moves the body by its own size within a second from rest.
         """
         self._acting = [acting for acting in self._acting if acting.until_ns > state.time_ns]
         arrows = []
@@ -156,7 +160,7 @@ def _attack(load: Load, setup: Setup, state: State) -> tuple[np.ndarray, np.ndar
     return state.position + state.rotation @ load.arm(setup.body), force, float(np.linalg.norm(force))
 
 
-def _strength_text(force, impulse: bool) -> str:
+def _strength_text(force: Sequence[float], impulse: bool) -> str:
     return f"{float(np.linalg.norm(force)):.3g} {'N s' if impulse else 'N'}"
 
 

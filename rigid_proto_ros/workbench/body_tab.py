@@ -6,10 +6,12 @@ from __future__ import annotations
 import asyncio
 import math
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+import viser
 
 from ..base.bundled import body_names
 from ..mass.from_mesh import mesh_body
@@ -17,10 +19,10 @@ from ..mass.tensor import six_from_tensor
 from ..mesh.reading import Mesh
 from ..scene.scenario import Scenario
 from .controls import Controls, read_numbers
+from .node_control import NodeControl
+from .scene_loader import SceneLoader
+from .status import Announcements
 from .tensors import comparison, judged
-
-if TYPE_CHECKING:
-    from .page import Page
 
 OWN_FILE = "(a file)"
 ANOTHER = "(another one)"
@@ -29,13 +31,23 @@ ANOTHER = "(another one)"
 class BodyTab:
     """Everything about mass and shape. ``changed`` is called whenever the node's parameters have."""
 
-    def __init__(self, page: Page, controls: Controls, tabs) -> None:
-        self._page = page
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tabs: viser.GuiTabGroupHandle,
+        controls: Controls,
+        scenes: SceneLoader,
+        node: NodeControl,
+        announcements: Announcements,
+    ) -> None:
+        self._gui = gui
         self._controls = controls
-        self._gui = page.server.gui
+        self._scenes = scenes
+        self._node = node
+        self._announcements = announcements
         self._base_scale = self._base_mass = 1.0
-        self._judged_mesh: tuple = ()
-        self._weights: dict[str, list] = {}
+        self._judged_mesh: tuple[object, ...] = ()
+        self._weights: dict[str, list[float]] = {}
         with tabs.add_tab("Body"):
             self._mesh_folder()
             self._size_and_mass_folder()
@@ -45,7 +57,7 @@ class BodyTab:
     @property
     def table(self) -> str:
         """The true tensor beside another, as it is shown."""
-        return self._table.content
+        return str(self._table.content)
 
     def changed(self, scenario: Scenario, another: bool) -> None:
         """Show what follows from the parameters in force; ``another`` body is the measure of "times" from now on."""
@@ -54,11 +66,10 @@ class BodyTab:
             self._base_scale = float(np.prod(np.abs(body.scale))) ** (1.0 / 3.0)
             self._base_mass = _own_mass(scenario)
         self._table.content = comparison(scenario)
-        mesh = str(scenario.parameters.mesh)
+        mesh = str(scenario.values["mesh"])
         self._file.content = "" if mesh in body_names() else f"Mesh file: `{Path(mesh).name}`"
         self._ballast_changed(scenario)
-        parameters = scenario.parameters
-        key = (parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback)
+        key = tuple(scenario.values[name] for name in ("mesh", "mesh_repair", "mesh_fallback"))
         if key != self._judged_mesh and scenario.body_mesh is not None:
             self._judged_mesh = key
             asyncio.get_running_loop().create_task(self._judge(scenario.body_mesh.mesh, *key[1:]))
@@ -70,7 +81,7 @@ class BodyTab:
             or ["closed and consistently wound: no problems found"]
         )
 
-    def show_verdict(self, lines: list[str]) -> None:
+    def show_verdict(self, lines: Sequence[str]) -> None:
         """What is to be said of a mesh, one line each."""
         self._verdict.content = "**Verdict**\n\n" + "\n".join(f"- {line}" for line in lines)
 
@@ -88,7 +99,7 @@ class BodyTab:
             self._controls.checkbox("mesh_repair", "Repair")
             self._controls.choice("mesh_fallback", "Fallback if open")
 
-        def shown(values):
+        def shown(values: Mapping[str, Any]) -> str:
             return values["mesh"] if values["mesh"] in body_names() else OWN_FILE
 
         self._controls.bind(mesh, shown, lambda name: None if name == OWN_FILE else {"mesh": name})
@@ -110,21 +121,25 @@ class BodyTab:
             controls.number("mass", "Mass [kg]; 0: by density")
             controls.number("density", "Density [kg/m³]")
 
-    def _size_factor(self, values) -> float:
+    def _size_factor(self, values: Mapping[str, Any]) -> float:
         scale = values["scale"]
-        return math.prod(abs(s) for s in scale) ** (1.0 / len(scale)) / self._base_scale
+        return float(math.prod(abs(s) for s in scale)) ** (1.0 / len(scale)) / self._base_scale
 
-    def _set_size(self, factor: float) -> dict:
-        scale = self._page.scenario.setup.body.scale
+    def _set_size(self, factor: float) -> dict[str, object] | None:
+        scenario = self._scenes.scenario
+        if scenario is None:
+            return None
+        scale = scenario.setup.body.scale
         present = float(np.prod(np.abs(scale))) ** (1.0 / 3.0)
         return {"scale": (scale * (factor * self._base_scale / present)).tolist()}
 
-    def _mass_factor(self, values) -> float:
-        scenario = self._page.scenario
+    def _mass_factor(self, _: Mapping[str, Any]) -> float:
+        scenario = self._scenes.scenario
         return _own_mass(scenario) / self._base_mass if scenario is not None and self._base_mass > 0.0 else 1.0
 
-    def _set_mass(self, factor: float) -> dict:
-        return {_mass_parameter(self._page.scenario): factor * self._base_mass}
+    def _set_mass(self, factor: float) -> dict[str, object] | None:
+        scenario = self._scenes.scenario
+        return None if scenario is None else {_mass_parameter(scenario): factor * self._base_mass}
 
     # Inertia
 
@@ -135,8 +150,10 @@ class BodyTab:
             self._controls.choice("inertia_model_com", "Its COM")
             self._table = gui.add_markdown("")
             with gui.add_folder("Edit the tensor", expand_by_default=False):
-                tensor = gui.add_text("Tensor", "", hint="ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes")
-                verdict = gui.add_markdown("")
+                tensor: Any = gui.add_text(
+                    "Tensor", "", hint="ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes"
+                )
+                verdict: Any = gui.add_markdown("")
                 present = gui.add_button("Copy the current tensor")
                 apply = gui.add_button(
                     "Use this tensor", disabled=True, hint="inertia_model explicit, with present mass and COM"
@@ -149,48 +166,53 @@ class BodyTab:
             return numbers if valid else None
 
         @tensor.on_update
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             judge()
 
         @present.on_click
-        async def _(event) -> None:
-            inertia = self._page.scenario.setup.body.inertia
-            tensor.value = " ".join(f"{x:.9g}" for x in six_from_tensor(inertia))
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            if self._scenes.scenario is not None:
+                inertia = self._scenes.scenario.setup.body.inertia
+                tensor.value = " ".join(f"{x:.9g}" for x in six_from_tensor(inertia))
 
         @apply.on_click
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             numbers = judge()
-            if numbers is not None:
-                self._page.set(_explicit(self._page.scenario, numbers))
+            if numbers is not None and self._scenes.scenario is not None:
+                self._node.set(_explicit(self._scenes.scenario, numbers))
 
     # Ballast
 
     def _ballast_folder(self) -> None:
         gui = self._gui
         with gui.add_folder("Ballast"):
-            self._weight = weight = gui.add_dropdown("Weight", (ANOTHER,), initial_value=ANOTHER)
-            self._name = name = gui.add_text("Its name", "weight", hint="Small letters, digits and _")
-            self._weight_mass = mass = gui.add_text("Its mass [kg]", "0", hint="0 takes it off")
-            self._place = place = gui.add_text("At x y z", "0 0 0", hint="Mesh coordinates")
+            weight: Any = gui.add_dropdown("Weight", (ANOTHER,), initial_value=ANOTHER)
+            name: Any = gui.add_text("Its name", "weight", hint="Small letters, digits and _")
+            mass: Any = gui.add_text("Its mass [kg]", "0", hint="0 takes it off")
+            place: Any = gui.add_text("At x y z", "0 0 0", hint="Mesh coordinates")
             put = gui.add_button("Put it there")
+        self._weight, self._name, self._weight_mass, self._place = weight, name, mass, place
 
         @weight.on_update
-        async def _(event) -> None:
+        async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 self._show_weight()
 
         @put.on_click
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             numbers = read_numbers(f"{mass.value} {place.value}", 4)
             chosen = name.value if weight.value == ANOTHER else weight.value
             if numbers is None or not re.fullmatch(r"[a-z][a-z0-9_]*", chosen):
                 received = f"got {chosen[:40]!r}, {mass.value[:40]!r}, {place.value[:80]!r}"
-                self._page.say(f"Ballast: {received}; accepted: a name of small letters, a mass, three coordinates")
+                self._announcements.say(
+                    f"Ballast: {received}; accepted: a name of small letters, a mass, three coordinates"
+                )
             else:
-                self._page.set({f"ballast.{chosen}": numbers})
+                self._node.set({f"ballast.{chosen}": numbers})
 
     def _ballast_changed(self, scenario: Scenario) -> None:
-        weights = {name: list(value) for name, value in scenario.parameters.ballast.items()}
+        values: Mapping[str, Any] = scenario.values
+        weights = {n.removeprefix("ballast."): list(value) for n, value in values.items() if n.startswith("ballast.")}
         if weights == self._weights:
             return
         added = [name for name in weights if name not in self._weights]
@@ -210,15 +232,13 @@ class BodyTab:
 
 def _own_mass(scenario: Scenario) -> float:
     """Mass [kg] without ballast: as its parameter says, or what the density gives."""
-    parameters = scenario.parameters
-    explicit = parameters.inertia_model == "explicit"
-    given = parameters.explicit_inertia.mass if explicit else parameters.mass
-    weights = sum(mass for mass, *_ in parameters.point_masses)
+    given = float(scenario.values[_mass_parameter(scenario)])
+    weights = sum(value[0] for name, value in scenario.values.items() if name.startswith("ballast."))
     return given if given > 0.0 else scenario.setup.body.mass - weights
 
 
 def _mass_parameter(scenario: Scenario) -> str:
-    return "explicit_inertia.mass" if scenario.parameters.inertia_model == "explicit" else "mass"
+    return "explicit_inertia.mass" if scenario.values["inertia_model"] == "explicit" else "mass"
 
 
 def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
@@ -230,6 +250,7 @@ def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
         "explicit_inertia.center_of_mass": (body.center_of_mass / body.scale).tolist(),
         "explicit_inertia.tensor": numbers,
     }
-    for name, (_, *place) in scenario.parameters.ballast.items():
-        changes[f"ballast.{name}"] = [0.0, *place]
+    for name, value in scenario.values.items():
+        if name.startswith("ballast."):
+            changes[name] = [0.0, *value[1:]]
     return changes

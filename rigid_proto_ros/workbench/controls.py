@@ -9,12 +9,18 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import viser
 
 from ..scene.parameters import parameter_named
+
+Handle = viser.GuiInputHandle[Any]
+Values = Mapping[str, Any]
+"""Parameters by name."""
+Changes = dict[str, object]
 
 TYPING_S = 0.6
 """[s] A text that hasn't changed for this long is meant as it stands."""
@@ -23,66 +29,22 @@ TOUCHED_S = 1.0
 """[s] An input isn't written to this soon after its user touched it: it would jump back under the finger."""
 
 
-ANSWER_S = 10.0
-"""[s] After which a call is given up: its node has died, or another one has its name. Reading a big mesh takes a few."""
-
-
-class ParameterSetter:
-    """Sends changes to the node, one call at a time; what comes in meanwhile goes with the next, the newest value winning.
-
-    send(changes, done) as RosLink.set_parameters; on_refusal(reason). For an event loop's thread.
-    """
-
-    def __init__(self, send: Callable, on_refusal: Callable[[str], None]) -> None:
-        self._send = send
-        self._on_refusal = on_refusal
-        self._waiting: dict[str, object] = {}
-        self._call: asyncio.TimerHandle | None = None
-
-    def set(self, changes: Mapping[str, object]) -> None:
-        """Set parameters soon."""
-        self._waiting.update(changes)
-        self._go_on()
-
-    @property
-    def busy(self) -> bool:
-        """Whether the node hasn't answered yet."""
-        return self._call is not None
-
-    def _go_on(self) -> None:
-        if self._call is not None or not self._waiting:
-            return
-        changes, self._waiting = self._waiting, {}
-        call = self._call = asyncio.get_running_loop().call_later(ANSWER_S, self._give_up)
-        self._send(changes, lambda successful, reason: self._done(call, successful, reason))
-
-    def _give_up(self) -> None:
-        self._done(self._call, False, f"no answer of the node within {ANSWER_S:g} s")
-
-    def _done(self, call: asyncio.TimerHandle | None, successful: bool, reason: str) -> None:
-        if call is None or call is not self._call:
-            return  # given up before
-        call.cancel()
-        self._call = None
-        if not successful:
-            self._on_refusal(reason)
-        self._go_on()
-
-
 @dataclass
 class _Control:
     """handle: the input. shown(values) gives what it shows of parameters; changes(input) what an input means for them,
     None where it can't be read, as ``accepted`` says."""
 
-    handle: viser.GuiInputHandle
-    shown: Callable[[Mapping], object]
-    changes: Callable[[object], dict | None]
+    handle: Any
+    shown: Callable[[Values], object]
+    changes: Callable[[Any], Changes | None]
     accepted: str = ""
     touched_s: float = -1e9
 
 
 class Controls:
-    """The inputs of one page server. set_parameters(changes) as ParameterSetter.set; say(text) tells of what can't be read."""
+    """The inputs of one page server. set_parameters(changes) as ParameterSetter.set; say(text) tells of
+    what can't be read.
+    """
 
     def __init__(
         self,
@@ -94,9 +56,9 @@ class Controls:
         self._set = set_parameters
         self._say = say
         self._controls: list[_Control] = []
-        self._values: Mapping[str, object] = {}
+        self._values: Values = {}
 
-    def update(self, values: Mapping[str, object], at_once: bool = False) -> None:
+    def update(self, values: Values, at_once: bool = False) -> None:
         """Show the parameters in force; ``at_once`` also in inputs that somebody is just using."""
         self._values = values
         for control in self._controls:
@@ -112,33 +74,33 @@ class Controls:
 
     # Kinds of inputs
 
-    def checkbox(self, name: str, label: str) -> viser.GuiInputHandle:
+    def checkbox(self, name: str, label: str) -> Handle:
         """A switch."""
         handle = self._gui.add_checkbox(label, False, hint=_hint(name))
         return self.bind(handle, lambda values: values[name], lambda value: {name: value})
 
-    def choice(self, name: str, label: str, options: tuple[str, ...] | None = None) -> viser.GuiInputHandle:
+    def choice(self, name: str, label: str, options: tuple[str, ...] | None = None) -> Handle:
         """One of the parameter's choices; an empty one is shown as a dash."""
         options = tuple(option or "–" for option in options or parameter_named(name).choices)
         handle = self._gui.add_dropdown(label, options, hint=_hint(name))
 
-        def shown(values):
+        def shown(values: Values) -> object:
             value = values[name] or "–"
             return value if value in options else handle.value
 
         return self.bind(handle, shown, lambda value: {name: "" if value == "–" else value})
 
-    def number(self, name: str, label: str) -> viser.GuiInputHandle:
+    def number(self, name: str, label: str) -> Handle:
         """A number of any size, as text."""
         accepted = parameter_named(name).accepted
         return self._text(
             label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1), accepted
         )
 
-    def vector(self, name: str, label: str, length: int) -> viser.GuiInputHandle:
+    def vector(self, name: str, label: str, length: int) -> Handle:
         """Numbers of any size, as text with blanks between them."""
 
-        def shown(values):
+        def shown(values: Values) -> str:
             numbers = values[name]
             return _written([numbers[0]] * length if len(numbers) == 1 else numbers)
 
@@ -146,7 +108,7 @@ class Controls:
             label, _hint(name), shown, lambda text: _numbers(name, text, length), parameter_named(name).accepted
         )
 
-    def slider(self, name: str, label: str, lower: float, upper: float, step: float) -> viser.GuiInputHandle:
+    def slider(self, name: str, label: str, lower: float, upper: float, step: float) -> Handle:
         """A number within what is usual; one beyond it stands at the end."""
         handle = self._gui.add_slider(label, lower, upper, step, lower, hint=_hint(name))
         return self.bind(
@@ -154,12 +116,18 @@ class Controls:
         )
 
     def factor(
-        self, label: str, hint: str, decades: float, shown: Callable[[Mapping], float], changes: Callable[[float], dict]
-    ) -> viser.GuiInputHandle:
-        """How many times of something: shown(values) > 0 gives it, changes(factor) sets it. The box holds the factor itself, the
-        slider below it is logarithmic."""
+        self,
+        label: str,
+        hint: str,
+        decades: float,
+        shown: Callable[[Values], float],
+        changes: Callable[[float], Changes | None],
+    ) -> Handle:
+        """How many times of something: shown(values) > 0 gives it, changes(factor) sets it. The box holds the factor
+        itself, the slider below it is logarithmic.
+        """
 
-        def typed(text):
+        def typed(text: object) -> Changes | None:
             numbers = read_numbers(text, 1)
             return changes(numbers[0]) if numbers is not None and numbers[0] > 0.0 else None
 
@@ -168,10 +136,17 @@ class Controls:
         self.bind(slider, lambda values: on_slider(shown(values), decades), lambda value: changes(10.0 ** value[0]))
         return box
 
-    def _text(self, label, hint, shown, changes, accepted: str) -> viser.GuiInputHandle:
+    def _text(
+        self,
+        label: str,
+        hint: str,
+        shown: Callable[[Values], object],
+        changes: Callable[[Any], Changes | None],
+        accepted: str,
+    ) -> Handle:
         handle = self._gui.add_text(label, "", hint=hint)
 
-        def place(values):
+        def place(values: Values) -> object:
             # "1.50" means what is in force, so it may stay as it was typed.
             mine = changes(handle.value)
             in_force = mine is not None and all(_equal(values.get(name), value) for name, value in mine.items())
@@ -179,13 +154,20 @@ class Controls:
 
         return self.bind(handle, place, changes, TYPING_S, accepted)
 
-    def bind(self, handle, shown, changes, wait_s: float = 0.0, accepted: str = ""):
+    def bind(
+        self,
+        handle: Handle,
+        shown: Callable[[Values], object],
+        changes: Callable[[Any], Changes | None],
+        wait_s: float = 0.0,
+        accepted: str = "",
+    ) -> Handle:
         """An input of any kind; see _Control. wait_s: after the last touch, until it is taken as meant."""
         control = _Control(handle, shown, changes, accepted)
         self._controls.append(control)
 
         @handle.on_update
-        async def _(event) -> None:
+        async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is None:
                 return  # we wrote it ourselves
             touched_s = control.touched_s = time.monotonic()
@@ -215,7 +197,7 @@ def _hint(name: str) -> str:
     return f"{parameter.description}{unit} ({name})"
 
 
-def log_slider(gui: viser.GuiApi, decades: float, hint: str) -> viser.GuiInputHandle:
+def log_slider(gui: viser.GuiApi, decades: float, hint: str) -> Handle:
     """A slider of factors whose value is (log10,); viser's slider for one number would show that beside it."""
     return gui.add_multi_slider(" ", -decades, decades, 0.01, (0.0,), hint=hint, marks=_marks(decades))
 
@@ -225,12 +207,12 @@ def on_slider(factor: float, decades: float) -> tuple[float]:
     return (round(min(max(math.log10(factor), -decades), decades), 2) if factor > 0.0 else 0.0,)
 
 
-def _marks(decades: float) -> tuple:
+def _marks(decades: float) -> tuple[tuple[float, str], ...]:
     whole = range(-int(decades), int(decades) + 1)
     return tuple((float(k), f"×{10.0**k:g}") for k in whole) if decades >= 1.0 else ((0.0, "×1"),)
 
 
-def _written(numbers) -> str:
+def _written(numbers: Iterable[float]) -> str:
     return " ".join(f"{x:.9g}" for x in numbers)
 
 
@@ -244,20 +226,20 @@ def read_numbers(text: object, length: int) -> list[float] | None:
     return numbers if len(numbers) == length and all(abs(x) < 1e308 for x in numbers) else None
 
 
-def _numbers(name: str, text, length: int) -> dict | None:
+def _numbers(name: str, text: object, length: int) -> Changes | None:
     numbers = read_numbers(text, length)
     if numbers is None:
         return None
     return {name: numbers[0] if parameter_named(name).type == "double" else numbers}
 
 
-def _equal(a, b) -> bool:
+def _equal(a: object, b: object) -> bool:
     if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
         return len(a) == len(b) and all(x == y for x, y in zip(a, b, strict=True))
     return a == b
 
 
-def _same(a, b) -> bool:
+def _same(a: object, b: object) -> bool:
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(map(_same, a, b))
     return abs(a - b) < 1e-9 if isinstance(a, float) and isinstance(b, float) else a == b

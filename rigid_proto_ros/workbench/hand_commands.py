@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """What is done by hand on the page, sent so that it acts in the order in which it was done.
 
-Single messages of one instant act by their kind and bytes, those of a list in its order. What is done together goes as a list;
-and while simulated time stands still, where all is done in one instant, everything is kept and goes as one list right before time
-goes on. Parameters that are set meanwhile are the node's at once, so that they are seen, and stand in the list again: their own
-changes act after all lists, and then change nothing any more.
+Single messages of one instant act by their kind and bytes, those of a list in its order. What is done together goes as
+a list; and while simulated time stands still, where all is done in one instant, everything is kept and goes as one list
+right before time goes on. Parameters that are set meanwhile are the node's at once, so that they are seen, and stand in
+the list again: their own changes act after all lists, and then change nothing any more.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ class HandCommands:
             self.go_on()
 
     def set_parameters(self, changes: dict[str, object], done: Callable[[bool, str], None]) -> None:
-        """As RosLink.set_parameters, in the order of what is done by hand. A change of mesh, tensor or integrator isn't: a list that
-        has one waits until it is worked out, and with it what is done by hand; it acts after the list.
+        """As RosLink.set_parameters, in the order of what is done by hand. A change of mesh, tensor or integrator
+        isn't: a list that has one waits until it is worked out, and with it what is done by hand; it acts after the
+        list.
         """
         if not self.paused or not all(map(_is_ordered, changes)):
             self._link.set_parameters(changes, done)

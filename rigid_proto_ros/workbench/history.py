@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The last minutes of a flight: scrub back, branch off, and see where the old future went.
 
-The node's clock starts again at every reset, a rewind included. The history's own time, the *moment*, goes on over plain
-resets, and goes back with a rewind to where the new future begins: moment = the run's offset + simulated time.
+The node's clock starts again at every reset, a rewind included. The history's own time, the *moment*, goes on over
+plain resets, and goes back with a rewind to where the new future begins: moment = the run's offset + simulated time.
 """
 
 from __future__ import annotations
@@ -34,11 +34,14 @@ MAX_RUNS = 200
 """Resets within the window; more come from a program, not from a hand."""
 
 MAX_EVENTS = 50_000
-"""Of one run: 40 minutes of pulling at 20 targets a second, 20 MB. A longer run can be looked at, and branched from recorded
-states, but not computed anew."""
+"""Of one run: 40 minutes of pulling at 20 targets a second, 20 MB. A longer run can be looked at, and branched from
+recorded states, but not computed anew.
+"""
 
 MIN_SPACING_NS = 5_000_000
-"""States closer to each other than this are left out: eyes see no more, and a node at 1 kHz would fill the log in 40 s."""
+"""States closer to each other than this are left out: eyes see no more, and a node at 1 kHz would fill
+the log in 40 s.
+"""
 
 SCENE_GRACE_S = 0.1
 """Topics come one by one: a scene heard this soon after a reset [wall clock] is the one that the run began with."""
@@ -48,7 +51,7 @@ STALE_STATES = 20
 
 
 @dataclass(frozen=True)
-class Ghost:
+class LeftFuture:
     """A future that was left: moments (n,) [ns] and rows (n, 13) as published, from the branch on."""
 
     moments: np.ndarray
@@ -61,18 +64,11 @@ class Ghost:
         return self.rows[int(np.searchsorted(self.moments, moment_ns, side="right")) - 1]
 
 
-@dataclass(frozen=True)
-class Mark:
-    """An event of the log on the history's time, for a slider's ticks."""
-
-    moment_ns: int
-    kind: str
-
-
 @dataclass
 class _Run:
     """From a start or reset on. scene: as it began; scenes: those with another mesh since; events: (time_ns, line).
-    whole: none was dropped for their number. is_new: a reset began it, and nothing has happened in it yet, not even time.
+    whole: none was dropped for their number. is_new: a reset began it, and nothing has happened in it yet, not even
+    time.
     """
 
     offset_ns: int
@@ -101,6 +97,14 @@ class History:
         self._lock = threading.RLock()
         self._node_name = node_name
         self._attachments = attachments
+        self.forget()
+
+    def forget(self) -> None:
+        """As if nothing had been heard."""
+        with self._lock:
+            self._forget()
+
+    def _forget(self) -> None:
         self._states = StateLog(MAX_STATES)
         self._scene = ""
         self._runs: deque[_Run] = deque([_Run(0, "")], maxlen=MAX_RUNS)
@@ -110,7 +114,7 @@ class History:
         self._stale_left = 0
         self._restarted_by_state = False
         self._rewinding: Rewind | None = None
-        self._ghost: Ghost | None = None
+        self._ghost: LeftFuture | None = None
 
     # What is heard
 
@@ -138,7 +142,7 @@ class History:
                 run.whole = False
                 run.events.clear()
 
-    def state(self, time_ns: int, pose: Sequence[float], twist: Sequence[float]) -> None:
+    def state(self, time_ns: int, pose: np.ndarray, twist: np.ndarray) -> None:
         """A state as published at one stamp: pose x y z and xyzw, twist linear and angular, both in world axes."""
         with self._lock:
             if self._is_stale(time_ns):
@@ -153,7 +157,7 @@ class History:
             self._kept_stamp_ns = time_ns
             self._runs[-1].is_new &= time_ns == 0
             live_ns = self._runs[-1].offset_ns + time_ns
-            self._states.append(live_ns, [*pose, *twist])
+            self._states.append(live_ns, np.concatenate([pose, twist]))
             oldest_ns = live_ns - round(WINDOW_S * 1e9)
             self._states.drop_before(oldest_ns)
             while len(self._runs) > 1 and self._runs[1].offset_ns <= oldest_ns:
@@ -177,21 +181,8 @@ class History:
         with self._lock:
             return moment_ns - self._run_at(moment_ns).offset_ns
 
-    def marks(self) -> list[Mark]:
-        """What was done, within what can be looked at."""
-        with self._lock:
-            first_ns, _ = self.span
-            found = []
-            ends = [run.offset_ns for run in self._runs][1:] + [self._live_ns]
-            for run, end_ns in zip(self._runs, ends, strict=True):
-                for time_ns, line in run.events:
-                    moment_ns = run.offset_ns + time_ns
-                    if first_ns <= moment_ns <= end_ns:
-                        found.append(Mark(moment_ns, decode_event(line, 1)[1]))
-            return found
-
     @property
-    def ghost(self) -> Ghost | None:
+    def ghost(self) -> LeftFuture | None:
         """The future that the last rewind left."""
         with self._lock:
             return self._ghost
@@ -204,8 +195,8 @@ class History:
     def rewind(self, moment_ns: int) -> Rewind:
         """What the node must be told to go on from the last state at or before a moment, with another future.
 
-        Takes as long as computing the run anew up to there: call it where that may take a second. Raises InputError when
-        nothing was heard yet, or a mesh that flew then is gone.
+        Takes as long as computing the run anew up to there: call it where that may take a second. Raises InputError
+        when nothing was heard yet, or a mesh that flew then is gone.
         """
         with self._lock:
             row = self._states.at(moment_ns)
@@ -264,7 +255,7 @@ class History:
             offset_ns = rewinding.moment_ns
             future = self._states.cut_after(offset_ns)
             if len(future[0]):
-                self._ghost = Ghost(*future)
+                self._ghost = LeftFuture(*future)
         while len(self._runs) > 1 and (
             self._runs[-1].offset_ns > offset_ns or (self._runs[-1].offset_ns == offset_ns and self._runs[-1].untouched)
         ):

@@ -1,22 +1,38 @@
 # SPDX-License-Identifier: MIT
 """The page's keys, by viser's commands: each has a hotkey, and Ctrl-K lists them all.
 
-Browsers send no key that is typed into an input. "?" isn't among the hotkeys that viser 1.1 names, but its pages take any key by
-the name that browsers give it; H does the same where another version doesn't. test_workbench_screen.py presses both.
-Letters W A S D Q E move viser's camera and are left to it.
+Browsers send no key that is typed into an input. "?" isn't among the hotkeys that viser 1.1 names, but its pages take
+any key by the name that browsers give it; H does the same where another version doesn't. test_workbench_screen.py
+presses both. Letters W A S D Q E move viser's camera and are left to it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from .page import Page
+import viser
+
+from .look_back import LookBack
+from .node_control import NodeControl
+from .scene_view import SceneView
+from .situation import SituationControl
+from .status import Announcements
 
 BACK_S = 1.0
 """[s] That backspace goes back, each time it is pressed."""
+
+
+@dataclass(frozen=True)
+class Keyboard:
+    """What the keys act on."""
+
+    node: NodeControl
+    look_back: LookBack
+    situations: SituationControl
+    view: SceneView
+    announcements: Announcements
 
 
 @dataclass(frozen=True)
@@ -26,48 +42,48 @@ class Key:
     shown: str
     hotkey: str
     does: str
-    act: Callable[[Page], Awaitable[None]]
+    act: Callable[[Keyboard], Awaitable[None]]
     modifier: str | None = None
 
 
-async def _pause(page: Page) -> None:
-    if page.looking_at is not None:
-        await page.go_on_from_here()
+async def _pause(page: Keyboard) -> None:
+    if page.look_back.moment_ns is not None:
+        await page.situations.go_on_from_here()
     else:
-        page.pause(not page.paused)
+        page.node.pause(not page.node.paused)
 
 
-async def _step(page: Page) -> None:
-    if page.looking_at is not None:
-        page.look_by(-page.step_s)
-    elif page.paused:
-        page.call("step")
+async def _step(page: Keyboard) -> None:
+    if page.look_back.moment_ns is not None:
+        page.look_back.step(-1)
+    elif page.node.paused:
+        page.node.call("step")
     else:
-        page.pause(True)
+        page.node.pause(True)
 
 
-async def _back_a_step(page: Page) -> None:
-    page.look_by(page.step_s)
+async def _back_a_step(page: Keyboard) -> None:
+    page.look_back.step(1)
 
 
-async def _back(page: Page) -> None:
-    page.look_by(BACK_S)
+async def _back(page: Keyboard) -> None:
+    page.look_back.look_by(BACK_S)
 
 
-async def _now(page: Page) -> None:
-    page.resume_after_looking()
+async def _now(page: Keyboard) -> None:
+    page.look_back.resume()
 
 
-async def _reset(page: Page) -> None:
-    page.call("reset")
+async def _reset(page: Keyboard) -> None:
+    page.look_back.reset()
 
 
-async def _centre(page: Page) -> None:
-    page.centre()
+async def _centre(page: Keyboard) -> None:
+    page.view.centre()
 
 
-async def _list(page: Page) -> None:
-    page.say(key_list())
+async def _list(page: Keyboard) -> None:
+    page.announcements.say(key_list())
 
 
 KEYS = (
@@ -88,15 +104,15 @@ def key_list() -> str:
     return "; ".join(f"{key.shown}: {key.does}" for key in KEYS if key.hotkey != "H")
 
 
-def add_keys(page: Page) -> None:
+def add_keys(gui: viser.GuiApi, page: Keyboard) -> None:
     """Give all pages the keys."""
     for key in KEYS:
         hotkey: Any = key.hotkey
         modifier: Any = key.modifier
-        command = page.server.gui.add_command(
+        command = gui.add_command(
             f"{key.does[0].upper()}{key.does[1:]}", hotkey=hotkey, modifier=modifier, description=f"Key {key.shown}"
         )
 
         @command.on_trigger
-        async def _(event: Any, key: Key = key) -> None:
+        async def _(_: Any, key: Key = key) -> None:
             await key.act(page)

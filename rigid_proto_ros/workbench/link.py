@@ -3,8 +3,8 @@
 
     1.<base64url of raw deflate of JSON {"scene": {parameter: value}, "script": [entry, ...]}>
 
-JSON and not YAML inside: it has no references that unfold. What comes out is bounded in size, in depth and in the number of
-commands, and is refused where it names a file: a link opened here must neither read nor write here.
+JSON and not YAML inside: it has no references that unfold. What comes out is bounded in size, in depth and in the
+number of commands, and is refused where it names a file: a link opened here must neither read nor write here.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def _damaged(what: str) -> InputError:
     return InputError("link", f"the link is damaged ({what})")
 
 
-def _check(values: Mapping[str, object], entries) -> None:
+def _check(values: Mapping[str, object], entries: Any) -> None:
     """Whether a link may carry it: nothing but bundled meshes, no files, a script that can be read."""
     _check_parameters(values, "scene")
     expand_script(entries, "script", max_commands=MAX_COMMANDS)

@@ -26,7 +26,8 @@ def check_address(host: str, port: int) -> None:
 def choose_page_port(host: str, asked: int | None, default: int) -> int:
     """The port to serve on: ``asked`` if it is free, else the first free one from ``default`` on.
 
-    Raises InputError where the host isn't one to listen on, ``asked`` is given and taken, or no port near the default is free.
+    Raises InputError where the host isn't one to listen on, ``asked`` is given and taken, or no port near the default
+    is free.
     """
     if asked is not None:
         if not 1 <= asked <= 65535:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Arrows of L and ω at the COM: as long as the value, on a scale that is said and changes in steps where the value outgrows it."""
+"""Arrows of L and ω at the COM: as long as the value, on a scale that is said and changes in steps where
+the value outgrows it.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +15,26 @@ from ..rerun_view.plot_range import nice_step
 from .poke_mark import UNWRITTEN
 
 SHORTEST, USUAL, LONGEST = 0.57, 1.0, 1.05
-"""Arrow lengths in body sizes: outside the first and the last the scale changes, to one on which the arrow is at most the second
-long. The longest still lies within the picture, the shortest reaches out of most bodies."""
+"""Arrow lengths in body sizes: outside the first and the last the scale changes, to one on which the arrow is at most
+the second long. The longest still lies within the picture, the shortest reaches out of most bodies.
+"""
 
 STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 """Of a scale, times powers of ten."""
 
 MOMENTUM_SHARE = 0.95
-"""Length of L's arrows against these: it is thick, and where ω is parallel to L its thin arrow reaches out of it more often."""
+"""Length of L's arrows against these: it is thick, and where ω is parallel to L its thin arrow reaches
+out of it more often.
+"""
 
 LEAST_RATE = 1e-9
 """[rad/s] A body slower than this is at rest, and what is left of ω and L has no meaning."""
 
 
 class ArrowScale:
-    """Value per round length of one kind of arrow: one of STEPS times a power of ten, kept while arrows aren't too long or short."""
+    """Value per round length of one kind of arrow: one of STEPS times a power of ten, kept while arrows
+    aren't too long or short.
+    """
 
     def __init__(self, share: float) -> None:
         self._share = share
@@ -54,8 +61,9 @@ class MotionArrow:
         self._label = scene.add_label(f"/{name}_label", UNWRITTEN, visible=False, anchor=anchor)
 
     def show(self, at: np.ndarray, vector: np.ndarray, size_m: float, unit_m: float, shown: bool) -> str:
-        """From ``at`` (3,) along ``vector`` (3,), for a body of this size [m], the picture's unit being ``unit_m`` [m]; returns the
-        scale as text, empty while nothing is drawn."""
+        """From ``at`` (3,) along ``vector`` (3,), for a body of this size [m], the picture's unit being ``unit_m`` [m];
+        returns the scale as text, empty while nothing is drawn.
+        """
         value = float(np.linalg.norm(vector))
         shown = shown and 0.0 < value < math.inf and size_m > 0.0
         if shown:
@@ -89,7 +97,9 @@ class MotionArrows:
         unit_m: float,
         shown: tuple[bool, bool],
     ) -> dict[str, str]:
-        """L (3,) [kg m²/s] and ω (3,) [rad/s] in world axes at the drawn COM; shown: which of the two. Returns their scales."""
+        """L (3,) [kg m²/s] and ω (3,) [rad/s] in world axes at the drawn COM; shown: which of the two.
+        Returns their scales.
+        """
         turns = float(np.linalg.norm(omega)) > LEAST_RATE
         texts = {
             "arrow of L": self._momentum.show(at, momentum, size_m, unit_m, shown[0] and turns),

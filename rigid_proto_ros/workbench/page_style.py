@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """How the page is laid out on a narrow screen: the picture above, below it and not over it readouts and controls.
 
-viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a long way
-down; it has no setting for either. A style sheet can
-change it, and viser passes HTML of its server's on to the page, style sheets included. The rules recognise the elements by
-the styles that viser 1.1 gives them; test_workbench_screen.py fails where another version gives others.
+viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a
+long way down; it has no setting for either. A style sheet can change it, and viser passes HTML of its server's on to
+the page, style sheets included. The rules recognise the elements by the styles that viser 1.1 gives them;
+test_workbench_screen.py fails where another version gives others.
 """
 
 from __future__ import annotations

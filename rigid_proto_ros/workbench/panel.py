@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import viser
 
 from ..motion.integrators import INTEGRATORS
 from .controls import TYPING_S, Controls, log_slider, on_slider, read_numbers
-from .pointer import POKE, PUSH
-
-if TYPE_CHECKING:
-    from .page import Page
+from .look_back import LookBack
+from .node_control import NodeControl
+from .pointer import POKE, PUSH, Tools
+from .situation import SituationControl
+from .status import Announcements
 
 SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
 """Simulated seconds per second, as the panel names them."""
@@ -37,10 +40,24 @@ Drag beside it: turn the view; right button: move it; wheel or two fingers: clos
 class Panel:
     """Play and physics: the tabs that need nothing but parameters, services and the pointer's tools."""
 
-    def __init__(self, page: Page, controls: Controls, tabs) -> None:
-        self._page = page
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tabs: viser.GuiTabGroupHandle,
+        controls: Controls,
+        tools: Tools,
+        node: NodeControl,
+        look_back: LookBack,
+        situations: SituationControl,
+        announcements: Announcements,
+    ) -> None:
+        self._gui = gui
         self._controls = controls
-        self._gui = page.server.gui
+        self._tools = tools
+        self._node = node
+        self._look_back = look_back
+        self._situations = situations
+        self._announcements = announcements
         self.play_tab = tabs.add_tab("Play")
         with self.play_tab:
             self._gui.add_markdown(HELP, order=-2.0)
@@ -59,8 +76,8 @@ class Panel:
 
     def show_force(self) -> None:
         """The poke's force, as it is now, in all its inputs."""
-        force = self._page.tools.force
-        times = force / self._page.usual_force
+        force = self._tools.force
+        times = force / self._tools.usual_force
         for box, text in ((self._force, f"{force:.4g}"), (self._times, f"{times:.4g}")):
             # "2." means what is in force, so it may stay as it is typed.
             if read_numbers(box.value, 1) != read_numbers(text, 1):
@@ -72,7 +89,7 @@ class Panel:
     # Play
 
     def _time_folder(self) -> None:
-        gui, page = self._gui, self._page
+        gui, node, look_back = self._gui, self._node, self._look_back
         with gui.add_folder("Time"):
             buttons = gui.add_button_group("Simulation", (PAUSE, GO_ON, STEP, RESET), hint="~/pause, ~/step, ~/reset")
             self._running = gui.add_markdown("")
@@ -81,18 +98,20 @@ class Panel:
             )
 
         @buttons.on_click
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             pressed = buttons.value
-            if page.looking_at is not None and pressed == GO_ON:
-                await page.go_on_from_here()
-            elif page.looking_at is not None and pressed == STEP:
-                page.look_by(-page.step_s)
+            if look_back.moment_ns is not None and pressed == GO_ON:
+                await self._situations.go_on_from_here()
+            elif look_back.moment_ns is not None and pressed == STEP:
+                look_back.step(-1)
             elif pressed in (PAUSE, GO_ON):
-                page.pause(pressed == PAUSE)
+                node.pause(pressed == PAUSE)
+            elif pressed == RESET:
+                look_back.reset()
             else:
-                page.call(pressed.lower())
+                node.call("step")
 
-        def shown(values):
+        def shown(values: Mapping[str, Any]) -> str:
             return next((name for name, factor in SPEEDS.items() if factor == values["real_time_factor"]), speed.value)
 
         self._controls.bind(speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
@@ -105,33 +124,36 @@ class Panel:
             self._controls.vector("initial.linear_velocity", "Initial velocity [m/s]", 3)
 
     def _poke_folder(self) -> None:
-        gui, tools = self._gui, self._page.tools
+        gui, tools = self._gui, self._tools
         with gui.add_folder("Poke (click)"):
             click = gui.add_dropdown(
                 "Click", (POKE, PUSH), initial_value=POKE, hint="Shift-click does the other; for pages without shift"
             )
-            self._force = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
+            self._force: Any = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
             suits = "Factor on a force that suits the body"
-            self._times = times = gui.add_text("Force ×", "1", hint=suits)
-            self._slider = slider = log_slider(gui, FORCE_DECADES, suits)
+            times: Any = gui.add_text("Force ×", "1", hint=suits)
+            slider: Any = log_slider(gui, FORCE_DECADES, suits)
+            self._times, self._slider = times, slider
             self._controls.number("poke_duration", "Duration [s]")
 
         @click.on_update
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             tools.click = click.value
 
         def take(force: float) -> None:
             tools.force = float(f"{force:.9g}")
             self.show_force()
 
-        def typed(box, unit: Callable[[], float]) -> None:
+        def typed(box: viser.GuiInputHandle[Any], unit: Callable[[], float]) -> None:
             def complain(text: str) -> None:
                 if box.value == text:  # else somebody is still typing
-                    self._page.say(f"{box.label}: got {text[:40]!r}; accepted: a number, up to {STRONGEST:g} N")
+                    self._announcements.say(
+                        f"{box.label}: got {text[:40]!r}; accepted: a number, up to {STRONGEST:g} N"
+                    )
                     self.show_force()
 
             @box.on_update
-            async def _(event) -> None:
+            async def _(event: viser.GuiEvent[Any]) -> None:
                 if event.client is None:
                     return
                 numbers = read_numbers(box.value, 1)
@@ -141,15 +163,15 @@ class Panel:
                     asyncio.get_running_loop().call_later(TYPING_S, complain, box.value)
 
         typed(self._force, lambda: 1.0)
-        typed(times, lambda: self._page.usual_force)
+        typed(times, lambda: tools.usual_force)
 
         @slider.on_update
-        async def _(event) -> None:
+        async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                take(float(f"{self._page.usual_force * 10.0 ** slider.value[0]:.3g}"))
+                take(float(f"{tools.usual_force * 10.0 ** slider.value[0]:.3g}"))
 
     def _string_folder(self) -> None:
-        gui, tools, controls = self._gui, self._page.tools, self._controls
+        gui, tools, controls = self._gui, self._tools, self._controls
         with gui.add_folder("String (drag)"):
             at = gui.add_dropdown(
                 "Pull at", (GRABBED, COM), initial_value=GRABBED, hint="Where the string is tied when you drag"
@@ -175,16 +197,16 @@ class Panel:
 
         def take() -> None:
             tools.frequency = float(strength.value) if scaled.value else 0.0
-            self._page.set({"string.frequency": tools.frequency})
+            self._node.set({"string.frequency": tools.frequency})
 
         @at.on_update
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             tools.at_com = at.value == COM
 
         for handle in (strength, scaled):
 
             @handle.on_update
-            async def _(event) -> None:
+            async def _(event: viser.GuiEvent[Any]) -> None:
                 if event.client is not None:
                     take()
 
@@ -205,6 +227,6 @@ class Panel:
             controls.choice("ghost.integrator", "Its integrator")
 
         @gravity.on_click
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             down = {"off": [0.0, 0.0, 0.0], "Earth's": EARTH, "Moon's": [0.0, 0.0, -1.62]}
-            self._page.set({"gravity": down[gravity.value]})
+            self._node.set({"gravity": down[gravity.value]})

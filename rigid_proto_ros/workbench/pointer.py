@@ -5,48 +5,52 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
+import viser
 
 from ..scene.command_codec import MESH_FRAME, ScriptCommand
 from ..scene.scenario import Scenario
 from .hand_commands import HandCommands
+from .scene_loader import SceneLoader
 from .sighting import DrawnPose, Sightings
 
 HOLD_S = 0.2
-"""A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that is
-short."""
+"""A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that
+is short.
+"""
 
 SAME_TICK_S = 0.03
-"""Messages this far apart aren't taken in the same tick, where single ones act by kind: a release would act before the target
-sent last, and that would tie the string again. While time stands still they go as one list."""
+"""Messages this far apart aren't taken in the same tick, where single ones act by kind: a release would act before the
+target sent last, and that would tie the string again. While time stands still they go as one list.
+"""
 
 POKE_TRAVEL = 0.3
 """Body sizes a second: what the suggested poke gives the body."""
+
+MODIFIERS: tuple[Any, ...] = (None, "shift")
+"""With which keys a click is heard, as viser names them."""
 
 POKE, PUSH = "Poke along the view", "Push inward"
 
 
 @dataclass
 class Tools:
-    """What the panel says about the pointer. force [N]; click: POKE or PUSH, for pages without a shift key.
+    """What the panel says about the pointer. force [N], usual_force: one that suits the body; click: POKE or PUSH, for
+    pages without a shift key.
 
-    at_com: the string pulls at the centre of mass and not at the grabbed point. frequency [rad/s]: how hard, scaled by the
-    effective mass; 0 leaves the node's stiffness.
+    at_com: the string pulls at the centre of mass and not at the grabbed point. frequency [rad/s]: how hard, scaled by
+    the effective mass; 0 leaves the node's stiffness.
     """
 
     force: float = 1.0
+    usual_force: float = 1.0
     click: str = POKE
     at_com: bool = False
     frequency: float = 8.0
-
-
-class Flown(Protocol):
-    """What the pointer needs to know of the body in flight."""
-
-    scenario: Scenario | None
 
 
 @dataclass
@@ -61,9 +65,9 @@ class _Drag:
 class Pointer:
     """Turns pointer events of any page into commands. One string, so one drag at a time: the first page has it."""
 
-    def __init__(self, hand: HandCommands, flown: Flown, sightings: Sightings, tools: Tools) -> None:
+    def __init__(self, hand: HandCommands, scenes: SceneLoader, sightings: Sightings, tools: Tools) -> None:
         self._hand = hand
-        self._flown = flown
+        self._scenes = scenes
         self._sightings = sightings
         self._tools = tools
         self._drag: _Drag | None = None
@@ -74,44 +78,47 @@ class Pointer:
         """Whether somebody holds the string."""
         return self._drag is not None and not self._drag.ended
 
-    def attach(self, node) -> None:
+    def attach(self, node: Any) -> None:
         """React to the pointer on this node of the picture."""
-        for modifier in (None, "shift"):
+        for modifier in MODIFIERS:
             node.on_click(modifier=modifier)(self._on_click)
         node.on_drag("left")(self._on_drag)
 
-    def attach_com(self, node) -> None:
+    def attach_com(self, node: Any) -> None:
         """The same for the mark of the centre of mass, which can lie where there is no body: a click acts there."""
 
-        async def clicked(event) -> None:
-            self.click_com(event.ray_direction)
+        async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
+            if event.ray_direction is not None:
+                self.click_com(event.ray_direction)
 
-        for modifier in (None, "shift"):
+        for modifier in MODIFIERS:
             node.on_click(modifier=modifier)(clicked)
 
     def knot_moved(self) -> None:
-        """Somebody published ~/string/attach: the parameter ``string.attach`` doesn't say any more where the knot is."""
+        """Somebody published ~/string/attach: the parameter ``string.attach`` doesn't say any more where
+        the knot is.
+        """
         self._knot_by_message = True
 
     # Click
 
-    async def _on_click(self, event) -> None:
-        scenario, seen = self._flown.scenario, self._sightings.usual(time.monotonic())
-        if scenario is None or seen is None:
-            return
-        push = (event.modifier == "shift") != (self._tools.click == PUSH)
-        self.click(event.ray_origin, event.ray_direction, seen, push)
+    async def _on_click(self, event: viser.SceneNodePointerEvent[Any]) -> None:
+        seen = self._sightings.usual(time.monotonic())
+        if seen is not None and event.ray_origin is not None and event.ray_direction is not None:
+            push = (event.modifier == "shift") != (self._tools.click == PUSH)
+            self.click(event.ray_origin, event.ray_direction, seen, push)
 
-    def click(self, ray_origin, ray_direction, seen: DrawnPose, push: bool) -> bool:
+    def click(self, ray_origin: Iterable[float], ray_direction: Iterable[float], seen: DrawnPose, push: bool) -> bool:
         """Poke where the ray of the picture meets the body as it was ``seen``; whether it meets it."""
-        scenario = self._flown.scenario
+        scenario = self._scenes.scenario
+        if scenario is None:
+            return False
         body, surface = scenario.setup.body, scenario.setup.surface
-        direction = np.asarray(ray_direction, dtype=float)
-        direction = direction / np.linalg.norm(direction)
+        direction = _unit(ray_direction)
         if surface is None:
             self._poke("world@com", self._tools.force * direction)
             return True
-        origin = body.mesh_point(seen.body_point(ray_origin))
+        origin = body.mesh_point(_three(seen.body_point(ray_origin)))
         hit = surface.ray_hit(origin, seen.body_direction(direction) / body.scale)
         if hit is None:
             return False
@@ -122,17 +129,16 @@ class Pointer:
             self._poke(f"world@{point}", self._tools.force * direction)
         return True
 
-    def click_com(self, ray_direction) -> None:
+    def click_com(self, ray_direction: Iterable[float]) -> None:
         """Poke at the centre of mass, along the view."""
-        direction = np.asarray(ray_direction, dtype=float)
-        self._poke("world@com", self._tools.force * direction / np.linalg.norm(direction))
+        self._poke("world@com", self._tools.force * _unit(ray_direction))
 
-    def _poke(self, frame_id: str, force) -> None:
-        self._hand.do(ScriptCommand(0, "poke", frame_id, tuple(float(f) for f in force)))
+    def _poke(self, frame_id: str, force: Iterable[float]) -> None:
+        self._hand.do(ScriptCommand(0, "poke", frame_id, _three(force)))
 
     # Drag
 
-    async def _on_drag(self, event) -> None:
+    async def _on_drag(self, event: viser.SceneNodeDragEvent[Any]) -> None:
         if event.phase == "start":
             self.grab(event.client_id, event.start_position, event.end_position)
         elif self._drag is not None and event.client_id == self._drag.client_id:
@@ -141,9 +147,9 @@ class Pointer:
             else:
                 self.let_go()
 
-    def grab(self, client_id: int, start, end) -> None:
+    def grab(self, client_id: int, start: Iterable[float], end: Iterable[float]) -> None:
         """Tie the string where the body was grabbed, and take its free end to the pointer."""
-        scenario = self._flown.scenario
+        scenario = self._scenes.scenario
         if scenario is None or self.dragging:
             return
         body, surface = scenario.setup.body, scenario.setup.surface
@@ -151,21 +157,21 @@ class Pointer:
         seen = self._sightings.of_point(start, now, surface, body)
         if seen is None:
             return
-        commands = []
+        commands: list[ScriptCommand] = []
         frequency = self._tools.frequency
-        if frequency > 0.0 and scenario.parameters.string.frequency != frequency:
+        if frequency > 0.0 and scenario.values["string.frequency"] != frequency:
             commands.append(_set("string.frequency", frequency))
         if self._tools.at_com or surface is None:
             aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
-            commands += self._tie_to(body.mesh_point(np.zeros(3)), aside)
+            commands += self._tie_to(body.mesh_point((0.0, 0.0, 0.0)), aside)
         else:
-            point = body.mesh_point(seen.body_point(start))
+            point = body.mesh_point(_three(seen.body_point(start)))
             commands.append(ScriptCommand(0, "string_attach", MESH_FRAME, point=_three(point)))
             self._knot_by_message = True
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
-        self._hand.do(*commands, self._target())
+        self._hand.do(*commands, _target(self._drag))
 
-    def _tie_to(self, point, aside) -> list[ScriptCommand]:
+    def _tie_to(self, point: np.ndarray, aside: np.ndarray) -> list[ScriptCommand]:
         """The knot at a point that isn't on the surface: only the parameter can say so."""
         if not self._knot_by_message:
             return [_set("string.attach", list(_three(point)))]
@@ -173,38 +179,34 @@ class Pointer:
         self._knot_by_message = False
         return [_set("string.attach", list(_three(knot))) for knot in (point + aside, point)]
 
-    def pull(self, end) -> None:
+    def pull(self, end: Iterable[float]) -> None:
         """Move the string's free end."""
-        if self.dragging:
-            self._drag.target = self._drag.view.world_point(end)
-            self._send_target()
+        drag = self._drag
+        if drag is not None and not drag.ended:
+            drag.target = drag.view.world_point(end)
+            self._hand.do(_target(drag))
 
     def hold(self) -> None:
         """To be called often: a hand that doesn't move goes on holding."""
-        if self.dragging and not self._hand.paused:
-            timeout_s = self._flown.scenario.parameters.string.timeout
-            hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
-            if time.monotonic() >= self._drag.last_target_s + hold_s:
-                self._send_target()
-
-    def _send_target(self) -> None:
-        if self.dragging:
-            self._hand.do(self._target())
-
-    def _target(self) -> ScriptCommand:
-        self._drag.last_target_s = time.monotonic()
-        return ScriptCommand(0, "string_target", "world", point=_three(self._drag.target))
+        drag, scenario = self._drag, self._scenes.scenario
+        if drag is None or drag.ended or scenario is None or self._hand.paused:
+            return
+        timeout_s = float(scenario.values["string.timeout"])
+        hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
+        if time.monotonic() >= drag.last_target_s + hold_s:
+            self._hand.do(_target(drag))
 
     def let_go(self) -> None:
-        """Release the string, once the last target is taken."""
-        if self.dragging:
-            drag = self._drag
-            drag.ended = True
-            if self._hand.paused:
-                self._release(drag)
-                return
-            wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
-            asyncio.get_running_loop().call_later(wait_s, self._release, drag)
+        """Release the string."""
+        drag = self._drag
+        if drag is None or drag.ended:
+            return
+        drag.ended = True
+        if self._hand.paused:
+            self._release(drag)
+            return
+        wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
+        asyncio.get_running_loop().call_later(wait_s, self._release, drag)
 
     def _release(self, drag: _Drag) -> None:
         self._hand.do(ScriptCommand(0, "string_release"))
@@ -212,16 +214,26 @@ class Pointer:
             self._drag = None
 
 
+def _target(drag: _Drag) -> ScriptCommand:
+    drag.last_target_s = time.monotonic()
+    return ScriptCommand(0, "string_target", "world", point=_three(drag.target))
+
+
+def _unit(direction: Iterable[float]) -> np.ndarray:
+    vector = np.array(list(direction), dtype=float)
+    return vector / np.linalg.norm(vector)
+
+
 def _set(name: str, value: object) -> ScriptCommand:
     return ScriptCommand(0, "set", changes={name: value})
 
 
-def _three(point) -> tuple[float, float, float]:
+def _three(point: Iterable[float]) -> tuple[float, float, float]:
     x, y, z = (float(coordinate) for coordinate in point)
     return x, y, z
 
 
 def suggested_force(scenario: Scenario, size: float) -> float:
     """A poke [N] that gives the body a part of its size a second: two digits are enough."""
-    duration_s = scenario.parameters.poke_duration
+    duration_s = float(scenario.values["poke_duration"])
     return float(f"{POKE_TRAVEL * size * scenario.setup.body.mass / duration_s:.2g}")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Where the last poke hit and how hard: a ring that widens and fades, and a label. A poke along the view is an arrow seen end-on."""
+"""Where the last poke hit and how hard: a ring that widens and fades, and a label. A poke along the view
+is an arrow seen end-on.
+"""
 
 from __future__ import annotations
 
@@ -23,13 +25,15 @@ ABOVE = 0.06
 SIDES = 40
 
 UNWRITTEN = "-"
-"""A label's text before it is first shown: one that is empty as it is made stays empty in viser 1.1, whatever it is given."""
+"""A label's text before it is first shown: one that is empty as it is made stays empty in viser 1.1,
+whatever it is given.
+"""
 
 
 class PokeMark:
     """One ring and one label in the picture. Lengths are in the picture's units."""
 
-    def __init__(self, scene, colour: tuple[int, int, int]) -> None:
+    def __init__(self, scene: Any, colour: tuple[int, int, int]) -> None:
         vertices, triangles = annulus()
         self._ring: Any = scene.add_mesh_simple(
             "/poke/ring", vertices, triangles, color=colour, side="double", opacity=1.0, visible=False
@@ -37,8 +41,9 @@ class PokeMark:
         self._label: Any = scene.add_label("/poke/label", UNWRITTEN, visible=False, anchor="bottom-center")
 
     def show(self, point: np.ndarray, direction: np.ndarray, text: str, age: float, size: float) -> None:
-        """At ``point`` (3,), lying across the force's unit ``direction`` (3,). age: 0 when it hit, 1 when it is forgotten.
-        size: of the body."""
+        """At ``point`` (3,), lying across the force's unit ``direction`` (3,). age: 0 when it hit, 1 when it is
+        forgotten. size: of the body.
+        """
         self._ring.position = point - LIFTED * size * direction
         self._ring.wxyz = from_z_to(direction)
         self._ring.scale = size * (1.0 + WIDENS * age)

@@ -30,9 +30,9 @@ from ..rerun_view.appearance import (
     TOTAL_ENERGY_SERIES,
     css,
 )
+from ..rerun_view.derived import angle_to
 from ..rerun_view.plot_range import AXIS_PIXELS, PlotRange, plot_range
 from ..scene.scenario import Scenario
-from .readouts import angle_between
 
 PLOTTED_S = 20.0
 """[s, simulated] Length of the plots."""
@@ -61,7 +61,9 @@ def table(rows: Iterable[tuple[str, str]]) -> str:
 
 
 class Plot:
-    """One small plot of values over the simulated time. series: name and colour of each; least: as ``plot_range`` takes it."""
+    """One small plot of values over the simulated time. series: name and colour of each; least: as
+    ``plot_range`` takes it.
+    """
 
     def __init__(
         self,
@@ -147,8 +149,8 @@ class ReadoutPanel:
         scales: Mapping[str, str],
         ghost_angle: float | None,
     ) -> None:
-        """Take a state; draw where that is due. scales: of the picture's arrows, by their names. ghost_angle [rad] between body and
-        ghost, None without one.
+        """Take a state; draw where that is due. scales: of the picture's arrows, by their names. ghost_angle [rad]
+        between body and ghost, None without one.
         """
         if now_s < self._sample_due_s and now_s < self._numbers_due_s:
             return
@@ -157,7 +159,7 @@ class ReadoutPanel:
         length = float(np.linalg.norm(momentum))
         if self._start is None and length > 0.0:
             self._start = momentum
-        angle = 0.0 if self._start is None else float(np.degrees(angle_between(momentum, self._start)))
+        angle = 0.0 if self._start is None else float(np.degrees(angle_to(self._start, momentum[np.newaxis])[0]))
         w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
         kinetic = state.kinetic_energy(body.mass, body.inertia)
         translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)

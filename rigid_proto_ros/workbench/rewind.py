@@ -44,13 +44,13 @@ KEPT_BY_REWIND = KEPT | {"ghost.inertia_model", "ghost.integrator"}
 class Rewind:
     """A moment to go on from, and all that the node must be told for it.
 
-    While paused: set ``changes`` atomically, call ``~/reset``, tell the history ``rewinding``, publish each of ``commands``
-    on its topic with its ``t_ns`` as the stamp, wait until ``commands_received`` covers them, resume. Where the node refuses
-    the changes because of what acts now, reset once before.
+    While paused: set ``changes`` atomically, call ``~/reset``, tell the history ``rewinding``, publish each of
+    ``commands`` on its topic with its ``t_ns`` as the stamp, wait until ``commands_received`` covers them, resume.
+    Where the node refuses the changes because of what acts now, reset once before.
 
     moment_ns on the history's time, time_ns on the node's clock of that run. row (13,): the state there, as published.
-    scene, script: the same as texts, for files and links. notes: what differs from what was. exact: computed anew from the
-    events to the bit; else taken from the recorded state.
+    scene, script: the same as texts, for files and links. notes: what differs from what was. exact: computed anew from
+    the events to the bit; else taken from the recorded state.
     """
 
     moment_ns: int
@@ -65,14 +65,16 @@ class Rewind:
 
 
 def core_row(row: np.ndarray) -> np.ndarray:
-    """A published state (13,) in the order of ``simulation/observer.py``'s ``STATE_FIELDS``: the angular velocity in body axes."""
+    """A published state (13,) in the order of ``simulation/observer.py``'s ``STATE_FIELDS``: the angular
+    velocity in body axes.
+    """
     values = row.tolist()
     return np.array([*values[:10], *rotate_inverse(*values[3:7], *values[10:13])])
 
 
 def make_rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole: bool, present: str) -> Rewind:
-    """The rewind to the end of a session, ``row`` (13,) being the state published there; whole: the session has all of its events.
-    present: the scene as it is now. Raises MeshError when the mesh that flew then is gone.
+    """The rewind to the end of a session, ``row`` (13,) being the state published there; whole: the session has all of
+    its events. present: the scene as it is now. Raises MeshError when the mesh that flew then is gone.
     """
     time_ns = session.end_ns
     reason = "more events happened than are kept"
@@ -115,7 +117,9 @@ def _start(values: Mapping[str, Any]) -> np.ndarray:
 
 
 def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, object]:
-    """Parameters in force at the session's end, as far as its events say, with the recorded state as the initial one."""
+    """Parameters in force at the session's end, as far as its events say, with the recorded state as the
+    initial one.
+    """
     values = dict(read_scene_text(session.scene).values)
     for number, line in enumerate(session.lines, 1):
         _, kind, content = decode_event(line, number)
@@ -127,9 +131,7 @@ def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, obj
     return {**values, **{name: numbers[i:j] for name, (i, j) in zip(_START, cuts, strict=True)}}
 
 
-def changes_to(
-    values: Mapping[str, object], present: Mapping[str, object], kept: frozenset[str] = KEPT
-) -> dict[str, object]:
+def changes_to(values: Mapping[str, Any], present: Mapping[str, Any], kept: frozenset[str] = KEPT) -> dict[str, object]:
     """What takes a node from its present parameters to those of a moment or a scene, to be set in one call.
 
     What can't change in flight and what is ``kept`` is left out; a ballast that isn't there yet weighs

@@ -2,7 +2,8 @@
 """The page's side of ROS: what it publishes and calls, and what it hears while a page is open.
 
 Services and latched topics come on the executor's thread and are handed to ``deliver``. States and event lines aren't
-given to the executor: the page takes them itself, all that have come since the last look, as the node takes its commands.
+given to the executor: the page takes them itself, all that have come since the last look, as the node takes its
+commands.
 """
 
 from __future__ import annotations
@@ -11,15 +12,19 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped, WrenchStamped
 from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
@@ -32,6 +37,11 @@ from ..ros.command_queue import Unserved
 from ..ros.parameter_server import ros_parameter
 from ..scene.parameters import parameter_named
 
+Answered = Callable[[bool, str], None]
+"""Told whether a call succeeded, and its message."""
+
+ZERO = (0.0, 0.0, 0.0)
+
 _TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
 
 LAST_WORD_S = 1.0
@@ -40,8 +50,8 @@ LAST_WORD_S = 1.0
 
 @dataclass(frozen=True)
 class Heard:
-    """states: (time_ns, pose and twist) pairs in order, each (13,): position, attitude xyzw, velocity of the COM, angular
-    velocity, all in world axes. events: lines of the event log in order.
+    """states: (time_ns, pose and twist) pairs in order, each (13,): position, attitude xyzw, velocity of the COM,
+    angular velocity, all in world axes. events: lines of the event log in order.
     """
 
     states: list[tuple[int, np.ndarray]] = field(default_factory=list)
@@ -78,8 +88,8 @@ class RosLink:
         self._services["pause"] = self.node.create_client(SetBool, f"{self.target}/pause")
         self._set = self.node.create_client(SetParametersAtomically, f"{self.target}/set_parameters_atomically")
         self._by_hand = Unserved()
-        self._taken: dict[str, object] = {}
-        self._served: list = []
+        self._taken: dict[str, Subscription] = {}
+        self._served: list[Subscription] = []
         self._poses: dict[int, PoseStamped] = {}
         self._last_call: Future | None = None
         self._executor = SingleThreadedExecutor()
@@ -88,8 +98,9 @@ class RosLink:
         self._thread.start()
 
     def wait_for_node(self, patience_s: float, given_up: Callable[[], bool] = lambda: False) -> None:
-        """Wait until the node is there, or ``given_up``. Raises InputError, with the names of those that are, when it doesn't
-        come."""
+        """Wait until the node is there, or ``given_up``. Raises InputError, with the names of those that are, when it
+        doesn't come.
+        """
         deadline = time.monotonic() + patience_s
         while not self._set.service_is_ready() and not given_up():
             if time.monotonic() > deadline:
@@ -129,10 +140,16 @@ class RosLink:
         if self._taken:
             return
 
-        def subscribe(message_type, name, callback, profile, group=None):
+        def subscribe(
+            message_type: type,
+            name: str,
+            callback: Callable[[Any], None],
+            profile: QoSProfile | int,
+            group: CallbackGroup | None = None,
+        ) -> Subscription:
             return self.node.create_subscription(message_type, name, callback, profile, callback_group=group)
 
-        def by_hand(message_type, topic, profile):
+        def by_hand(message_type: type, topic: str, profile: QoSProfile) -> Subscription:
             return subscribe(message_type, f"{self.target}/{topic}", lambda _: None, profile, self._by_hand)
 
         self._served = [
@@ -181,11 +198,11 @@ class RosLink:
 
     # Saying
 
-    def wrench(self, topic: str, frame_id: str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0)) -> None:
+    def wrench(self, topic: str, frame_id: str, force: Sequence[float] = ZERO, torque: Sequence[float] = ZERO) -> None:
         """Publish on ``poke`` or ``wrench``: it acts as soon as the node takes it."""
         self._publishers[topic].publish(cdr.wrench_stamped(0, frame_id, force, torque))
 
-    def point(self, topic: str, frame_id: str, point) -> None:
+    def point(self, topic: str, frame_id: str, point: Iterable[float]) -> None:
         """Publish on ``string/target`` or ``string/attach``."""
         self._publishers[topic].publish(cdr.stamped_doubles(0, frame_id, tuple(float(x) for x in point)))
 
@@ -197,7 +214,7 @@ class RosLink:
         """Publish a message as its bytes."""
         self._publishers[topic].publish(data)
 
-    def call(self, service: str, data: bool | None = None, done: Callable[[bool, str], None] | None = None) -> None:
+    def call(self, service: str, data: bool | None = None, done: Answered | None = None) -> None:
         """Call one of the node's services; done(success, message) comes on the page's thread."""
         client = self._services[service]
         if not client.service_is_ready():
@@ -209,7 +226,7 @@ class RosLink:
             lambda future: self._answer(done, future.result().success, future.result().message)
         )
 
-    def set_parameters(self, changes: dict[str, object], done: Callable[[bool, str], None] | None = None) -> None:
+    def set_parameters(self, changes: dict[str, object], done: Answered | None = None) -> None:
         """Set parameters all at once, or none; done(success, reason) comes on the page's thread."""
         try:
             parameters = [ros_parameter(parameter_named(n), parameter_named(n).convert(v)) for n, v in changes.items()]
@@ -224,7 +241,7 @@ class RosLink:
             lambda future: self._answer(done, future.result().result.successful, future.result().result.reason)
         )
 
-    def _answer(self, done: Callable[[bool, str], None] | None, success: bool, message: str) -> None:
+    def _answer(self, done: Answered | None, success: bool, message: str) -> None:
         if done is not None:
             self._deliver(done, success, message)
 
@@ -247,8 +264,8 @@ def flying_nodes(topics: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     return sorted(base for base in bases if all(f"{base}/{topic}" in names for topic in own))
 
 
-def _drain(subscription, message_type) -> list:
-    messages = []
+def _drain(subscription: Subscription, message_type: type) -> list[Any]:
+    messages: list[Any] = []
     with subscription.handle:
         while True:
             taken = subscription.handle.take_message(message_type, False)
@@ -257,9 +274,9 @@ def _drain(subscription, message_type) -> list:
             messages.append(taken[0])
 
 
-def _stamp_ns(message) -> int:
+def _stamp_ns(message: PoseStamped | TwistStamped) -> int:
     stamp = message.header.stamp
-    return stamp.sec * 1_000_000_000 + stamp.nanosec
+    return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
 
 
 def _row(pose: PoseStamped, twist: TwistStamped) -> np.ndarray:

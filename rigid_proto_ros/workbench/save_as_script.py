@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """What was done by hand as a scene and a poke script that give the same motion again, bit for bit.
 
-The events of a run say all that acted on the body, and when. The run is computed anew, and each event becomes a script entry
-as it acts. Entries of one time act in the order in which the script lists them, so what was done in one instant acts again as it
-did.
+The events of a run say all that acted on the body, and when. The run is computed anew, and each event becomes a script
+entry as it acts. Entries of one time act in the order in which the script lists them, so what was done in one instant
+acts again as it did.
 """
 
 from __future__ import annotations
@@ -94,14 +94,14 @@ class _Writer(Observer):
         self.lines: list[str] = []
         self.entries: list[dict] = []
         self._last = scenario
-        self._again: Resimulation | None = None
-        self._applied: tuple[WrenchCommand, Load, Body] | None = None
+        self._again: Resimulation
+        self._applied: tuple[WrenchCommand, Load, Body]
 
     def follow(self, again: Resimulation) -> None:
-        """The simulation that this writes of."""
+        """The simulation that this writes of: to be called before anything acts in it."""
         self._again = again
 
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:  # noqa: ARG002
         """A wrench or poke takes effect; its line follows."""
         self._applied = command, load, body
 

@@ -31,7 +31,8 @@ class SceneLoader:
         self._refused = refused
         self._newest = self._loaded = ""
         self._ahead: Scenario | None = None
-        self._loading: asyncio.Task | None = None
+        self._loading: asyncio.Task[None] | None = None
+        self._known = asyncio.Event()
 
     @property
     def busy(self) -> bool:
@@ -45,8 +46,8 @@ class SceneLoader:
             self._loading = self._loop.create_task(self._load())
 
     def string_changed(self, changes: Mapping[str, object]) -> None:
-        """Take on parameters of the string as their event says them, before their text comes: what is tied next, in the same
-        instant, is settled by them.
+        """Take on parameters of the string as their event says them, before their text comes: what is tied next, in the
+        same instant, is settled by them.
         """
         present = self.scenario
         if present is None or not all(name.startswith("string.") for name in changes):
@@ -63,8 +64,17 @@ class SceneLoader:
             self._newest = self._loaded = self.scenario.text
         self._take_on(present, self.scenario)
 
+    async def known(self) -> Scenario:
+        """Wait until the node's scenario is known."""
+        await self._known.wait()
+        assert self.scenario is not None
+        return self.scenario
+
     def forget(self) -> None:
-        """Take on the next text even if it says what the last one did."""
+        """Take on the next text even if it says what the last one did. Until then the scenario isn't known: somebody
+        may change it unheard.
+        """
+        self._known.clear()
         self._newest = self._loaded = ""
         self._ahead = None
 
@@ -85,6 +95,7 @@ class SceneLoader:
                     continue  # its event came first
                 before, self.scenario = self.scenario, scenario
                 self._take_on(before, scenario)
+                self._known.set()
         finally:
             self._loading = None
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""viser's server as the workbench needs it: quiet, for pages of its own alone, and with nothing that leads beyond it."""
+"""viser's server as the workbench needs it: quiet, for pages of its own alone, and with nothing that
+leads beyond it.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +9,17 @@ import contextlib
 import http
 import io
 import logging
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 from urllib.parse import unquote, urlsplit
 
 import viser
-import websockets.asyncio.server
-from viser import _messages
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
 
 from ..base.errors import InputError
 from .listening import check_address
 from .page_style import lay_out
+from .viser_internals import Gate, refuse_tunnels, requests_go_through
 
 PANEL_PIXELS = 380
 TITLE = "rigid_proto workbench"
@@ -33,15 +35,13 @@ def make_server(host: str, port: int, on_link: Callable[[str], None]) -> viser.V
     # Whoever knocks and goes, a port scan or a browser that thought better of it, is no error of ours.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     # Its greeting would stand between the lines that the command prints.
-    with contextlib.redirect_stdout(io.StringIO()), _requests_go_through(_gate(host, on_link)):
+    with contextlib.redirect_stdout(io.StringIO()), requests_go_through(_gate(host, on_link)):
         server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
     if server.get_port() != port:
         # Somebody took it in between, and viser went on to the next.
         stop_server(server)
         raise InputError("--port", port, f"a port on {host} that no other program listens on")
-    # A browser could ask for a public tunnel to this server: nobody asked us for that.
-    for request in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
-        server._websock_server.unregister_handler(request)
+    refuse_tunnels(server)  # nobody asked us for one
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(PANEL_PIXELS)
@@ -55,10 +55,8 @@ def stop_server(server: viser.ViserServer) -> None:
         server.stop()
 
 
-def _gate(host: str, on_link: Callable[[str], None]) -> Callable:
-    """What is asked of each request before viser sees it: an answer that turns it away, or None."""
-
-    def answer(connection, request):
+def _gate(host: str, on_link: Callable[[str], None]) -> Gate:
+    def answer(connection: ServerConnection, request: Request) -> Response | None:
         reason = refusal(host, request.headers.get("Host", ""), request.headers.get("Origin"))
         if reason:
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
@@ -75,8 +73,8 @@ def _gate(host: str, on_link: Callable[[str], None]) -> Callable:
 def refusal(served_on: str, host: str, origin: str | None) -> str:
     """Why a request isn't from a page of this server, or empty.
 
-    A page of any site may open a socket to this machine, and a name that somebody else owns may point here: the first shows
-    in ``Origin``, the second in ``Host``.
+    A page of any site may open a socket to this machine, and a name that somebody else owns may point here: the first
+    shows in ``Origin``, the second in ``Host``.
     """
     name = urlsplit(f"//{host}").hostname or ""
     if served_on in LOOPBACK_NAMES and name not in LOOPBACK_NAMES:
@@ -84,22 +82,3 @@ def refusal(served_on: str, host: str, origin: str | None) -> str:
     if origin is not None and urlsplit(origin).netloc != host:
         return f"a page of {origin[:80]!r}; accepted: pages of {host}"
     return ""
-
-
-@contextlib.contextmanager
-def _requests_go_through(gate: Callable) -> Iterator[None]:
-    """While this lasts, a server that is started asks ``gate`` first; viser has no way of its own to be told so."""
-    module: Any = websockets.asyncio.server
-    serve = module.serve
-
-    def guarded(*arguments, process_request=None, **options):
-        def process(connection, request):
-            return gate(connection, request) or process_request(connection, request)
-
-        return serve(*arguments, process_request=process, **options)
-
-    module.serve = guarded
-    try:
-        yield
-    finally:
-        module.serve = serve

@@ -4,30 +4,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import viser
 
 from .controls import read_numbers
-from .scene_view import SWITCHES
-
-if TYPE_CHECKING:
-    from .page import Page
+from .scene_view import SWITCHES, SceneView
+from .status import Announcements
 
 
 class ShowTab:
     """One switch for each of SWITCHES. ``show`` does what a click on them does, for lessons and keys."""
 
-    def __init__(self, page: Page, tabs: Any) -> None:
-        gui = page.server.gui
+    def __init__(
+        self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, view: SceneView, announcements: Announcements
+    ) -> None:
         self._switches: dict[str, Any] = {}
         with tabs.add_tab("Show"):
             for name, shown in SWITCHES.items():
                 self._switches[name] = switch = gui.add_checkbox(name, shown)
 
                 @switch.on_update
-                async def _(event, name=name, switch=switch) -> None:
-                    page.view.switch(name, switch.value)
+                async def _(_: viser.GuiEvent[Any], name: str = name, switch: Any = switch) -> None:
+                    view.switch(name, switch.value)
 
             point = gui.add_text(
                 "Point of the path", "", hint="x y z in mesh coordinates; empty: the vertex farthest from the COM"
@@ -38,20 +38,20 @@ class ShowTab:
             centre = gui.add_button("Centre on the body")
 
         @point.on_update
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             numbers = read_numbers(point.value, 3)
             if point.value.strip() and numbers is None:
-                page.say(f"Point of the path: {point.value[:40]!r}; accepted: three numbers, or nothing")
+                announcements.say(f"Point of the path: {point.value[:40]!r}; accepted: three numbers, or nothing")
             else:
-                page.view.trails.point = None if numbers is None else np.array(numbers)
+                view.trails.point = None if numbers is None else np.array(numbers)
 
         @follow.on_update
-        async def _(event) -> None:
-            page.follow = follow.value
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            view.follows = follow.value
 
         @centre.on_click
-        async def _(event) -> None:
-            page.centre()
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            view.centre()
 
     def show(self, changes: Mapping[str, bool]) -> None:
         """Turn switches on or off, by name."""

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Body and ghost compared at the head of the page: which is which, since when they go their own ways, and how far apart they are."""
+"""Body and ghost compared at the head of the page: which is which, since when they go their own ways, and
+how far apart they are.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import numpy as np
 import viser
@@ -35,7 +38,7 @@ class SideBySide:
         self.angle: float | None = None
 
         @button.on_click
-        async def _(event) -> None:
+        async def _(_: viser.GuiEvent[Any]) -> None:
             await start()
 
     @property

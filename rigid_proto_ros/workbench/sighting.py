@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""What the user saw when the pointer went down: the body as a browser drew it, some moments before the message came here."""
+"""What the user saw when the pointer went down: the body as a browser drew it, some moments before the
+message came here.
+"""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,17 +39,17 @@ class DrawnPose:
     origin: np.ndarray
     unit: float
 
-    def world_point(self, drawn_point) -> np.ndarray:
+    def world_point(self, drawn_point: Iterable[float]) -> np.ndarray:
         """A point of the picture (3,) in the world [m]."""
-        return self.origin + self.unit * np.asarray(drawn_point)
+        return self.origin + self.unit * np.array(list(drawn_point))
 
-    def body_point(self, drawn_point) -> np.ndarray:
+    def body_point(self, drawn_point: Iterable[float]) -> np.ndarray:
         """A point of the picture (3,) in metres from the COM, body axes."""
         return (self.world_point(drawn_point) - self.position) @ matrix_from_quaternion(self.orientation_xyzw)
 
-    def body_direction(self, direction) -> np.ndarray:
+    def body_direction(self, direction: Iterable[float]) -> np.ndarray:
         """A direction of the picture (3,) in body axes."""
-        return np.asarray(direction) @ matrix_from_quaternion(self.orientation_xyzw)
+        return np.array(list(direction)) @ matrix_from_quaternion(self.orientation_xyzw)
 
 
 class Sightings:
@@ -77,10 +80,13 @@ class Sightings:
                 return pose
         return self._drawn[0] if self._drawn else None
 
-    def of_point(self, drawn_point, now_s: float, surface: Surface | None, body: Body) -> DrawnPose | None:
+    def of_point(
+        self, drawn_point: Iterable[float], now_s: float, surface: Surface | None, body: Body
+    ) -> DrawnPose | None:
         """The pose in which ``drawn_point`` (3,) lay on the surface, so that the user grabbed what he saw.
 
-        Where several fit, as for a sphere, the one nearest to the usual delay; where none does, that of the usual delay.
+        Where several fit, as for a sphere, the one nearest to the usual delay; where none does, that of the usual
+        delay.
         """
         usual = self.usual(now_s)
         if usual is None or surface is None:
@@ -88,8 +94,12 @@ class Sightings:
         size = float(np.linalg.norm(surface.extent * body.scale))
         nearest_first = sorted(self._drawn, key=lambda pose: abs(pose.time_s - usual.time_s))
         for pose in nearest_first[: max(1, SEARCHED_TRIANGLES // len(surface.triangles))]:
-            point = body.mesh_point(pose.body_point(drawn_point))
-            gap = float(np.linalg.norm((surface.nearest_point(point) - point) * body.scale))
+            point = body.mesh_point(_numbers(pose.body_point(drawn_point)))
+            gap = float(np.linalg.norm((surface.nearest_point(_numbers(point)) - point) * body.scale))
             if gap <= ON_SURFACE * size:
                 return pose
         return usual
+
+
+def _numbers(point: np.ndarray) -> list[float]:
+    return [float(x) for x in point]

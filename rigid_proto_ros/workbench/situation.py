@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bringing a node into a situation: parameters, a reset, commands stamped with the time at which they act.
+"""Taking a node into a situation: parameters, a reset, commands stamped with the time at which they act.
 
 The node is paused meanwhile, so that each command is there before its time: the motion that follows is the one that
 ``poke_client --reset`` or ``simulate`` would give, to the bit.
@@ -11,15 +11,20 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ..base.errors import InputError
 from ..motion.frames import parse_frame
+from ..scene import parameters
 from ..scene.command_codec import ScriptCommand, outgoing
-from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
 from ..scene.script import parse_script, with_contacts
-from .rewind import changes_to
-from .ros_link import RosLink
+from .history import History
+from .look_back import LookBack
+from .node_control import NodeControl
+from .rewind import Rewind, changes_to
+from .ros_link import Answered, RosLink
+from .status import Announcements
 
 MAX_UNCONFIRMED = 400
 """Commands sent beyond what the node has reported as received, which it does once a second."""
@@ -42,20 +47,23 @@ class Situation:
 def situation_of(scene: str, script: str, present: Mapping[str, object]) -> Situation:
     """The situation of a scene (parameter-file text) and a poke script (YAML text); raises InputError.
 
-    What the scene doesn't name is at its default. Contacts can't change in flight: the script's are taken from the scene as
-    the points that they are.
+    What the scene doesn't name is at its default. Contacts can't change in flight: the script's are taken from the
+    scene as the points that they are.
     """
-    wanted = Parameters().replaced(read_scene_text(scene).values)
-    listed = parse_script(script, wrench_timeout=wanted.wrench_timeout) if script.strip() else []
-    commands = [_at_its_point(command, wanted.contacts) for command in with_contacts(listed, wanted.contacts)]
+    given = parameters.convert_all(read_scene_text(scene).values)
+    values: dict[str, Any] = {**parameters.defaults(), **given}
+    contacts = {n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")}
+    timeout_s = float(values["wrench_timeout"])
+    commands = with_contacts(parse_script(script, wrench_timeout=timeout_s) if script.strip() else [], contacts)
+    commands = [_at_its_point(command, contacts) for command in commands]
     if len(commands) > MAX_COMMANDS:
         raise InputError(
             "script", f"{len(commands)} commands are more than {MAX_COMMANDS}; send the script with poke_client"
         )
-    return Situation(changes_to(wanted.named(), present), commands)
+    return Situation(changes_to(values, present), commands)
 
 
-def _at_its_point(command: ScriptCommand, contacts: Mapping[str, tuple]) -> ScriptCommand:
+def _at_its_point(command: ScriptCommand, contacts: Mapping[str, tuple[float, ...]]) -> ScriptCommand:
     """A wrench or poke at a contact as one at the point where the contact lies."""
     if command.kind not in ("wrench", "poke"):
         return command
@@ -65,10 +73,79 @@ def _at_its_point(command: ScriptCommand, contacts: Mapping[str, tuple]) -> Scri
     return replace(command, frame_id=replace(frame, point=("point", contacts[frame.point[1]])).text)
 
 
-async def bring_about(
+class SituationControl:
+    """Takes the node into situations, and tells whoever shows or keeps its past. let_go() ends a drag.
+
+    another_body: the body that comes next is another one; what fits it is found anew.
+    """
+
+    def __init__(
+        self,
+        node: NodeControl,
+        history: History,
+        look_back: LookBack,
+        announcements: Announcements,
+        let_go: Callable[[], None],
+    ) -> None:
+        self._node = node
+        self._history = history
+        self._look_back = look_back
+        self._announcements = announcements
+        self._let_go = let_go
+        self._going_back = False
+        self.another_body = True
+
+    async def take_to(self, situation: Situation, rewind: Rewind | None = None) -> None:
+        """Take the node there; ``rewind`` is what it goes back by. Raises InputError."""
+        self._let_go()
+        paused = self._look_back.paused_before
+
+        def before_reset() -> None:
+            self._history.rewinding(rewind)
+            if rewind is None:
+                self._history.forget_ghost()
+                self._look_back.end()  # the past was another body's
+
+        try:
+            await take_to(self._node.link, situation, paused, lambda: self._node.received, before_reset)
+        except InputError:
+            self._history.rewinding(None)
+            self._look_back.resume()
+            raise
+        self._node.paused = paused
+        self._look_back.end()
+
+    async def go_on_from_here(self) -> None:
+        """Take the node to the moment that is looked at, and let time go on from there; once, however
+        often it is asked for.
+        """
+        if self._going_back:
+            return
+        self._going_back = True
+        try:
+            self._look_back.run_afterwards()
+            await self._announcements.while_doing("going back", self._rewind())
+        finally:
+            self._going_back = False
+
+    async def _rewind(self) -> None:
+        moment_ns = self._look_back.moment_ns
+        if moment_ns is None:
+            return
+        try:
+            rewind = await asyncio.to_thread(self._history.rewind, moment_ns)
+            await self.take_to(Situation(rewind.changes, rewind.commands), rewind)
+            for note in rewind.notes:
+                self._announcements.say(note)
+        finally:
+            self._look_back.resume()
+
+
+async def take_to(
     link: RosLink, situation: Situation, paused: bool, received: Callable[[], int], before_reset: Callable[[], None]
 ) -> None:
-    """Take the node there; it is paused or running then as it was, ``paused``, before. Raises InputError when it refuses.
+    """Take the node there; it is paused or running then as it was, ``paused``, before. Raises InputError when it
+    refuses.
 
     received() gives its count of commands, before_reset() is called right before its time starts again.
     """
@@ -91,7 +168,7 @@ async def bring_about(
 
 async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Callable[[], int]) -> None:
     first, number, confirmed = received(), 0, 0
-    for message in outgoing(commands):
+    for message in outgoing(list(commands)):
         link.send(message.topic, message.data)
         number += len(message.commands)
         if number - confirmed >= MAX_UNCONFIRMED or number == len(commands):
@@ -105,7 +182,7 @@ async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Call
 
 async def asked(link: RosLink, service: str, data: bool | None = None) -> str:
     """Call a service and wait; returns its message, raises InputError where it fails."""
-    answer = asyncio.get_running_loop().create_future()
+    answer: asyncio.Future[tuple[bool, str]] = asyncio.get_running_loop().create_future()
     link.call(service, data, _giving(answer))
     successful, message = await _within(answer, service)
     if not successful:
@@ -115,12 +192,12 @@ async def asked(link: RosLink, service: str, data: bool | None = None) -> str:
 
 async def set_parameters(link: RosLink, changes: Mapping[str, object]) -> tuple[bool, str]:
     """Set parameters together and wait; whether the node took them, and its reason where it didn't."""
-    answer = asyncio.get_running_loop().create_future()
+    answer: asyncio.Future[tuple[bool, str]] = asyncio.get_running_loop().create_future()
     link.set_parameters(dict(changes), _giving(answer))
     return await _within(answer, "set_parameters_atomically")
 
 
-def _giving(answer: asyncio.Future) -> Callable[[bool, str], None]:
+def _giving(answer: asyncio.Future[tuple[bool, str]]) -> Answered:
     def give(successful: bool, message: str) -> None:
         if not answer.done():  # it may come after we stopped waiting
             answer.set_result((successful, message))
@@ -128,7 +205,7 @@ def _giving(answer: asyncio.Future) -> Callable[[bool, str], None]:
     return give
 
 
-async def _within(answer: asyncio.Future, what: str):
+async def _within(answer: asyncio.Future[tuple[bool, str]], what: str) -> tuple[bool, str]:
     try:
         return await asyncio.wait_for(answer, STALLED_S)
     except TimeoutError:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The body's shadow on the floor, straight below it, as under a bright sky: soft at its edge.
 
-It is the density of points of the surface seen from above, drawn as a small picture. The shadows that viser's lights can cast
-take a browser without a graphics card as long again as all the rest.
+It is the density of points of the surface seen from above, drawn as a small picture. The shadows that viser's lights
+can cast take a browser without a graphics card as long again as all the rest.
 """
 
 from __future__ import annotations
@@ -46,10 +46,18 @@ class SoftShadow:
         self._due_s = 0.0
 
     def draw(
-        self, now_s: float, attitude_xyzw, scale: np.ndarray, offset: np.ndarray, radius: float, at: np.ndarray
+        self,
+        now_s: float,
+        attitude_xyzw: np.ndarray,
+        scale: np.ndarray,
+        offset: np.ndarray,
+        radius: float,
+        at: np.ndarray,
     ) -> None:
-        """Below the body at an attitude. The surface's points are times ``scale`` (3,) less ``offset`` (3,) in body axes from the
-        COM; ``radius`` is half the body's size, ``at`` (3,) below the COM on the floor; all in the picture's units."""
+        """Below the body at an attitude. The surface's points are times ``scale`` (3,) less ``offset`` (3,) in body
+        axes from the COM; ``radius`` is half the body's size, ``at`` (3,) below the COM on the floor; all in the
+        picture's units.
+        """
         if not len(self._points):
             self.hide()
             return
@@ -84,7 +92,9 @@ def sampled(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def shadow_picture(places: np.ndarray) -> np.ndarray:
-    """Black RGBA (CELLS, CELLS, 4) as opaque as it lies under points (n, 2) in -0.5..0.5: rows from +y down, columns along x."""
+    """Black RGBA (CELLS, CELLS, 4) as opaque as it lies under points (n, 2) in -0.5..0.5: rows from +y
+    down, columns along x.
+    """
     cells = np.floor((places + 0.5) * CELLS).astype(int)
     inside = ((cells >= 0) & (cells < CELLS)).all(axis=1)
     columns, rows = cells[inside].T

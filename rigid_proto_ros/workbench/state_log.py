@@ -32,7 +32,7 @@ class StateLog:
         """(n, 13); a view."""
         return self._rows[self._begin : self._end]
 
-    def append(self, time_ns: int, row) -> None:
+    def append(self, time_ns: int, row: np.ndarray) -> None:
         """Add a row; one at the last time replaces it. An earlier time is left out."""
         if len(self) and time_ns <= self._times[self._end - 1]:
             if time_ns == self._times[self._end - 1]:

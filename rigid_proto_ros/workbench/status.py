@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Awaitable, Mapping
 
+import viser
+
+from ..base.errors import InputError
 from ..ros.diagnostic_warnings import command_warnings, increase
 
 SILENT_S = 2.5
@@ -68,10 +71,44 @@ class Status:
             return f"waiting for `{self._target}` …"
         self._silent_since = self._silent_since or time.strftime("%H:%M:%S")
         return (
-            f"⚠ **`{self._target}` has ended, or hangs: no message since {self._silent_since}.** The picture shows its last "
-            "state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in another terminal): this page goes "
-            "on by itself when it is back."
+            f"⚠ **`{self._target}` has ended, or hangs: no message since {self._silent_since}.** The picture shows its "
+            "last state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in another terminal): this "
+            "page goes on by itself when it is back."
         )
+
+
+class Announcements:
+    """What is said to all browsers in their corner. activity: what the page is busy with, for the line at its head."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._said_once: set[str] = set()
+        self.activity = ""
+
+    def say(self, text: str) -> None:
+        """A line to all browsers."""
+        for client in self._server.get_clients().values():
+            client.add_notification("Workbench", text, auto_close_seconds=10.0)
+
+    def say_once(self, text: str) -> None:
+        """The same, but not again before the next beginning."""
+        if text not in self._said_once:
+            self._said_once.add(text)
+            self.say(text)
+
+    def begin_anew(self) -> None:
+        """A reset: what was said once may be said again."""
+        self._said_once.clear()
+
+    async def while_doing(self, what: str, work: Awaitable[object]) -> None:
+        """Await work that takes a while, saying so; a refusal is said on the page and not raised."""
+        self.activity = what
+        try:
+            await work
+        except InputError as error:
+            self.say(str(error))
+        finally:
+            self.activity = ""
 
 
 ENDED = "⚠ **The workbench has ended.** Start it again with `rigid_proto workbench` and load this page anew."

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What the body is seen against: a floor with a scale bar, and a wall that shows how fast it falls.
 
-The floor goes with the picture, so a falling body keeps it below; its lines are those of the world, and so are those of the
-wall, whose heights are written beside them. Neither is ground: nothing collides.
+The floor goes with the picture, so a falling body keeps it below; its lines are those of the world, and so are those of
+the wall, whose heights are written beside them. Neither is ground: nothing collides.
 """
 
 from __future__ import annotations
@@ -58,8 +58,9 @@ class Surroundings:
             self._show_wall(False)
 
     def place(self, origin: np.ndarray, unit: float, falls: bool) -> None:
-        """The picture's middle is at the world point ``origin`` (3,), one of its units is ``unit`` [m] long. falls: there is
-        gravity."""
+        """The picture's middle is at the world point ``origin`` (3,), one of its units is ``unit`` [m] long. falls:
+        there is gravity.
+        """
         text = length_text(CELL * unit)
         if self._bar_label.text != text:
             self._bar_label.text = text

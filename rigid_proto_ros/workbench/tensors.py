@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The true tensor beside an approximate one, as the page shows them; and what is to be said of a tensor as it is typed."""
+"""The true tensor beside an approximate one, as the page shows them; and what is to be said of a tensor
+as it is typed.
+"""
 
 from __future__ import annotations
 
@@ -20,32 +22,34 @@ TITLES = {"solid": "solid (true)", "shell": "shell", "points": "points", "boundi
 
 
 def model_properties(scenario: Scenario, model: str, com: str = "") -> MassProperties:
-    """Mass properties of the scenario's body under a model; raises InputError where that can't be had. com: one of MODEL_COMS, as
-    the scenario has it where it is empty."""
-    parameters = scenario.parameters
-    ballast = parameters.point_masses
+    """Mass properties of the scenario's body under a model; raises InputError where that can't be had. com: one of
+    MODEL_COMS, as the scenario has it where it is empty.
+    """
+    values = scenario.values
+    ballast = [value for name, value in values.items() if name.startswith("ballast.")]
     if model == "explicit":
-        given = parameters.explicit_inertia
-        return explicit_mass_properties(given.mass, given.center_of_mass, given.tensor, ballast, parameters.scale)
+        mass, com, tensor = (values[f"explicit_inertia.{name}"] for name in ("mass", "center_of_mass", "tensor"))
+        return explicit_mass_properties(mass, com, tensor, ballast, values["scale"])
     if scenario.body_mesh is None:
         raise InputError("mesh", "a mesh is needed")
     return scenario.body_mesh.moments.mass_properties(
         model,
-        scale=parameters.scale,
-        mass=parameters.mass,
-        density=parameters.density,
+        scale=values["scale"],
+        mass=values["mass"],
+        density=values["density"],
         ballast=ballast,
-        com=com or parameters.inertia_model_com,
+        com=com or values["inertia_model_com"],
     )
 
 
 def comparison(scenario: Scenario) -> str:
-    """The true tensor and the one in force, or the bounding box's where that is the true one: what counts for the motion in a
-    sentence, and a table of the numbers.
+    """The true tensor and the one in force, or the bounding box's where that is the true one: what counts for the
+    motion in a sentence, and a table of the numbers.
 
-    Errors of moments are relative to each moment, those of entries to the true tensor's largest, as ``inspect`` has them.
+    Errors of moments are relative to each moment, those of entries to the true tensor's largest, as ``inspect`` has
+    them.
     """
-    flying = str(scenario.parameters.inertia_model)
+    flying = str(scenario.values["inertia_model"])
     other = "bounding_box" if flying == "solid" else flying
     try:
         true = model_properties(scenario, "solid")
@@ -91,11 +95,13 @@ def comparison(scenario: Scenario) -> str:
 
 
 def _com_text(scenario: Scenario, off: np.ndarray, own: np.ndarray) -> str:
-    size = _size(scenario)
+    surface = scenario.setup.surface
+    size = 1.0 if surface is None else float(np.linalg.norm(surface.extent * scenario.setup.body.scale))
     away, own_away = float(np.linalg.norm(off)), float(np.linalg.norm(own))
     text = f"COM offset **{away:.3g} m**, {100.0 * away / size:.2g} % of the size"
     if away < 1e-9 * size < own_away:
-        return f"COM where the solid has it; the model's own lies {own_away:.3g} m off, {100.0 * own_away / size:.2g} % of the size"
+        share = f"{100.0 * own_away / size:.2g} % of the size"
+        return f"COM where the solid has it; the model's own lies {own_away:.3g} m off, {share}"
     return text
 
 
@@ -115,15 +121,10 @@ def _rounded(entry: float, largest: float) -> float:
 
 def _alone(scenario: Scenario, reason: str) -> str:
     body = scenario.setup.body
-    lines = [f"Simulating: **{scenario.parameters.inertia_model}**. {reason}", "", "|  |  |", "| --- | --- |"]
+    lines = [f"Simulating: **{scenario.values['inertia_model']}**. {reason}", "", "|  |  |", "| --- | --- |"]
     lines.append(f"| mass [kg] | {body.mass:.5g} |")
     lines += [f"| I{'₁₂₃'[k]} principal [kg m²] | {m:.5g} |" for k, m in enumerate(body.principal_moments)]
     return "\n".join(lines)
-
-
-def _size(scenario: Scenario) -> float:
-    surface = scenario.setup.surface
-    return float(np.linalg.norm(surface.extent * scenario.setup.body.scale))
 
 
 def judged(numbers: list[float] | None) -> tuple[bool, str]:

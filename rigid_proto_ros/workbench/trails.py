@@ -17,7 +17,9 @@ LASTS_S = 4.0
 """[s, simulated] Length of a path."""
 
 POINTS = 300
-"""Of one path, always: it goes to every page some times a second, and viser loses the colours of lines whose number changes."""
+"""Of one path, always: it goes to every page some times a second, and viser loses the colours of lines
+whose number changes.
+"""
 
 DRAWN_S = 0.1
 """[s] Between two drawings."""
@@ -89,7 +91,15 @@ class Trails:
             found[POINT_TRAIL] = np.array([row[0:3] + matrix_from_quaternion(row[3:7]) @ arm for row in rows])
         return found
 
-    def draw(self, now_s: float, until_ns: int, body: Body, surface: Surface | None, origin, unit: float) -> None:
+    def draw(
+        self,
+        now_s: float,
+        until_ns: int,
+        body: Body,
+        surface: Surface | None,
+        origin: np.ndarray,
+        unit: float,
+    ) -> None:
         """Draw the paths up to a moment; ``origin`` (3,) and ``unit`` [m] are the picture's."""
         if now_s >= self._due_s:
             self._due_s = now_s + DRAWN_S

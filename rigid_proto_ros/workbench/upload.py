@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Meshes that come as bytes through a page: judged as ``inspect`` judges files, kept as one file while they are flown.
 
-The node reads a mesh by path, so the file must be there; it lies in a folder of this process alone, under a name made here.
-The next upload replaces it, and the folder goes with the process; one that was killed is swept up by the next.
+The node reads a mesh by path, so the file must be there; it lies in a folder of this process alone, under a name made
+here. The next upload replaces it, and the folder goes with the process; one that was killed is swept up by the next.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import struct
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,9 @@ MAX_BYTES = 256_000_000
 """Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""
 
 ACCEPTED = (*OWN_FORMATS, "glb")
-"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip. A .glb that names others is refused."""
+"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip. A .glb
+that names others is refused.
+"""
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Metres, by the name of what a file's numbers may be in."""
@@ -40,7 +43,9 @@ UPRIGHT = {"z": [0.0, 0.0, 0.0, 1.0], "y": [HALF, 0.0, 0.0, HALF], "x": [0.0, -H
 """Attitudes xyzw that turn a file's up axis to the world's z."""
 
 ROOM_SIZE = 20.0
-"""A file whose longest side is more than this isn't in metres: meshes are of things, and most of these are in millimetres."""
+"""A file whose longest side is more than this isn't in metres: meshes are of things, and most of these
+are in millimetres.
+"""
 
 SENSIBLE_DENSITY = 1000.0
 """[kg/m³] Water's, the node's own default."""
@@ -48,7 +53,9 @@ SENSIBLE_DENSITY = 1000.0
 
 @dataclass(frozen=True)
 class Upload:
-    """name: as shown. path: for the parameter ``mesh``. inspection: what is known of it; report: as ``inspect --json``."""
+    """name: as shown. path: for the parameter ``mesh``. inspection: what is known of it; report: as
+    ``inspect --json``.
+    """
 
     name: str
     path: str
@@ -58,7 +65,8 @@ class Upload:
     @property
     def sides(self) -> np.ndarray:
         """Sides (3,) of its bounding box, in the file's numbers."""
-        return self.inspection.upper - self.inspection.lower
+        lower, upper = self.inspection.lower, self.inspection.upper
+        return np.zeros(3) if lower is None or upper is None else upper - lower
 
     @property
     def likely_unit(self) -> str:
@@ -123,8 +131,8 @@ class Uploads:
     def take(self, file_name: str, data: bytes, *, repair: bool = False, fallback: str = "") -> Upload:
         """Judge a file and lay it beside the one in flight, in place of any other.
 
-        A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises MeshError for what is no mesh,
-        and keeps nothing of it.
+        A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises MeshError for what is no
+        mesh, and keeps nothing of it.
         """
         name, suffix = shown_name(file_name)
         if suffix not in ACCEPTED:
@@ -178,10 +186,12 @@ class Uploads:
 
 
 def refuse_other_files(name: str, data: bytes) -> None:
-    """Raise MeshError for a .glb that isn't one, or that has parts in other files: they would be read from this machine."""
+    """Raise MeshError for a .glb that isn't one, or that has parts in other files: they would be read
+    from this machine.
+    """
     try:
         magic, _, _, length, kind = struct.unpack_from("<4sIII4s", data)
-        parts = json.loads(data[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else None
+        parts: Any = json.loads(data[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else None
         named = [part.get("uri") for part in (*parts.get("buffers", ()), *parts.get("images", ()))]
     except (struct.error, ValueError, AttributeError, TypeError) as error:
         raise MeshError("upload", name, "a binary glTF file") from error
@@ -190,7 +200,9 @@ def refuse_other_files(name: str, data: bytes) -> None:
 
 
 def shown_name(file_name: str) -> tuple[str, str]:
-    """What is left of a file's name: its last part, plain letters, at most 40 before the ending; and the ending itself."""
+    """What is left of a file's name: its last part, plain letters, at most 40 before the ending; and the
+    ending itself.
+    """
     last = PureWindowsPath(PurePosixPath(file_name.replace("\0", "")).name).name
     stem, _, suffix = last.rpartition(".")
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:40] or "mesh"

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -13,8 +15,10 @@ from rerun.chunk import RrdReader  # noqa: E402
 from rigid_proto_ros.cli.main import main  # noqa: E402
 from rigid_proto_ros.rerun_view import appearance  # noqa: E402
 from rigid_proto_ros.rerun_view import entities as e  # noqa: E402
+from rigid_proto_ros.rerun_view.derived import angle_to  # noqa: E402
 from rigid_proto_ros.rerun_view.inertia_shapes import skewed  # noqa: E402
 from rigid_proto_ros.rerun_view.layout import Subject, layout  # noqa: E402
+from rigid_proto_ros.rerun_view.plot_range import with_two_ticks  # noqa: E402
 from rigid_proto_ros.rerun_view.plots import Ranges  # noqa: E402
 from rigid_proto_ros.rerun_view.reader import record_batches  # noqa: E402
 from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
@@ -100,3 +104,30 @@ def test_a_finished_recording_says_how_far_its_plots_reach(tmp_path) -> None:
     assert any(low <= -0.5 and 3.0 <= high <= 5.0 for ((low, high),) in ends), ends
     com = np.array([points[-1] for points in column(path, e.COM_TRAIL, "Points3D:positions")])
     assert com[:, 2].max() == pytest.approx(2.77, abs=0.02) and abs(com[:, 1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.5, 3.0, math.pi - 1e-6, math.pi])
+def test_angles_are_accurate_at_both_ends(angle: float) -> None:
+    other = np.array([math.cos(angle), math.sin(angle), 0.0])
+    assert angle_to(np.array([2.0, 0.0, 0.0]), 5.0 * other[np.newaxis])[0] == pytest.approx(angle, rel=1e-9, abs=1e-16)
+    assert angle_to(np.zeros(3), other[np.newaxis])[0] == 0.0
+
+
+@pytest.mark.parametrize("ends", [(0.0, 5.5), (-6.0, 6.0), (-0.2, 0.9), (0.98, 1.03), (-3e-16, 8e-16), (-6.4, -5.8)])
+def test_an_axis_has_two_ticks_whose_numbers_can_be_read(ends: tuple[float, float]) -> None:
+    low, high = with_two_ticks(*ends)
+    assert low <= ends[0] and high >= ends[1]
+    # Rerun numbers ticks at one power of ten, and only where no more than some five of them lie on the axis of a small plot.
+    step = 10.0 ** math.ceil(math.log10((high - low) / 5.0) - 1e-9)
+    assert math.floor(high / step) - math.ceil(low / step) >= 1
+    assert high - low <= 4.0 * (ends[1] - ends[0])
+
+
+def test_a_legend_lies_beside_the_curves_and_never_over_them() -> None:
+    made = layout(1.0, "lesson", Subject()).plots[e.ENERGY]
+    for view in made:
+        (axis,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
+        (ranges,) = [view.properties["VisibleTimeRanges"]]
+        ends = [r["range"]["end"] for r in ranges.ranges.as_arrow_array().to_pylist()]
+        assert all(end == 0 for end in ends), ends  # curves end at the cursor
+        assert axis["end"] >= 0.44 * 1e9 * 20.0, axis  # and room for the legend follows

@@ -13,15 +13,15 @@ from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.arrows import ArrowScale, arrow_length
 from rigid_proto_ros.rerun_view.derived import rotation_matrices
-from rigid_proto_ros.rerun_view.ghost import attitude_angle
 from rigid_proto_ros.rerun_view.inertia_shapes import PrincipalFrame, bounding_box
-from rigid_proto_ros.rerun_view.logged_text import readable
+from rigid_proto_ros.rerun_view.motion_picture import Trail
 from rigid_proto_ros.rerun_view.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+from rigid_proto_ros.rerun_view.run_log import readable
 from rigid_proto_ros.rerun_view.string_picture import sag
 from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
-from rigid_proto_ros.rerun_view.trail import Trail
 from rigid_proto_ros.simulation.observer import BodySnapshot, ShownString
+from rigid_proto_ros.simulation.quantities import attitude_angle
 
 MOMENTS = st.tuples(*[st.floats(0.1, 10.0)] * 3).map(
     lambda s: np.sort(np.array([s[1] + s[2], s[0] + s[2], s[0] + s[1]])),
@@ -145,7 +145,7 @@ def test_the_ghosts_angle_is_accurate_down_to_round_off(axis, log_angle):
         ]
     )
     for second in (turned, -turned):
-        (found,) = attitude_angle(start[np.newaxis], second[np.newaxis])
+        found = attitude_angle(start, second)
         assert abs(found - angle) < 1e-15 + 1e-13 * angle
 
 
@@ -177,7 +177,8 @@ def test_the_ghost_is_compared_with_the_body_at_equal_times_and_per_run(tmp_path
         times, angles = cells(file, e.GHOST_ANGLE, "Scalars:scalars")
         part = slice(30 * run, 30 * run + 30)
         assert times == [k * flight.PERIOD_NS for k in range(30)]
-        assert np.allclose(np.radians(np.ravel(angles)), attitude_angle(body[part, 3:7], ghost[part, 3:7]), rtol=1e-14)
+        apart = [attitude_angle(*pair) for pair in zip(body[part, 3:7], ghost[part, 3:7], strict=True)]
+        assert np.allclose(np.radians(np.ravel(angles)), apart, rtol=1e-14)
         _, places = cells(file, e.GHOST, "Transform3D:translation")
         assert np.array_equal(np.array(places)[:, 0], ghost[part, 0:3].astype(np.float32))
 

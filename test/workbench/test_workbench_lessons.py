@@ -20,7 +20,7 @@ from lesson_flights import degrees_between  # noqa: E402
 from rigid_proto_ros.base.bundled import scene_names  # noqa: E402
 from rigid_proto_ros.base.rotation import matrix_from_quaternion  # noqa: E402
 from rigid_proto_ros.scene.lessons import SENTENCES, lesson  # noqa: E402
-from rigid_proto_ros.workbench import controls, session_tab  # noqa: E402
+from rigid_proto_ros.workbench import controls, lesson_folder  # noqa: E402
 from rigid_proto_ros.workbench import page as page_module  # noqa: E402
 from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL  # noqa: E402
 
@@ -88,7 +88,7 @@ class User(FlownPage):
     def rewind(self) -> None:
         """As far back as it goes."""
         available = self.time[-1] - self.time[0]
-        self.do(lambda: self.page._session.every_second())
+        self.do(lambda: self.page.session_tab.every_second())
         self.set("Seconds back", float(min(available, self.widget("Seconds back").max)))
         self.press("Continue from here")
 
@@ -146,7 +146,7 @@ FACE = (0.0, 0.0, -1.0)
 
 def racket_at_com(user: User) -> None:
     # It lies in the open throat, where a click meets no body: its mark takes it.
-    assert user.page.view.com._impl.click_cb
+    assert user.page.view.body.com._impl.click_cb
     user.do(lambda: user.page.pointer.click_com(FACE))
     user.fly(0.06)
     user.remembered = user.velocity, user.energy[-1]
@@ -256,7 +256,7 @@ def bracket_wobbles(user: User) -> None:
 
 def bracket_axes(user: User) -> None:
     user.set("Principal axes", True)
-    arrows, *_ = user.page.view._handles["Principal axes"]
+    arrows, *_ = user.page.view.switches.nodes("Principal axes")
     w, x, y, z = arrows.wxyz
     drawn = matrix_from_quaternion(np.array([x, y, z, w]))
     assert arrows.visible and np.abs(drawn).max() < np.cos(np.radians(1.0))
@@ -273,7 +273,7 @@ def bracket_calm(user: User) -> None:
 def plumb(user: User) -> tuple[np.ndarray, np.ndarray]:
     """The string's line in mesh coordinates [m]: a point, and its direction."""
     page = user.page
-    knot, hand = user.do(lambda: page.acting.string_ends(page.scenario.setup, page.state))
+    knot, hand = user.do(lambda: page.follower.acting.string_ends(page.scenes.scenario.setup, page.follower.state))
     R, position = user.rotation[-1], user.rows[-1, 0:3]
     return R.T @ (knot - position) + user.body.center_of_mass, R.T @ (hand - knot) / np.linalg.norm(hand - knot)
 
@@ -412,7 +412,7 @@ def racket_wrong(user: User) -> None:
 
 def path_of(user: User, name: str) -> np.ndarray:
     page, setup = user.page, user.link.scenario.setup
-    return user.do(lambda: page.view.trails.paths(page.state.time_ns, setup.body, setup.surface))[name]
+    return user.do(lambda: page.view.trails.paths(page.follower.state.time_ns, setup.body, setup.surface))[name]
 
 
 def parabola_miss(path: np.ndarray) -> float:
@@ -474,7 +474,9 @@ def top_falls(user: User) -> None:
 
 def ghost_row(user: User) -> np.ndarray:
     page = user.page
-    return user.until(lambda: (row := page._ghost_row(False)[0]) is not None and [row], "a ghost")[0]
+    return user.until(
+        lambda: (row := page.follower.ghost_row(page.scenes.scenario, None)[0]) is not None and [row], "a ghost"
+    )[0]
 
 
 def ghost_spin(user: User) -> np.ndarray:
@@ -547,7 +549,7 @@ def test_every_sentence_of_every_lesson_has_a_step() -> None:
 
 @pytest.mark.parametrize("name", sorted(STEPS))
 def test_every_step_of_the_lesson_can_be_done_on_the_page_and_shows_what_it_says(user: User, name: str) -> None:
-    user.set("Lesson", session_tab.NO_LESSON)
+    user.set("Lesson", lesson_folder.NO_LESSON)
     user.said.clear()
     user.link.refused.clear()
     user.pick(lesson(name).title)

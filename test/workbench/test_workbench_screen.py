@@ -123,11 +123,11 @@ def test_the_outline_under_the_pointer_is_whole_and_ends_when_the_body_leaves(de
     sizes = np.sort(np.bincount(pieces.ravel())[1:])
     assert sizes[-1] > 0.95 * sizes.sum(), sizes
     # The body goes, the pointer stays; the picture doesn't follow.
-    desk.do(lambda: setattr(desk.page, "follow", False))
+    desk.do(lambda: setattr(desk.page.view, "follows", False))
     away = np.array([0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6])
     desk.do(lambda: desk.link.say([(4_000_000_000, away)]))
     until(lambda: not halo(page).any(), "end of the outline")
-    desk.do(lambda: setattr(desk.page, "follow", True))
+    desk.do(lambda: setattr(desk.page.view, "follows", True))
 
 
 def test_on_a_phone_the_body_is_seen_above_the_panel_and_the_readouts_are_at_its_top(browser_page) -> None:

@@ -21,7 +21,7 @@ from rigid_proto_ros.workbench.controls import Controls  # noqa: E402
 from rigid_proto_ros.workbench.listening import choose_page_port  # noqa: E402
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server  # noqa: E402
 from rigid_proto_ros.workbench.upload import MAX_BYTES  # noqa: E402
-from rigid_proto_ros.workbench.upload_button import MAX_TRANSFERS, PART_BYTES, guard_uploads  # noqa: E402
+from rigid_proto_ros.workbench.viser_internals import MAX_TRANSFERS, PART_BYTES, guard_uploads  # noqa: E402
 
 OPENED: list[str] = []
 
@@ -178,7 +178,7 @@ class Transfers:
             register_handler=handlers.__setitem__,
             queue_message=lambda message: self.acknowledged.append(message.transferred_bytes),
         )
-        guard_uploads(SimpleNamespace(_websock_server=socket, gui=gui), lambda client, why: self.refused.append(why))
+        guard_uploads(SimpleNamespace(_websock_server=socket, gui=gui), lambda why: self.refused.append(why))
         self._on = {kind.__name__: handler for kind, handler in handlers.items()}
 
     def _start(self, client_id, message) -> None:

@@ -4,24 +4,21 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from flown_page import PageInProcess
 from workbench_page import bare_page
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 
-from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
 from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
-from rigid_proto_ros.workbench import controls  # noqa: E402
+from rigid_proto_ros.workbench import node_control  # noqa: E402
 from rigid_proto_ros.workbench import page as page_module  # noqa: E402
-from rigid_proto_ros.workbench.controls import ParameterSetter  # noqa: E402
-from rigid_proto_ros.workbench.page import Page  # noqa: E402
+from rigid_proto_ros.workbench.node_control import ParameterSetter  # noqa: E402
 from rigid_proto_ros.workbench.ros_link import Heard  # noqa: E402
-from rigid_proto_ros.workbench.server import make_server, stop_server  # noqa: E402
 
 PATIENCE_S = 60.0
 STEP_NS = 100_000_000
@@ -73,44 +70,19 @@ class StandIn:
         self.told.append(("close",))
 
 
-class Desk:
-    """A page, its server and its stand-in. ``do`` runs a function on the page's thread."""
+class Desk(PageInProcess):
+    """A page with a stand-in for its link."""
 
-    def __init__(self) -> None:
-        self.server = make_server(LOOPBACK, any_free_port(), lambda link: None)
-        self.page: Page = self.do(lambda: Page(self.server, "/rigid_body", "http://here"))
-        self.link = self.page.link
-        self.said: list[str] = []
-        self.page.say = self.said.append
-        self.running = asyncio.run_coroutine_threadsafe(self.page.run(), self.page.loop)
-
-    def end(self) -> None:
-        """As the page's process ends."""
-        if not self.running.cancelled():
-            self.running.cancel()
-            stop_server(self.server)
-            self.page.close()
-
-    def do(self, function: Callable):
-        async def done():
-            found = function()
-            return await found if asyncio.iscoroutine(found) else found
-
-        return asyncio.run_coroutine_threadsafe(done(), self.server.get_event_loop()).result(PATIENCE_S)
-
-    def until(self, condition: Callable[[], object], what: str):
-        deadline = time.monotonic() + PATIENCE_S
-        while not (found := self.do(condition)):
-            assert time.monotonic() < deadline, f"no {what}; told {self.link.told}, said {self.said}"
-            time.sleep(0.01)
-        return found
+    @property
+    def link(self) -> StandIn:
+        return self.page.link
 
     def fly(self, seconds: float = 2.0, begin_s: float = 0.0) -> None:
         """Let the page hear of a flight up to there."""
         row = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6])
         first, last = (round(t * 1e9 / STEP_NS) for t in (begin_s, seconds))
         states = [(k * STEP_NS, row) for k in range(first, last + 1)]
-        self.until(lambda: self.page.scenario is not None, "scene")
+        self.until(lambda: self.page.scenes.scenario is not None, "scene")
         self.do(lambda: self.link.say(states))
         self.until(lambda: self.page.history.span[1] == states[-1][0], "flight")
 
@@ -129,13 +101,13 @@ class Desk:
     def look_back(self, socket) -> None:
         """A page scrubs one second back."""
         self.drag(socket, "Seconds back", 1.0)
-        self.until(lambda: self.page.looking_at == 1_000_000_000, "looking back")
+        self.until(lambda: self.page.look_back.moment_ns == 1_000_000_000, "looking back")
         assert self.link.told[-1] == ("pause", True)
 
     @property
     def shows_now(self) -> bool:
-        button = self.page._session._go_on
-        return self.page.looking_at is None and self.input("Seconds back").value == 0.0 and button.disabled
+        button = self.page.session_tab._go_on
+        return self.page.look_back.moment_ns is None and self.input("Seconds back").value == 0.0 and button.disabled
 
 
 @pytest.fixture
@@ -151,7 +123,7 @@ def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
 def test_the_last_page_that_closes_while_it_looks_back_leaves_the_node_as_it_was(desk: Desk, paused: bool) -> None:
     with bare_page(desk.server.get_port()) as socket:
         desk.fly()
-        desk.page.paused = paused
+        desk.page.node.paused = paused
         desk.look_back(socket)
     desk.until(lambda: ("stop_listening",) in desk.link.told, "end of listening")
     assert desk.link.told[-2:] == [("pause", paused), ("stop_listening",)]
@@ -210,13 +182,13 @@ EXPLICIT = {"inertia_model": "explicit", "explicit_inertia.tensor": [1e-3, 0.0, 
 def test_times_the_mass_is_that_of_the_body_without_its_ballast(desk: Desk, model: dict, mass: str) -> None:
     desk.link.values = {**model, "ballast.weight": [0.6, 0.0, 0.0, 0.0]}
     with bare_page(desk.server.get_port()) as socket:
-        desk.until(lambda: desk.page.scenario is not None, "scene")
-        own = desk.page.scenario.setup.body.mass - 0.6
+        desk.until(lambda: desk.page.scenes.scenario is not None, "scene")
+        own = desk.page.scenes.scenario.setup.body.mass - 0.6
         assert desk.input("Mass ×").value == "1"
         desk.drag(socket, "Mass ×", "10")
-        desk.until(lambda: desk.page.scenario.parameters.named()[mass] != model[mass], "another mass")
-        assert desk.page.scenario.parameters.named()[mass] == pytest.approx(10.0 * own, rel=1e-12)
-        desk.do(lambda: desk.page._controls.update(desk.page.scenario.parameters.named(), at_once=True))
+        desk.until(lambda: desk.page.scenes.scenario.values[mass] != model[mass], "another mass")
+        assert desk.page.scenes.scenario.values[mass] == pytest.approx(10.0 * own, rel=1e-12)
+        desk.do(lambda: desk.page._controls.update(desk.page.scenes.scenario.values, at_once=True))
         assert desk.input("Mass ×").value == "10"
 
 
@@ -236,14 +208,14 @@ def test_lines_that_are_no_events_are_passed_over_and_said_once(desk: Desk) -> N
 @pytest.mark.parametrize("late", [False, True])
 def test_a_parameter_call_that_nobody_answers_is_given_up_and_the_next_one_made(late: bool, monkeypatch) -> None:
     """As when a node dies in it and is started again: what was set meanwhile goes to the new one."""
-    monkeypatch.setattr(controls, "ANSWER_S", 0.0)
+    monkeypatch.setattr(node_control, "ANSWER_S", 0.0)
     sent: list[tuple[dict, Callable]] = []
     refused: list[str] = []
     setter = ParameterSetter(lambda changes, done: sent.append((changes, done)), refused.append)
 
     async def node_dies() -> None:
         setter.set({"mass": 1.0})
-        monkeypatch.setattr(controls, "ANSWER_S", 1e6)
+        monkeypatch.setattr(node_control, "ANSWER_S", 1e6)
         setter.set({"mass": 2.0, "step": 0.01})
         while len(sent) < 2:
             await asyncio.sleep(0.01)

@@ -8,21 +8,14 @@ import rerun as rr
 
 from ..simulation.mailbox import Block
 from ..simulation.observer import BodySnapshot
+from ..simulation.quantities import attitude_angle
 from . import entities as e
 from .columns import Send, one_time, scalar_columns, time_columns
 from .inertia_shapes import PrincipalFrame
 from .plots import Ranges
 
 
-def attitude_angle(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Angle (n,) [rad] of the turn between attitudes xyzw (n, 4), accurate near 0."""
-    a, b = first[:, :3], second[:, :3]
-    v = first[:, 3:] * b - second[:, 3:] * a - np.cross(a, b)
-    w = np.einsum("ni,ni->n", first, second)
-    return 2.0 * np.arctan2(np.linalg.norm(v, axis=1), np.abs(w))
-
-
-class Ghost:
+class GhostPicture:
     """Follows the ghost of one run. Its states are compared with the body's at equal times."""
 
     def __init__(self, ranges: Ranges) -> None:
@@ -64,7 +57,8 @@ class Ghost:
             at = np.minimum(np.searchsorted(self._body_times, times_ns), len(self._body_times) - 1)
             same = np.flatnonzero(self._body_times[at] == times_ns)
             if len(same):
-                angle = np.degrees(attitude_angle(self._body_attitudes[at[same]], rows[same, 3:7]))
+                pairs = zip(self._body_attitudes[at[same]], rows[same, 3:7], strict=True)
+                angle = np.degrees([attitude_angle(body, ghost) for body, ghost in pairs])
                 self._ranges.note(e.GHOST_ANGLE, angle)
                 send(e.GHOST_ANGLE, time_columns(times_ns[same], walls[same]), scalar_columns(angle[:, np.newaxis]))
         keep = self._body_times > times_ns[-1]

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""The heads of the bundled scenes are lessons: they have what pages and documents show."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigid_proto_ros.base.bundled import example_names, scene_names
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.scene.lessons import lesson, lessons, read_lesson
+
+
+def test_every_bundled_scene_is_a_lesson_with_a_title_three_sentences_and_a_reason() -> None:
+    found = {one.name: one for one in lessons()}
+    assert sorted(found) == scene_names()
+    assert len({one.title for one in found.values()}) == len(found)
+    for name, one in found.items():
+        assert 8 < len(one.title) < 60, name
+        assert not one.title.endswith("."), name
+        assert all(20 < len(sentence) < 200 for sentence in one.sentences), name
+        assert one.sentences[-1].endswith("."), name
+        assert len(one.reason) > 60, name
+        assert not one.script or one.script in example_names(), name
+
+
+def test_a_scene_without_a_lessons_head_is_told_what_is_missing(tmp_path) -> None:
+    with pytest.raises(InputError, match="scene"):
+        lesson("no_such")
+    path = tmp_path / "x.yaml"
+    path.write_text("# SPDX\n#\n# Title\n#\n# One. Two.\n#\n# Why.\n#\n# Fly it.\nrigid_body: {}\n")
+    with pytest.raises(InputError, match="2 sentences"):
+        read_lesson(path)
+    path.write_text("# Title\nrigid_body: {}\n")
+    with pytest.raises(InputError, match="paragraphs"):
+        read_lesson(path)
