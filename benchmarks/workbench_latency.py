@@ -119,7 +119,7 @@ def measure() -> tuple[dict[str, list[float]], dict[str, tuple[float, str]]]:
     asyncio.run_coroutine_threadsafe(page.known(), loop).result(60)
     listener = Listener()
     publishers = (page.link._publishers["poke"], page.link._publishers["string/target"])
-    while page.state is None or any(publisher.get_subscription_count() < 2 for publisher in publishers):
+    while page.follower.state is None or any(publisher.get_subscription_count() < 2 for publisher in publishers):
         time.sleep(0.05)
     time.sleep(1.0)
 

@@ -248,7 +248,7 @@ class FlownPage(PageInProcess):
                 and page.follower.state.time_ns == link.rows[-1][0]
                 and not page.follower.waiting
             )
-            return at and not page.scenes.busy and page.scenes.scenario.values == link.scenario.values
+            return at and not page.scenes.busy and page.scenes.scenario.parameters == link.scenario.parameters
 
         self.until(shown, "page that has heard all")
 

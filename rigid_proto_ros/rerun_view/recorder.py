@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from ..base.errors import InputError
+from ..scene.parameters import Parameters
 from ..simulation.observer import Observer
 
 
@@ -17,20 +18,20 @@ def is_mcap(path: str) -> bool:
 def make_recorder(
     path: str,
     node_name: str = "rigid_body",
-    values: Mapping[str, object] | None = None,
+    parameters: Parameters | None = None,
     on_error: Callable[[str], None] | None = None,
     simulated_log: bool = False,
 ) -> Observer:
     """An observer that records to ``path``; raises InputError where it can't.
 
-    values: the scene's parameters, of which frames' names count. simulated_log: messages are logged at simulated time,
-    as suits a run without a clock; else at the wall's, for as long as the run may go on.
+    parameters: the scene's, of which frames' names count. simulated_log: messages are logged at simulated time, as
+    suits a run without a clock; else at the wall's, for as long as the run may go on.
     """
     if is_mcap(path):
         try:
             from ..session.mcap_observer import McapObserver
 
-            return McapObserver(path, node_name, values, on_error, simulated_log)
+            return McapObserver(path, node_name, parameters, on_error, simulated_log)
         except ImportError as error:
             raise InputError("record", path, f"mcap to be installed, pip install mcap zstandard ({error})") from None
     from . import RerunObserver

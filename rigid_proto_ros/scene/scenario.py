@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.rotation import matrix_from_quaternion, unit_quaternion
 from ..mass.from_mesh import mesh_body
-from ..mass.properties import MeshMoments, explicit_mass_properties, scale_vector
+from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
 from ..mass.tensor import check_tensor
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
@@ -27,32 +26,30 @@ from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from ..simulation.setup import Setup
 from ..simulation.simulation import needs_of
-from . import parameters
-
-_MESH_PARAMETERS = ("mesh", "mesh_repair", "mesh_fallback")
+from .declaration import READ_ONLY, Value
+from .parameters import Parameters, convert_all, parameter_named
 
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """A mesh with what is computed from it once: its moments, and its surface wound outward. made_of: the values of
-    _MESH_PARAMETERS that it was loaded for.
+    """A mesh with what is computed from it once: its moments, and its surface wound outward. made_of: what of the parameters it
+    was loaded for (``_made_of``).
     """
 
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
-    made_of: tuple
+    made_of: tuple[str, bool, str]
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A complete, checked set of parameter values and what follows from them; immutable.
+    """Checked parameters and what follows from them; immutable.
 
-    values: every parameter by name, in its own type. body_mesh: None without a mesh. warnings: one line each. ghost: the
-    setup of the ghost, when one is asked for.
+    body_mesh: None without a mesh. warnings: one line each. ghost: the setup of the ghost, when one is asked for.
     """
 
-    values: Mapping[str, Any]
+    parameters: Parameters
     body_mesh: BodyMesh | None
     setup: Setup
     warnings: tuple[str, ...] = ()
@@ -66,155 +63,166 @@ class Scenario:
         mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a loaded one, used where it is
         the one that the parameters ask for.
         """
-        changes = parameters.convert_all(changes)
-        for name, value in changes.items():
-            if parameters.parameter_named(name).changes == parameters.READ_ONLY:
+        for name, value in convert_all(changes).items():
+            if parameter_named(name).changes == READ_ONLY:
                 raise InputError(
                     name, value, "a parameter that can be changed while running; this one is set at start only"
                 )
-        values = {**self.values, **changes}
-        if "density" in changes and "mass" not in changes:
-            values["mass"] = 0.0
+        parameters = self.parameters.replaced(changes)
         if mesh is None:
-            if all(values[name] == self.values[name] for name in _MESH_PARAMETERS):
-                return build_scenario(values, self.body_mesh)
-            if at_hand is not None and at_hand.made_of == _made_of(values):
-                return build_scenario(values, at_hand)
-        return build_scenario(values, load_body_mesh(values, mesh))
+            if _made_of(parameters) == _made_of(self.parameters):
+                return build_scenario(parameters, self.body_mesh)
+            if at_hand is not None and at_hand.made_of == _made_of(parameters):
+                return build_scenario(parameters, at_hand)
+        return build_scenario(parameters, load_body_mesh(parameters, mesh))
 
-    def with_inertia(self, mass: float, com, tensor6, relative: bool) -> Scenario:
+    def with_inertia(self, mass: float, com: Sequence[float], tensor6: Sequence[float], relative: bool) -> Scenario:
         """The scenario with an explicit inertia, as a message gives it; raises InputError.
 
         com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. tensor6: ixx ixy ixz iyy iyz
         izz about it. It stands for the whole body, so every ballast mass becomes 0.
         """
         scale = self.setup.body.scale
-        com = np.asarray(com, dtype=float) + (self.setup.body.center_of_mass if relative else 0.0)
+        center = np.asarray(com, dtype=float) + (self.setup.body.center_of_mass if relative else 0.0)
         changes: dict[str, object] = {
             "inertia_model": "explicit",
             "explicit_inertia.mass": mass,
-            "explicit_inertia.center_of_mass": [_divided(c, s) for c, s in zip(com, scale, strict=True)],
+            "explicit_inertia.center_of_mass": [_divided(c, s) for c, s in zip(center, scale, strict=True)],
             "explicit_inertia.tensor": list(tensor6),
         }
-        for name, value in self.values.items():
-            if name.startswith("ballast."):
-                changes[name] = [0.0, *value[1:]]
+        for name, (_, *place) in self.parameters.ballast.items():
+            changes[f"ballast.{name}"] = [0.0, *place]
         return self.with_changes(changes)
 
     @property
     def text(self) -> str:
         """The scenario as a parameter file that starts the same simulation."""
-        return scene_text(self.values, self.body_mesh.mesh.sha256 if self.body_mesh else "")
+        return scene_text(self.parameters.named(), self.body_mesh.mesh.sha256 if self.body_mesh else "")
 
 
-def scene_text(values: Mapping[str, object], mesh_sha256: str = "") -> str:
-    """Parameter values as a parameter file, the hash of the mesh's file in a comment."""
+def scene_text(values: Mapping[str, Value], mesh_sha256: str = "") -> str:
+    """Parameters by name as a parameter file, the hash of the mesh's file in a comment."""
     lines = [f"    {name}: {yaml_value(value)}" for name, value in sorted(values.items())]
     mesh = [f"# mesh_sha256: {mesh_sha256}"] if mesh_sha256 else []
     return "\n".join([*mesh, "rigid_body:", "  ros__parameters:", *lines, ""])
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:
-    """A scenario from some parameters, the others at their defaults; raises InputError or one of its family.
+    """A scenario from some parameters by name, the others at their defaults; raises InputError or one of its family.
 
     mesh: a mesh at hand, used instead of loading the one that the parameter names.
     """
-    complete = {**parameters.defaults(), **parameters.convert_all(values)}
-    return build_scenario(complete, load_body_mesh(complete, mesh))
+    parameters = Parameters().replaced(values)
+    return build_scenario(parameters, load_body_mesh(parameters, mesh))
 
 
-def load_body_mesh(values: Mapping[str, object], mesh: Mesh | None = None) -> BodyMesh | None:
-    """The mesh that checked values name (or the one at hand), with its moments; None without one. Raises MeshError."""
-    if values["mesh"] == "":
-        if values["inertia_model"] != "explicit":
-            raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
+def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh | None:
+    """The mesh that the parameters name (or the one at hand), with its moments; None without one. Raises MeshError."""
+    if parameters.mesh == "":
+        if parameters.inertia_model != "explicit":
+            raise _no_mesh()
         return None
-    body = mesh_body(mesh or values["mesh"], repair=values["mesh_repair"], fallback=values["mesh_fallback"])
+    body = mesh_body(mesh or parameters.mesh, repair=parameters.mesh_repair, fallback=parameters.mesh_fallback)
     if not body.verdict.usable:
-        raise MeshError(f"mesh {values['mesh']}", body.verdict.reason or "the surface has no extent")
+        raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason or "the surface has no extent")
     triangles = body.triangles[:, [0, 2, 1]] if body.verdict.inward else body.triangles
     surface = Surface(body.vertices, np.ascontiguousarray(triangles))
-    return BodyMesh(body.mesh, body.moments, surface, _made_of(values))
+    return BodyMesh(body.mesh, body.moments, surface, _made_of(parameters))
 
 
-def _made_of(values: Mapping[str, object]) -> tuple:
-    return tuple(values[name] for name in _MESH_PARAMETERS)
+def _no_mesh() -> InputError:
+    return InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
 
 
-def build_scenario(values: Mapping[str, object], body_mesh: BodyMesh | None) -> Scenario:
-    """The scenario of a complete set of checked values whose mesh is loaded already; raises InputError."""
-    setup, warnings = _setup(values, body_mesh)
-    ghost = {name: values[f"ghost.{name}"] for name in ("inertia_model", "integrator") if values[f"ghost.{name}"]}
-    ghost_setup = _setup({**values, **ghost}, body_mesh)[0] if ghost else None
-    if "integrator" in ghost:
+def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
+    return parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback
+
+
+def build_scenario(parameters: Parameters, body_mesh: BodyMesh | None) -> Scenario:
+    """The scenario of parameters whose mesh is loaded already; raises InputError."""
+    setup, warnings = _setup(parameters, body_mesh)
+    return Scenario(parameters, body_mesh, setup, warnings, _ghost_setup(parameters, body_mesh))
+
+
+def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | None:
+    ghost = parameters.ghost
+    if not ghost.inertia_model and not ghost.integrator:
+        return None
+    own = replace(
+        parameters,
+        inertia_model=ghost.inertia_model or parameters.inertia_model,
+        integrator=ghost.integrator or parameters.integrator,
+    )
+    setup, _ = _setup(own, body_mesh)
+    if ghost.integrator:
         try:
-            check_carried(ghost_setup.integrator, needs_of(ghost_setup, (), ghost_setup.string.attached))
+            check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
         except CommandRefused as refusal:
             raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
-    return Scenario(values, body_mesh, setup, warnings, ghost_setup)
+    return setup
 
 
-def _setup(values: Mapping[str, object], body_mesh: BodyMesh | None) -> tuple[Setup, tuple[str, ...]]:
-    scale = scale_vector(values["scale"])
-    properties = _mass_properties(values, body_mesh, scale)
+def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, tuple[str, ...]]:
+    scale = scale_vector(list(parameters.scale))
+    properties = _mass_properties(parameters, body_mesh, scale)
     check_tensor(properties.inertia)
     # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by message.
     center_of_mass = [_divided(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]
     body = make_body(properties.mass, center_of_mass, properties.inertia, scale)
-    quaternion = unit_quaternion(values["initial.orientation_xyzw"], "initial.orientation_xyzw")
+    initial, string = parameters.initial, parameters.string
+    quaternion = unit_quaternion(initial.orientation_xyzw, "initial.orientation_xyzw")
     R = matrix_from_quaternion(quaternion)
-    w = np.asarray(values["initial.angular_velocity"])
+    w = np.asarray(initial.angular_velocity)
     omega_body = R[0] * w[0] + R[1] * w[1] + R[2] * w[2]
-    contacts = {n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")}
-    if values["imu_contact"] and values["imu_contact"] not in contacts:
-        known = ", ".join(sorted(contacts)) or "the body has none"
-        raise InputError("imu_contact", values["imu_contact"], f"'' for the COM, or a contact ({known})")
+    if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
+        known = ", ".join(sorted(parameters.contacts)) or "the body has none"
+        raise InputError("imu_contact", parameters.imu_contact, f"'' for the COM, or a contact ({known})")
     setup = Setup(
         body=body,
-        inertia_model=values["inertia_model"],
+        inertia_model=parameters.inertia_model,
         surface=body_mesh.surface if body_mesh else None,
         geometry=(body_mesh.mesh.sha256 if body_mesh else "", *scale.tolist()),
-        contacts=contacts,
-        gravity=np.asarray(values["gravity"]),
-        linear_damping=values["linear_damping"],
-        angular_damping=values["angular_damping"],
-        gyroscopic=values["gyroscopic"],
-        integrator=integrator_named(values["integrator"]),
-        step_ns=max(1, nanoseconds(values["step"])),
-        wrench_timeout_ns=nanoseconds(values["wrench_timeout"]),
-        poke_duration_ns=max(1, nanoseconds(values["poke_duration"])),
+        contacts=dict(parameters.contacts),
+        gravity=np.asarray(parameters.gravity),
+        linear_damping=parameters.linear_damping,
+        angular_damping=parameters.angular_damping,
+        gyroscopic=parameters.gyroscopic,
+        integrator=integrator_named(parameters.integrator),
+        step_ns=max(1, nanoseconds(parameters.step)),
+        wrench_timeout_ns=nanoseconds(parameters.wrench_timeout),
+        poke_duration_ns=max(1, nanoseconds(parameters.poke_duration)),
         string=StringSettings(
-            attached=values["string.attached"],
-            attach=tuple(values["string.attach"]),
-            target=tuple(values["string.target"]),
-            stiffness=values["string.stiffness"],
-            frequency=values["string.frequency"],
-            damping_ratio=values["string.damping_ratio"],
-            rest_length=values["string.rest_length"],
-            bilateral=values["string.bilateral"],
-            timeout_ns=nanoseconds(values["string.timeout"]),
+            attached=string.attached,
+            attach=string.attach,
+            target=string.target,
+            stiffness=string.stiffness,
+            frequency=string.frequency,
+            damping_ratio=string.damping_ratio,
+            rest_length=string.rest_length,
+            bilateral=string.bilateral,
+            timeout_ns=nanoseconds(string.timeout),
         ),
-        accuracy=values["accuracy"],
-        initial=state_row(values["initial.position"], quaternion, values["initial.linear_velocity"], omega_body),
-        initial_string_mass=values["initial.string_mass"],
+        accuracy=parameters.accuracy,
+        initial=state_row(initial.position, quaternion, initial.linear_velocity, omega_body),
+        initial_string_mass=initial.string_mass,
     )
     return setup, tuple(properties.warnings)
 
 
-def _mass_properties(values, body_mesh, scale):
-    ballast = [tuple(v) for n, v in sorted(values.items()) if n.startswith("ballast.")]
-    if values["inertia_model"] == "explicit":
-        given = (values[f"explicit_inertia.{part}"] for part in ("mass", "center_of_mass", "tensor"))
-        return explicit_mass_properties(*given, ballast=ballast, scale=scale)
+def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: np.ndarray) -> MassProperties:
+    ballast = parameters.point_masses
+    if parameters.inertia_model == "explicit":
+        given = parameters.explicit_inertia
+        return explicit_mass_properties(given.mass, given.center_of_mass, given.tensor, ballast=ballast, scale=scale)
     if body_mesh is None:
-        raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
+        raise _no_mesh()
     return body_mesh.moments.mass_properties(
-        values["inertia_model"],
+        parameters.inertia_model,
         scale=scale,
-        mass=values["mass"],
-        density=values["density"],
+        mass=parameters.mass,
+        density=parameters.density,
         ballast=ballast,
-        com=values["inertia_model_com"],
+        com=parameters.inertia_model_com,
     )
 
 

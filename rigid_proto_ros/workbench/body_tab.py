@@ -66,13 +66,16 @@ class BodyTab:
             self._base_scale = float(np.prod(np.abs(body.scale))) ** (1.0 / 3.0)
             self._base_mass = _own_mass(scenario)
         self._table.content = comparison(scenario)
-        mesh = str(scenario.values["mesh"])
+        mesh = str(scenario.parameters.mesh)
         self._file.content = "" if mesh in body_names() else f"Mesh file: `{Path(mesh).name}`"
         self._ballast_changed(scenario)
-        key = tuple(scenario.values[name] for name in ("mesh", "mesh_repair", "mesh_fallback"))
+        parameters = scenario.parameters
+        key = (parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback)
         if key != self._judged_mesh and scenario.body_mesh is not None:
             self._judged_mesh = key
-            asyncio.get_running_loop().create_task(self._judge(scenario.body_mesh.mesh, *key[1:]))
+            asyncio.get_running_loop().create_task(
+                self._judge(scenario.body_mesh.mesh, parameters.mesh_repair, parameters.mesh_fallback)
+            )
 
     async def _judge(self, mesh: Mesh, repair: bool, fallback: str) -> None:
         body = await asyncio.to_thread(mesh_body, mesh, repair=repair, fallback=fallback)
@@ -211,8 +214,7 @@ class BodyTab:
                 self._node.set({f"ballast.{chosen}": numbers})
 
     def _ballast_changed(self, scenario: Scenario) -> None:
-        values: Mapping[str, Any] = scenario.values
-        weights = {n.removeprefix("ballast."): list(value) for n, value in values.items() if n.startswith("ballast.")}
+        weights = {name: list(value) for name, value in scenario.parameters.ballast.items()}
         if weights == self._weights:
             return
         added = [name for name in weights if name not in self._weights]
@@ -232,13 +234,15 @@ class BodyTab:
 
 def _own_mass(scenario: Scenario) -> float:
     """Mass [kg] without ballast: as its parameter says, or what the density gives."""
-    given = float(scenario.values[_mass_parameter(scenario)])
-    weights = sum(value[0] for name, value in scenario.values.items() if name.startswith("ballast."))
+    parameters = scenario.parameters
+    explicit = parameters.inertia_model == "explicit"
+    given = parameters.explicit_inertia.mass if explicit else parameters.mass
+    weights = sum(mass for mass, *_ in parameters.point_masses)
     return given if given > 0.0 else scenario.setup.body.mass - weights
 
 
 def _mass_parameter(scenario: Scenario) -> str:
-    return "explicit_inertia.mass" if scenario.values["inertia_model"] == "explicit" else "mass"
+    return "explicit_inertia.mass" if scenario.parameters.inertia_model == "explicit" else "mass"
 
 
 def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
@@ -250,7 +254,6 @@ def _explicit(scenario: Scenario, numbers: list[float]) -> dict[str, object]:
         "explicit_inertia.center_of_mass": (body.center_of_mass / body.scale).tolist(),
         "explicit_inertia.tensor": numbers,
     }
-    for name, value in scenario.values.items():
-        if name.startswith("ballast."):
-            changes[name] = [0.0, *value[1:]]
+    for name, (_, *place) in scenario.parameters.ballast.items():
+        changes[f"ballast.{name}"] = [0.0, *place]
     return changes

@@ -127,7 +127,7 @@ class BodyView:
             self._shape = shape
             self._tip = farthest_point(surface, body) if surface is not None else np.zeros(3)
             self._draw_inertia(scenario, box, ellipsoid, corners)
-        self._place_contacts(str(scenario.values["mesh"]))
+        self._place_contacts(str(scenario.parameters.mesh))
 
     def _make_meshes(self, surface: Surface | None) -> None:
         """The nodes of body and ghost: mesh coordinates about the middle of the box, to be scaled by the node itself.

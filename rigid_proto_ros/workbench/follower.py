@@ -136,7 +136,7 @@ class Follower:
     def _act(self, kind: str, content: dict[str, Any], time_ns: int, scenario: Scenario, state: State) -> None:
         """What acted on the body acts on what is drawn beside it; what can't be followed is said."""
         try:
-            frames = frame_names(scenario.values, self._target)
+            frames = frame_names(scenario.parameters, self._target)
             command = command_of_event(kind, content, scenario.setup.contacts, frames)
             if command is not None:
                 self.acting.event(command, time_ns, scenario, state)

@@ -108,9 +108,9 @@ class LessonFolder:
         await self._announcements.while_doing("setting the scene", self._take_to(scene, script))
 
     async def _take_to(self, scene: str, script: str) -> None:
-        present = (await self._scenes.known()).values
-        situation = situation_of(scene, script, present)
-        changes = {**situation.changes, **self._speed(float(present["real_time_factor"]))}
+        present = (await self._scenes.known()).parameters
+        situation = situation_of(scene, script, present.named())
+        changes = {**situation.changes, **self._speed(present.real_time_factor)}
         await self._situations.take_to(replace(situation, changes=changes))
         self._situations.another_body = True
 

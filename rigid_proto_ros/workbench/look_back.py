@@ -57,7 +57,7 @@ class LookBack:
         negative number.
         """
         scenario = self._scenes.scenario
-        self.look_by(count * (0.01 if scenario is None else 1.0 / float(scenario.values["publish_rate"])))
+        self.look_by(count * (0.01 if scenario is None else 1.0 / float(scenario.parameters.publish_rate)))
 
     def run_afterwards(self) -> None:
         """Simulated time goes on after this look back, though it stood still before."""

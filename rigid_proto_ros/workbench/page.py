@@ -220,8 +220,8 @@ class Page:
         if old is not None:
             self.follower.changed(old, scenario)
         self.body_tab.changed(scenario, another)
-        self._upload.flies(str(scenario.values["mesh"]))
-        self._controls.update(scenario.values)
+        self._upload.flies(str(scenario.parameters.mesh))
+        self._controls.update(scenario.parameters.named())
         self.situations.another_body = False
         if another:
             self.tools.usual_force = self.tools.force = suggested_force(scenario, 2.0 * self.view.radius)

@@ -159,7 +159,7 @@ class Pointer:
             return
         commands: list[ScriptCommand] = []
         frequency = self._tools.frequency
-        if frequency > 0.0 and scenario.values["string.frequency"] != frequency:
+        if frequency > 0.0 and scenario.parameters.string.frequency != frequency:
             commands.append(_set("string.frequency", frequency))
         if self._tools.at_com or surface is None:
             aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
@@ -191,7 +191,7 @@ class Pointer:
         drag, scenario = self._drag, self._scenes.scenario
         if drag is None or drag.ended or scenario is None or self._hand.paused:
             return
-        timeout_s = float(scenario.values["string.timeout"])
+        timeout_s = float(scenario.parameters.string.timeout)
         hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
         if time.monotonic() >= drag.last_target_s + hold_s:
             self._hand.do(_target(drag))
@@ -235,5 +235,5 @@ def _three(point: Iterable[float]) -> tuple[float, float, float]:
 
 def suggested_force(scenario: Scenario, size: float) -> float:
     """A poke [N] that gives the body a part of its size a second: two digits are enough."""
-    duration_s = float(scenario.values["poke_duration"])
+    duration_s = float(scenario.parameters.poke_duration)
     return float(f"{POKE_TRAVEL * size * scenario.setup.body.mass / duration_s:.2g}")

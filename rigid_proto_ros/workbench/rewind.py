@@ -116,11 +116,11 @@ def _start(values: Mapping[str, Any]) -> np.ndarray:
     return np.array([number for name in _START for number in values[name]])
 
 
-def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, object]:
+def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, Any]:
     """Parameters in force at the session's end, as far as its events say, with the recorded state as the
     initial one.
     """
-    values = dict(read_scene_text(session.scene).values)
+    values: dict[str, Any] = dict(read_scene_text(session.scene).values)
     for number, line in enumerate(session.lines, 1):
         _, kind, content = decode_event(line, number)
         if kind == "set":

@@ -11,12 +11,11 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from ..base.errors import InputError
 from ..motion.frames import parse_frame
-from ..scene import parameters
 from ..scene.command_codec import ScriptCommand, outgoing
+from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
 from ..scene.script import parse_script, with_contacts
 from .history import History
@@ -50,17 +49,14 @@ def situation_of(scene: str, script: str, present: Mapping[str, object]) -> Situ
     What the scene doesn't name is at its default. Contacts can't change in flight: the script's are taken from the
     scene as the points that they are.
     """
-    given = parameters.convert_all(read_scene_text(scene).values)
-    values: dict[str, Any] = {**parameters.defaults(), **given}
-    contacts = {n.removeprefix("contacts."): tuple(v) for n, v in values.items() if n.startswith("contacts.")}
-    timeout_s = float(values["wrench_timeout"])
-    commands = with_contacts(parse_script(script, wrench_timeout=timeout_s) if script.strip() else [], contacts)
-    commands = [_at_its_point(command, contacts) for command in commands]
+    wanted = Parameters().replaced(read_scene_text(scene).values)
+    listed = parse_script(script, wrench_timeout=wanted.wrench_timeout) if script.strip() else []
+    commands = [_at_its_point(command, wanted.contacts) for command in with_contacts(listed, wanted.contacts)]
     if len(commands) > MAX_COMMANDS:
         raise InputError(
             "script", f"{len(commands)} commands are more than {MAX_COMMANDS}; send the script with poke_client"
         )
-    return Situation(changes_to(values, present), commands)
+    return Situation(changes_to(wanted.named(), present), commands)
 
 
 def _at_its_point(command: ScriptCommand, contacts: Mapping[str, tuple[float, ...]]) -> ScriptCommand:

@@ -25,20 +25,20 @@ def model_properties(scenario: Scenario, model: str, com: str = "") -> MassPrope
     """Mass properties of the scenario's body under a model; raises InputError where that can't be had. com: one of
     MODEL_COMS, as the scenario has it where it is empty.
     """
-    values = scenario.values
-    ballast = [value for name, value in values.items() if name.startswith("ballast.")]
+    parameters = scenario.parameters
+    ballast = parameters.point_masses
     if model == "explicit":
-        mass, com, tensor = (values[f"explicit_inertia.{name}"] for name in ("mass", "center_of_mass", "tensor"))
-        return explicit_mass_properties(mass, com, tensor, ballast, values["scale"])
+        given = parameters.explicit_inertia
+        return explicit_mass_properties(given.mass, given.center_of_mass, given.tensor, ballast, parameters.scale)
     if scenario.body_mesh is None:
         raise InputError("mesh", "a mesh is needed")
     return scenario.body_mesh.moments.mass_properties(
         model,
-        scale=values["scale"],
-        mass=values["mass"],
-        density=values["density"],
+        scale=parameters.scale,
+        mass=parameters.mass,
+        density=parameters.density,
         ballast=ballast,
-        com=com or values["inertia_model_com"],
+        com=com or parameters.inertia_model_com,
     )
 
 
@@ -49,7 +49,7 @@ def comparison(scenario: Scenario) -> str:
     Errors of moments are relative to each moment, those of entries to the true tensor's largest, as ``inspect`` has
     them.
     """
-    flying = str(scenario.values["inertia_model"])
+    flying = str(scenario.parameters.inertia_model)
     other = "bounding_box" if flying == "solid" else flying
     try:
         true = model_properties(scenario, "solid")
@@ -121,7 +121,7 @@ def _rounded(entry: float, largest: float) -> float:
 
 def _alone(scenario: Scenario, reason: str) -> str:
     body = scenario.setup.body
-    lines = [f"Simulating: **{scenario.values['inertia_model']}**. {reason}", "", "|  |  |", "| --- | --- |"]
+    lines = [f"Simulating: **{scenario.parameters.inertia_model}**. {reason}", "", "|  |  |", "| --- | --- |"]
     lines.append(f"| mass [kg] | {body.mass:.5g} |")
     lines += [f"| I{'₁₂₃'[k]} principal [kg m²] | {m:.5g} |" for k, m in enumerate(body.principal_moments)]
     return "\n".join(lines)

@@ -138,8 +138,8 @@ class UploadButton:
         if upload is None:
             return
         values = {**upload.flight(self._unit.value, self._up.value), **changes}
-        present: dict[str, Any] = dict((await self._scenes.known()).values)
-        values |= {name: [0.0, *value[1:]] for name, value in present.items() if name.startswith("ballast.")}
+        ballast = (await self._scenes.known()).parameters.ballast
+        values |= {f"ballast.{name}": [0.0, *place] for name, (_, *place) in ballast.items()}
         self._situations.another_body = True
         await self._announcements.while_doing(f"setting {upload.name}", self._situations.take_to(Situation(values)))
         self._show([f"{upload.name}: simulated"], None)

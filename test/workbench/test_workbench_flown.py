@@ -171,7 +171,7 @@ def test_one_click_shows_body_and_ghost_released_alike_and_the_angle_that_grows_
     flown.until(lambda: degrees in shown.sentence, "the number")
     assert (
         "only the tensor differs" in shown.sentence
-        and flown.page.scenes.scenario.values["inertia_model_com"] == "solid"
+        and flown.page.scenes.scenario.parameters.inertia_model_com == "solid"
     )
     flown.pick("One book, three throws")
     flown.until(lambda: not shown.sentence, "end of the comparison")

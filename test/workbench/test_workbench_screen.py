@@ -75,16 +75,16 @@ def test_keys_pause_step_look_back_reset_and_are_listed(desk, browser_page) -> N
     page, told = browser_page, desk.link.told
     count = len(told)
     pressed(desk, page, "Space", lambda: told[count:] == [("pause", True)])
-    desk.page.paused = True
+    desk.page.node.paused = True
     pressed(desk, page, "ArrowRight", lambda: told[-1] == ("step", None))
     pressed(desk, page, "Space", lambda: told[-1] == ("pause", False))
-    desk.page.paused = False
+    desk.page.node.paused = False
     pressed(desk, page, "r", lambda: told[-1] == ("reset", None))
     desk.fly(3.0, begin_s=1.1)
-    pressed(desk, page, "Backspace", lambda: desk.page.looking_at == 2_000_000_000)
-    pressed(desk, page, "ArrowLeft", lambda: desk.page.looking_at == 1_990_000_000)
-    pressed(desk, page, "ArrowRight", lambda: desk.page.looking_at == 2_000_000_000)
-    pressed(desk, page, "n", lambda: desk.page.looking_at is None and told[-1] == ("pause", False))
+    pressed(desk, page, "Backspace", lambda: desk.page.look_back.moment_ns == 2_000_000_000)
+    pressed(desk, page, "ArrowLeft", lambda: desk.page.look_back.moment_ns == 1_990_000_000)
+    pressed(desk, page, "ArrowRight", lambda: desk.page.look_back.moment_ns == 2_000_000_000)
+    pressed(desk, page, "n", lambda: desk.page.look_back.moment_ns is None and told[-1] == ("pause", False))
     for key in ("Shift+?", "h"):
         desk.said.clear()
         pressed(desk, page, key, lambda: any("Backspace: rewind 1 s" in text for text in desk.said))

@@ -186,9 +186,9 @@ def test_times_the_mass_is_that_of_the_body_without_its_ballast(desk: Desk, mode
         own = desk.page.scenes.scenario.setup.body.mass - 0.6
         assert desk.input("Mass ×").value == "1"
         desk.drag(socket, "Mass ×", "10")
-        desk.until(lambda: desk.page.scenes.scenario.values[mass] != model[mass], "another mass")
-        assert desk.page.scenes.scenario.values[mass] == pytest.approx(10.0 * own, rel=1e-12)
-        desk.do(lambda: desk.page._controls.update(desk.page.scenes.scenario.values, at_once=True))
+        desk.until(lambda: desk.page.scenes.scenario.parameters.named()[mass] != model[mass], "another mass")
+        assert desk.page.scenes.scenario.parameters.named()[mass] == pytest.approx(10.0 * own, rel=1e-12)
+        desk.do(lambda: desk.page._controls.update(desk.page.scenes.scenario.parameters.named(), at_once=True))
         assert desk.input("Mass ×").value == "10"
 
 
