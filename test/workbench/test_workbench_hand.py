@@ -87,7 +87,8 @@ def test_what_is_done_together_in_flight_is_one_message_and_waits_for_nothing() 
     (frequency, aside, knot, target) = (decode_event(line, 1)[2] for line in hand.link._log.lines)
     assert hand.kinds() == ["set", "set", "set", "string_target"] and target["point"] == [0.0, 0.0, 0.1]
     assert frequency == {"string.frequency": 8.0}
-    assert knot["string.attach"] == hand.link.scenario.parameters.string.attach != aside["string.attach"]
+    in_force = list(hand.link.scenario.parameters.string.attach)
+    assert knot["string.attach"] == in_force != aside["string.attach"]
     assert hand.pointer.dragging
 
 
