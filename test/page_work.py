@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseStamped
 from node_work import SPIN, count_publications, steps_and_time
 from rclpy.executors import SingleThreadedExecutor
 
+from rigid_proto_ros.ros.diagnostics import Reports
 from rigid_proto_ros.ros.node import RigidBodyNode
 from rigid_proto_ros.ros.physics_thread import PhysicsThread
 from rigid_proto_ros.ros.warm_up import warm_up
@@ -37,6 +38,8 @@ def main() -> None:
     listener.create_subscription(PoseStamped, "/rigid_body/pose", lambda m: None, 10, raw=True)
     thread.start([node.loop])
     spinning.start()
+    reports = Reports([node.diagnostics])
+    reports.start()
 
     def count(twist_listeners: int) -> dict:
         deadline = time.monotonic() + 20.0
@@ -55,6 +58,7 @@ def main() -> None:
     link.stop_listening()
     found["after"] = count(0)
     thread.stop()
+    reports.stop()
     executor.shutdown(timeout_sec=1.0)
     print(json.dumps(found))
     listener.destroy_node()

@@ -18,6 +18,7 @@ from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario
 from ..simulation.observer import Observer
 from .arguments import NODE_NAME, given_arguments, read_bodies, remapped_node_name
+from .diagnostics import Reports
 from .node import RigidBodyNode
 from .physics_thread import PhysicsThread
 from .warm_up import warm_up
@@ -38,6 +39,7 @@ class Bodies:
         self._physics = PhysicsThread(self._on_crash)
         self._executor: Executor | None = None
         self._executing: threading.Thread | None = None
+        self._reports: Reports | None = None
 
     def start(self) -> None:
         """Make the nodes, which may compile for minutes, and let them run. Raises InputError."""
@@ -59,6 +61,8 @@ class Bodies:
             self._executor.add_node(node)
         self._executing = threading.Thread(target=self._spin, args=(self._executor,), name="executor", daemon=True)
         self._executing.start()
+        self._reports = Reports([node.diagnostics for node in self._nodes])
+        self._reports.start()
         self._physics.start([node.loop for node in self._nodes])
         for node in self._nodes:
             node.get_logger().info(f"{node.get_fully_qualified_name()} is simulating {_described(node.loop.scenario)}")
@@ -82,6 +86,8 @@ class Bodies:
     def close(self) -> int:
         """End the motion and the recordings; returns the exit status that this makes."""
         self._ending = True
+        if self._reports is not None:
+            self._reports.stop()
         self._physics.stop()
         for node in list(self._nodes):
             node.close()

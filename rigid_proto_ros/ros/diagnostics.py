@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import threading
 import time
+import traceback
+from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from .command_intake import TOPICS, CommandIntake
@@ -19,9 +21,12 @@ REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tens
 WARNING_S = 10.0
 """How often the log says that real time is given up."""
 
+REPORT_S = 1.0
+"""Time between two reports on /diagnostics."""
+
 
 class Diagnostics:
-    """Reports as long as the node lives; the level follows from what went wrong since the last report."""
+    """Of one node; the level of a report follows from what went wrong since the one before."""
 
     def __init__(self, node: Node, loop: SimulationLoop, intake: CommandIntake, watchers: Watchers) -> None:
         self._node = node
@@ -32,10 +37,9 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._before: dict[str, object] = {}
         self._reported_s = time.monotonic()
-        # By the steady clock: reports must go on while /clock stands still.
-        self._timer = node.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _report(self) -> None:
+    def report(self) -> None:
+        """Publish how it stands, and log what is new and wrong."""
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         values = self._values()
@@ -119,3 +123,29 @@ class Diagnostics:
         if before <= 0:
             self._node.get_logger().warning(warning)
         return warning
+
+
+class Reports(threading.Thread):
+    """Lets several nodes of one process report once a second, all together. An executor would go through every entity
+    of every node for each of them, and its timers stand still with /clock.
+    """
+
+    def __init__(self, diagnostics: Sequence[Diagnostics]) -> None:
+        super().__init__(name="reports", daemon=True)
+        self._diagnostics = diagnostics
+        self._no_more = threading.Event()
+
+    def run(self) -> None:
+        """On the thread."""
+        while not self._no_more.wait(REPORT_S):
+            for diagnostics in self._diagnostics:
+                try:
+                    diagnostics.report()
+                except Exception:
+                    # A fault of ours in one report must not end those of the other nodes.
+                    traceback.print_exc()
+
+    def stop(self) -> None:
+        """End: nobody reports of a node that is being destroyed."""
+        self._no_more.set()
+        self.join(REPORT_S)

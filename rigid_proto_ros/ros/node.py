@@ -78,7 +78,7 @@ class RigidBodyNode(Node):
         self.loop.watch(self._watchers.observer)
         Services(self.loop, self.call, self.intake.received).offer(self)
         offer_simulation_interfaces(self, self.loop, self.call)
-        self._diagnostics = Diagnostics(self, self.loop, self.intake, self._watchers)
+        self.diagnostics = Diagnostics(self, self.loop, self.intake, self._watchers)
         tell_start(self._watchers.observer, scenario)
         self.loop.simulation.announce()
         self.loop.tell_scene()

@@ -24,6 +24,9 @@ that choose their own steps take up to some thousands in it.
 
 GROWTH = 4
 
+TICK_NS = 10_000_000
+"""Loops with nothing else to do wake at multiples of this [ns of wall time], and take their commands."""
+
 LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 """A message's stamp counts seconds in 32 bits."""
 
@@ -122,7 +125,8 @@ class Pace:
 
     def anchor(self, simulated_ns: int) -> None:
         """From now on simulated time goes on from ``simulated_ns``."""
-        self.anchored_ns = self.followed() if self.followed else time.monotonic_ns()
+        # On the grid of TICK_NS, a little ahead: loops that start at different moments then wake together.
+        self.anchored_ns = self.followed() if self.followed else -(-time.monotonic_ns() // TICK_NS) * TICK_NS
         self._last_reading_ns = self.anchored_ns
         self._anchor_simulated_ns = simulated_ns
 
@@ -132,7 +136,8 @@ class Pace:
             return self._followed_present_ns(reached_ns)
         if self.factor == 0.0:
             return next_publication_ns
-        present_ns = self._anchor_simulated_ns + int((time.monotonic_ns() - self.anchored_ns) * self.factor)
+        elapsed_ns = max(0, time.monotonic_ns() - self.anchored_ns)
+        present_ns = self._anchor_simulated_ns + int(elapsed_ns * self.factor)
         expected_ns = max(reached_ns, next_publication_ns)
         lag_ns = (present_ns - expected_ns) / self.factor
         if lag_ns > MAX_LAG_NS:

@@ -79,13 +79,17 @@ class PhysicsThread:
         try:
             for loop in self._loops:
                 loop.start()
+            # Kept from tick to tick: asking all loops at every wake-up of one would grow with their number squared.
+            wakes = [loop.next_wake_ns() for loop in self._loops]
             while not self._stopping:
-                self._wait_until(min(loop.next_wake_ns() for loop in self._loops))
-                self._serve_requests()
+                self._wait_until(min(wakes))
+                if self._serve_requests():
+                    wakes = [loop.next_wake_ns() for loop in self._loops]
                 now_ns = time.monotonic_ns()
-                for loop in self._loops:
-                    if loop.next_wake_ns() <= now_ns:
+                for number, loop in enumerate(self._loops):
+                    if wakes[number] <= now_ns:
                         loop.tick()
+                        wakes[number] = loop.next_wake_ns()
         except Exception:
             traceback.print_exc()
             self._on_crash()
@@ -100,7 +104,9 @@ class PhysicsThread:
             self._wake.wait(rest_ns * 1e-9)
             self._wake.clear()
 
-    def _serve_requests(self) -> None:
+    def _serve_requests(self) -> bool:
+        """Whether there were any."""
+        served = bool(self._requests)
         while self._requests:
             loop, function, future = self._requests.pop(0)
             if future.set_running_or_notify_cancel():
@@ -109,6 +115,7 @@ class PhysicsThread:
                     future.set_result(function())
                 except BaseException as error:  # the caller's to handle
                     future.set_exception(error)
+        return served
 
 
 def step_over(call: Call, loop: SimulationLoop, periods: int = 1) -> int:

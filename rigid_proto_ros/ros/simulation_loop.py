@@ -14,10 +14,7 @@ from ..scene.ghost import Ghost, ghost_of
 from ..scene.scenario import Scenario
 from ..simulation.observer import Observer
 from ..simulation.simulation import Simulation
-from .pacing import LAST_STAMP_NS, Pace, Publications, Timekeeping, WorkBudget
-
-DRAIN_NS = 10_000_000
-"""Commands are taken at least this often [ns of wall time]."""
+from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Timekeeping, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
 """Between publications at most this often, while commands come in [ns of wall time]."""
@@ -188,7 +185,7 @@ class SimulationLoop:
         """Advance to the present: publish what is due, then take the commands that have arrived."""
         wall_ns = time.monotonic_ns()
         if wall_ns >= self._next_listener_check_ns:
-            self._next_listener_check_ns = wall_ns + DRAIN_NS
+            self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
         present_ns = self._simulated_present_ns()
         if present_ns > LAST_STAMP_NS:
@@ -288,7 +285,8 @@ class SimulationLoop:
 
     def next_wake_ns(self) -> int:
         """When ``tick`` is due next [ns of wall time]."""
-        latest_ns = self._last_drain_ns + DRAIN_NS
+        # On a grid that all loops of the process share, so that one wake-up serves them all.
+        latest_ns = (self._last_drain_ns // TICK_NS + 1) * TICK_NS
         factor = self._pace.factor
         if self.stepping or not self._caught_up:
             return 0
