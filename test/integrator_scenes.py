@@ -11,6 +11,7 @@ from flights import SECOND
 from one_segment import OneSegment, make_problem
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
+from rigid_proto_ros.base.rotation import cross
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import (
@@ -22,7 +23,7 @@ from rigid_proto_ros.motion.integrators.integrator import (
     WORLD_TORQUE,
     Integrator,
 )
-from rigid_proto_ros.motion.loads import LoadSum, cross
+from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings, Tied, tie
 
@@ -121,7 +122,7 @@ def _reference(scene: Scene, times):
 
 def scene_for(integrator: Integrator, **changes) -> Scene:
     """Everything that the integrator carries except a string and a dropped gyroscopic term."""
-    return Scene(integrator.carries - {STRING, NO_GYROSCOPIC_TERM}, **changes)
+    return Scene(integrator.supports - {STRING, NO_GYROSCOPIC_TERM}, **changes)
 
 
 def flown(integrator: Integrator | str, scene: Scene, step_ns: int, until_ns: int) -> State:

@@ -54,7 +54,7 @@ HEUN = Integrator(
     source="Heun 1900",
     limits="Explicit.",
     stability_limit=1.0,
-    carries=LOADS | {ANGULAR_DAMPING, NO_GYROSCOPIC_TERM},
+    supports=LOADS | {ANGULAR_DAMPING, NO_GYROSCOPIC_TERM},
     kernel=heun_steps,
     make_methods=fixed_steps,
 )

@@ -72,18 +72,18 @@ def parameters() -> str:
 
 
 def integrators() -> str:
-    """What each integrator is and can't carry."""
+    """What each integrator is and doesn't support."""
     needs = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM)
     rows = []
     for integrator in INTEGRATORS.values():
-        lacks = [need for need in needs if need not in integrator.carries]
+        lacks = [need for need in needs if need not in integrator.supports]
         order = "exact" if integrator.order is None else str(integrator.order)
         evaluations = str(integrator.evaluations)
         if integrator.kernel is None:  # it picks others
             order = evaluations = "-"
         cells = (_code(integrator.name), order, evaluations, "; ".join(lacks))
         rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".").replace("``", "`")))
-    return _table(("name", "order", "evaluations a step", "can't carry", "good for, and what breaks it"), rows)
+    return _table(("name", "order", "evaluations a step", "doesn't support", "good for, and what breaks it"), rows)
 
 
 def masses(short: bool = False) -> str:

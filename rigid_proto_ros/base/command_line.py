@@ -42,8 +42,8 @@ class Parser(argparse.ArgumentParser):
     below --help's options.
     """
 
-    def __init__(self, *args: Any, examples: Iterable[tuple[str, str]] = (), **kwargs: Any) -> None:
-        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
+    def __init__(self, *, examples: Iterable[tuple[str, str]] = (), **kwargs: Any) -> None:
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
         self._negative_number_matcher = NEGATIVE_NUMBER
         self.show_examples(examples)
 

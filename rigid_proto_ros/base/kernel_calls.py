@@ -14,6 +14,7 @@ from typing import Any
 from numba import boolean, config, float64, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
+from numba.core.typing.templates import Signature
 
 from .compilation import intrinsic
 
@@ -23,7 +24,7 @@ STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
 ADAPTIVE_STEPS = types.FunctionType(
     int64(float64[::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], int64, boolean)
 )
-"""A kernel (y, p, control, following, workspace, span_ns, look)."""
+"""A kernel (y, p, control, following, workspace, span_ns, sampling)."""
 
 _INTERPRETED = bool(getattr(config, "DISABLE_JIT", 0))
 """NUMBA_DISABLE_JIT=1: kernels are plain functions, for readable tracebacks."""
@@ -44,7 +45,7 @@ def address_of(kernel: Callable, taken_as: types.FunctionType) -> int:
     return address
 
 
-def entry_of(kernel: Callable, signature: types.Type) -> Callable:
+def entry_of(kernel: Callable, signature: Signature) -> Callable:
     """The compiled function itself for this signature: called without looking at its arguments' types.
 
     A call through numba's dispatcher looks them up each time, which costs more than a short kernel takes.

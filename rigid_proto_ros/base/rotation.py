@@ -14,6 +14,31 @@ import numpy as np
 from .compilation import njit
 from .errors import InputError
 
+Numbers = Sequence[float] | np.ndarray
+"""Components of a vector or a quaternion, as they may be given."""
+Vector = tuple[float, float, float]
+
+
+def vector(numbers: Numbers) -> Vector:
+    """Three given components."""
+    x, y, z = numbers
+    return float(x), float(y), float(z)
+
+
+def cross(a: Numbers, b: Numbers) -> np.ndarray:
+    """a × b (3,)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
+    """The matrix (3, 3) times v (3,), summed in a fixed order: BLAS would pick one by processor."""
+    return matrix[:, 0] * v[0] + matrix[:, 1] * v[1] + matrix[:, 2] * v[2]
+
+
+def transposed_times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
+    """The transposed matrix (3, 3) times v (3,), in the same order."""
+    return matrix[0] * v[0] + matrix[1] * v[1] + matrix[2] * v[2]
+
 
 @njit(cache=True)
 def multiply(
@@ -114,7 +139,7 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
     return q
 
 
-def unit_quaternion(q: Sequence[float], field: str) -> np.ndarray:
+def unit_quaternion(q: Numbers, field: str) -> np.ndarray:
     """A given quaternion scaled to unit length; raises InputError when it has none.
 
     One that is unit already, to rounding, is kept bit for bit, so that a dumped state is read back as it was.

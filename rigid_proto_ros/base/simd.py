@@ -22,7 +22,7 @@ from .compilation import intrinsic
 _DOUBLE, _NUMBER = ir.DoubleType(), ir.IntType(32)
 _LINE = 64
 """Bytes."""
-Vector = Any
+Packed = Any
 """A vector within a kernel, to a type checker."""
 
 

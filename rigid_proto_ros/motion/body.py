@@ -10,12 +10,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import quaternion_from_matrix
+from ..base.rotation import Numbers, quaternion_from_matrix
 from ..mass.tensor import principal_axes
 
 # Where the numbers of a body stand in its row.
@@ -88,23 +87,23 @@ class Body:
         row[BODY_SCALE : BODY_SCALE + 3] = self.scale
         return row
 
-    def point(self, mesh_point: Sequence[float]) -> np.ndarray:
+    def point(self, mesh_point: Numbers) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""
         x, y, z = mesh_point
         return np.array(arm(self.row, float(x), float(y), float(z)))
 
-    def mesh_point(self, point: Sequence[float]) -> np.ndarray:
+    def mesh_point(self, point: Numbers) -> np.ndarray:
         """Metres from the COM, body axes, to mesh coordinates (3,)."""
         return (np.asarray(point) + self.center_of_mass) / self.scale
 
-    def angular_acceleration(self, torque_body: Sequence[float]) -> np.ndarray:
+    def angular_acceleration(self, torque_body: Numbers) -> np.ndarray:
         """I⁻¹ τ (3,), both in body axes."""
         x, y, z = torque_body
         return np.array(angular_acceleration(self.row, float(x), float(y), float(z)))
 
 
 def make_body(
-    mass: float, center_of_mass: Sequence[float], inertia: Any, scale: Sequence[float] = (1.0, 1.0, 1.0)
+    mass: float, center_of_mass: Numbers, inertia: Sequence[Numbers] | np.ndarray, scale: Numbers = (1.0, 1.0, 1.0)
 ) -> Body:
     """A body of given mass properties, its tensor diagonalized once."""
     inertia = np.asarray(inertia, dtype=float)

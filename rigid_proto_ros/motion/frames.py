@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from ..base.errors import CommandRefused
+from ..base.rotation import Vector, vector
 
 AXES = ("world", "body", "normal")
 FIXED_POINTS = ("com", "origin")
@@ -92,7 +93,7 @@ def parse_frame(
     return Frame(axes, point, duration_s, impulse)
 
 
-def _parse_point(part: str, text: str, contacts: Container[str], axes_words: Sequence[str] = ()) -> tuple:
+def _parse_point(part: str, text: str, contacts: Collection[str], axes_words: Iterable[str] = ()) -> tuple:
     word, *values = part.split("/")
     if part in FIXED_POINTS:
         return (part,)
@@ -113,11 +114,11 @@ def _parse_point(part: str, text: str, contacts: Container[str], axes_words: Seq
     raise CommandRefused("frame", "frame_id", text, accepted)
 
 
-def _parse_triple(part: str, text: str) -> tuple[float, float, float]:
+def _parse_triple(part: str, text: str) -> Vector:
     numbers = part.split(",")
     if len(numbers) != 3 or not all(_NUMBER.match(n) for n in numbers):
         raise CommandRefused("frame", "frame_id", text, "three decimal numbers x,y,z without blanks")
-    values = tuple(float(n) for n in numbers)
+    values = vector([float(n) for n in numbers])
     if not all(math.isfinite(v) for v in values):
         raise CommandRefused("nonfinite", "frame_id", text, "three finite numbers x,y,z")
     return values

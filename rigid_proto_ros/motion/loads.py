@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 import math
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from numba import boolean, float64
 from ..base.compilation import njit
 from ..base.errors import CommandRefused
 from ..base.kernel_calls import entry_of
-from ..base.rotation import matrix_elements
+from ..base.rotation import Numbers, Vector, matrix_elements, transposed_times, vector
 from . import body as of_body
 from .body import Body
 from .frames import Frame, point_text
@@ -59,7 +59,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def arm_of(load: np.ndarray, body: np.ndarray) -> tuple[float, float, float]:
+def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
     """From the COM to the point of attack [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
         return 0.0, 0.0, 0.0
@@ -67,7 +67,7 @@ def arm_of(load: np.ndarray, body: np.ndarray) -> tuple[float, float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def own_force(load: np.ndarray, body: np.ndarray) -> tuple[float, float, float]:
+def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
     """The force in body axes, of a load whose axes turn with the body: three numbers."""
     f = load[FORCE]
     if load[LOAD_AXES] == NORMAL_AXES:
@@ -170,10 +170,10 @@ class Load(NamedTuple):
     """
 
     axes: str
-    mesh_point: tuple[float, float, float] | None
-    force: tuple[float, float, float]
-    torque: tuple[float, float, float]
-    mesh_normal: tuple[float, float, float] | None = None
+    mesh_point: Vector | None
+    force: Vector
+    torque: Vector
+    mesh_normal: Vector | None = None
 
     @property
     def is_zero(self) -> bool:
@@ -207,7 +207,7 @@ class Load(NamedTuple):
     def force_body(self, body: Body, state: State) -> np.ndarray:
         """The force (3,) in body axes at this state."""
         if self.axes == "world":
-            return _transposed_times(state.rotation, np.asarray(self.force))
+            return transposed_times(state.rotation, np.asarray(self.force))
         return self.own_force(body)
 
     def own_force(self, body: Body) -> np.ndarray:
@@ -235,7 +235,7 @@ def load_of_row(row: np.ndarray) -> Load:
 def load_of_bytes(row: bytes) -> Load:
     """The load whose row these are."""
     axes, has_point, *numbers = _ROW.unpack(row)
-    point, force, torque, normal = (tuple(numbers[k : k + 3]) for k in range(0, 12, 3))
+    point, force, torque, normal = (vector(numbers[k : k + 3]) for k in range(0, 12, 3))
     named = _AXES[int(axes)]
     return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
 
@@ -264,7 +264,7 @@ def light_amount(body: Body) -> float:
     return 0.1 * MAX_ACCELERATION * min(body.mass, float(body.principal_moments[0]) / (1.0 + 3.0 * largest))
 
 
-def light_row(frame: Frame, force: Sequence[float], torque: Sequence[float], most: float) -> bytes:
+def light_row(frame: Frame, force: Numbers, torque: Numbers, most: float) -> bytes:
     """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its
     amount no more than ``most`` (of ``light_amount``). Empty for any other: ``settle`` says what it is, or what is
     wrong with it.
@@ -289,18 +289,18 @@ def light_row(frame: Frame, force: Sequence[float], torque: Sequence[float], mos
 
 def settle(
     frame: Frame,
-    force: Sequence[float],
-    torque: Sequence[float],
+    force: Numbers,
+    torque: Numbers,
     body: Body,
     surface: Surface | None,
-    contacts: dict,
+    contacts: Mapping[str, Vector],
     state: State | None,
 ) -> Load:
     """Settle a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
 
     state None leaves a ray unsettled: it is checked again when it takes effect.
     """
-    force, torque = tuple(map(float, force)), tuple(map(float, torque))
+    force, torque = vector(force), vector(torque)
     # Of finite numbers a sum that isn't finite overflowed; only then each is looked at.
     if not math.isfinite(sum(force) + sum(torque)) and not all(map(math.isfinite, (*force, *torque))):
         raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
@@ -316,20 +316,20 @@ def settle(
         normal = surface.inward_normal(mesh_point)
         if not normal.any():
             raise CommandRefused("frame", "frame_id", frame.text, "a point where the surface has a normal")
-        mesh_normal = tuple(float(n) for n in normal)
+        mesh_normal = vector(normal)
     return Load(frame.axes, mesh_point, force, torque, mesh_normal)
 
 
 def _mesh_point(
-    frame: Frame, body: Body, surface: Surface | None, contacts: dict, state: State | None
-) -> tuple[float, float, float] | None:
+    frame: Frame, body: Body, surface: Surface | None, contacts: Mapping[str, Vector], state: State | None
+) -> Vector | None:
     word, *values = frame.point
     if word == "com":
         return None
     if word == "origin":
         return (0.0, 0.0, 0.0)
     if word == "contact":
-        return tuple(float(x) for x in contacts[values[0]])
+        return vector(contacts[values[0]])
     if word == "point":
         return values[0]
     if surface is None:
@@ -337,22 +337,13 @@ def _mesh_point(
     if word == "vertex":
         if values[0] >= len(surface.vertices):
             raise CommandRefused("frame", "frame_id", frame.text, f"vertex/0 to vertex/{len(surface.vertices) - 1}")
-        return tuple(float(x) for x in surface.vertices[values[0]])
+        return vector(surface.vertices[values[0]])
     if state is None:
         return None
     R = state.rotation
-    origin = body.mesh_point(_transposed_times(R, np.asarray(values[0]) - state.position))
-    direction = _transposed_times(R, np.asarray(values[1]) / np.abs(values[1]).max()) / body.scale
+    origin = body.mesh_point(transposed_times(R, np.asarray(values[0]) - state.position))
+    direction = transposed_times(R, np.asarray(values[1]) / np.abs(values[1]).max()) / body.scale
     hit = surface.ray_hit(origin, direction)
     if hit is None:
         raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
-    return tuple(float(x) for x in hit[0])
-
-
-def cross(a: Sequence[float], b: Sequence[float]) -> np.ndarray:
-    """a × b of two (3,) arrays."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def _transposed_times(R: np.ndarray, v: np.ndarray) -> np.ndarray:
-    return R[0] * v[0] + R[1] * v[1] + R[2] * v[2]
+    return vector(hit[0])

@@ -11,7 +11,7 @@ with g_w = gravity + F_w/m [m/s², world], g_b = F_b/m [m/s², principal], M = �
 and F the pull of the string (motion/string.py) on its knot at r.
 
 Translation is split into a reference that has a closed form and what is added to it (motion/variables.py), so that an
-integrator carries no more than it must. Without a string the reference is what g_w and c_v do from the start on, with
+integrator computes no more than it must. Without a string the reference is what g_w and c_v do from the start on, with
 one it is the even motion of the string's free end.
 """
 

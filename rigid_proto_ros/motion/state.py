@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.rotation import matrix_from_quaternion
+from ..base.rotation import Numbers, matrix_from_quaternion, times
 
 
 @dataclass(slots=True)
@@ -51,16 +50,16 @@ class State:
     @property
     def angular_velocity(self) -> np.ndarray:
         """ω in world axes [rad/s]."""
-        return _product(self.rotation, self.angular_velocity_body)
+        return times(self.rotation, self.angular_velocity_body)
 
     def kinetic_energy(self, mass: float, inertia: np.ndarray) -> float:
         """½ m|v|² + ½ ωᵀIω [J]."""
         v, w = self.linear_velocity, self.angular_velocity_body
-        return 0.5 * mass * float((v * v).sum()) + 0.5 * float((w * _product(inertia, w)).sum())
+        return 0.5 * mass * float((v * v).sum()) + 0.5 * float((w * times(inertia, w)).sum())
 
     def angular_momentum(self, inertia: np.ndarray) -> np.ndarray:
         """L = R I ω about the COM, world axes [N m s]."""
-        return _product(self.rotation, _product(inertia, self.angular_velocity_body))
+        return times(self.rotation, times(inertia, self.angular_velocity_body))
 
     def sha256(self) -> str:
         """SHA-256 of int64 time_ns, then float64 x, q xyzw, v, ω body, little-endian, with −0 written as +0."""
@@ -69,16 +68,11 @@ class State:
         return digest.hexdigest()
 
 
-def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Matrix times vector summed in a fixed order: BLAS would pick one by processor."""
-    return matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2]
-
-
 def state_row(
-    position: Sequence[float],
-    orientation_xyzw: Sequence[float],
-    linear_velocity: Sequence[float],
-    angular_velocity_body: Sequence[float],
+    position: Numbers,
+    orientation_xyzw: Numbers,
+    linear_velocity: Numbers,
+    angular_velocity_body: Numbers,
 ) -> np.ndarray:
     """The 13 numbers of a state in their order."""
     return np.concatenate([position, orientation_xyzw, linear_velocity, angular_velocity_body]).astype(float)

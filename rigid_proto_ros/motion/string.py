@@ -14,13 +14,12 @@ the string changes, then held: c = 2ζ√(k m_eff), and k = m_eff ω² when a fr
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.rotation import Numbers, cross, times, transposed_times, vector
 from .body import Body
-from .loads import cross
 from .state import State
 
 RAMP_NS = 100_000_000
@@ -99,7 +98,7 @@ class Tied:
 
     def span(self, body: Body, state: State) -> np.ndarray:
         """From the free end to the knot (3,) [m, world]."""
-        knot = state.position + (state.rotation * self.arm(body)).sum(axis=1)
+        knot = state.position + times(state.rotation, self.arm(body))
         return knot - self.free_end(state.time_ns)
 
     def stretch(self, body: Body, state: State) -> float:
@@ -110,7 +109,7 @@ class Tied:
         """Force on the knot (3,) [N, world]."""
         span = self.span(body, state)
         length = _length(span)
-        arm = (state.rotation * self.arm(body)).sum(axis=1)
+        arm = times(state.rotation, self.arm(body))
         velocity = state.linear_velocity + cross(state.angular_velocity, arm) - self.hand_velocity(state.time_ns)
         if self.rest_length == 0.0:
             return -self.stiffness * span - self.damping * velocity
@@ -130,7 +129,7 @@ class Tied:
             return 0.0
         return 0.5 * self.stiffness * stretch * stretch
 
-    def moved(self, target: Sequence[float], time_ns: int, timeout_ns: int) -> Tied:
+    def moved(self, target: Numbers, time_ns: int, timeout_ns: int) -> Tied:
         """The hand goes to a new target: over the time since the last one, at most RAMP_NS."""
         ramp_ns = min(time_ns - self.last_target_ns, RAMP_NS)
         return replace(
@@ -163,8 +162,8 @@ class Tied:
 
 def tie(
     settings: StringSettings,
-    attach: Sequence[float],
-    target: Sequence[float],
+    attach: Numbers,
+    target: Numbers,
     body: Body,
     state: State,
     timeout_ns: int,
@@ -177,7 +176,7 @@ def tie(
     now_ns = state.time_ns
     point = np.asarray(target, dtype=float)
     tied = Tied(
-        attach=tuple(float(x) for x in attach),
+        attach=vector(attach),
         origin=point,
         target=point,
         begin_ns=now_ns,
@@ -201,7 +200,7 @@ def effective_mass(body: Body, arm: np.ndarray, state: State, span: np.ndarray, 
     length = _length(span)
     if length > max(least, ROUNDINGS * 2.0**-52 * (_length(state.position) + _length(np.asarray(arm)))):
         R = state.rotation
-        direction = R[0] * span[0] + R[1] * span[1] + R[2] * span[2]
+        direction = transposed_times(R, span)
         directions, weight = [direction / length], 1.0
     else:
         directions, weight = list(np.eye(3)), 1.0 / 3.0

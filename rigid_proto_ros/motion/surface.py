@@ -8,13 +8,13 @@ a million triangles take some milliseconds.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.rotation import Numbers
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Surface:
         """Sides of the bounding box (3,)."""
         return self.vertices.max(axis=0) - self.vertices.min(axis=0)
 
-    def ray_hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, int] | None:
+    def ray_hit(self, origin: Numbers, direction: Numbers) -> tuple[np.ndarray, int] | None:
         """First point (3,) where the ray meets the surface from either side, and its triangle; None for a miss."""
         direction = np.asarray(direction, dtype=float)
         direction = direction / np.abs(direction).max()
@@ -38,12 +38,12 @@ class Surface:
             return None
         return np.asarray(origin, dtype=float) + distance * direction, int(triangle)
 
-    def nearest_point(self, point: Sequence[float]) -> np.ndarray:
+    def nearest_point(self, point: Numbers) -> np.ndarray:
         """The point (3,) of the surface nearest to ``point`` (3,)."""
         nearest, _, _ = _nearest(self.vertices, self.triangles, np.asarray(point, dtype=float))
         return np.array(nearest)
 
-    def inward_normal(self, point: Sequence[float]) -> np.ndarray:
+    def inward_normal(self, point: Numbers) -> np.ndarray:
         """Unit inward normal (3,) of the surface where it is nearest to ``point`` (3,).
 
         On an edge or at a vertex it is the angle-weighted mean of the faces that meet there (Baerentzen & Aanaes 2005),
@@ -101,7 +101,7 @@ def _first_hit(
 
 
 @njit(cache=True)
-def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[float, float, float]:
+def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, float, float]:
     """Nearest point of a triangle, squared distance, and the angle that the triangle spans there: its corner's, π on an
     edge, 2π inside. After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """

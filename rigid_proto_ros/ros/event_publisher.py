@@ -67,9 +67,9 @@ class EventPublisher(Observer):
 
     def event(self, time_ns: int, line: str) -> None:  # noqa: ARG002
         """A line of the event log."""
-        if self.hears_events():
+        if self.wants_events():
             self._events.publish(cdr.string(line))
 
-    def hears_events(self) -> bool:
+    def wants_events(self) -> bool:
         """Somebody listens to the topic."""
         return self._events.get_subscription_count() > 0

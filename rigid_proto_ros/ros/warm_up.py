@@ -15,7 +15,7 @@ from ..simulation.simulation import Simulation
 
 
 def warm_up(setup: Setup) -> State:
-    """Fly this setup for a moment under a command of each kind that its integrator carries; returns the last state."""
+    """Fly this setup for a moment under a command of each kind that its integrator supports; returns the last state."""
     force, none = (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0)
     spinning = setup.initial.copy()
     spinning[10:13] += (0.1, 0.2, 0.3)
@@ -32,7 +32,7 @@ def warm_up(setup: Setup) -> State:
         try:
             trial.submit(command)
         except CommandRefused:
-            continue  # an integrator that can't carry it will refuse it in flight too
+            continue  # an integrator that doesn't support it will refuse it in flight too
         for until_ns in (1_000_000, 2_000_001):
             trial.advance(until_ns)
     return trial.state

@@ -2,7 +2,7 @@
 """The ghost: a second body that gets the same commands under another tensor or integrator, to be seen beside the first.
 
 True against box, exact against rk4: where the two part is the lesson. It never acts back, and a run without a viewer
-doesn't carry it.
+doesn't support it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Refusals(Observer):
 
 class Ghost:
     """The simulation of ``scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told of what the
-    ghost can't carry, once until the next reset.
+    ghost doesn't support, once until the next reset.
     """
 
     def __init__(self, scenario: Scenario, observer: Observer) -> None:
@@ -48,7 +48,7 @@ class Ghost:
         self.announce()
 
     def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
-        """Take a command of the followed simulation; what the ghost can't carry passes it by, and the observer is told."""
+        """Take a command of the followed simulation; what the ghost doesn't support passes it by, and the observer is told."""
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
         # A change before it in its list may allow what the present setup doesn't: then it is judged when it acts.

@@ -20,7 +20,7 @@ from ..mass.properties import MassProperties, MeshMoments, explicit_mass_propert
 from ..mass.tensor import check_tensor
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
-from ..motion.integrators import check_carried, integrator_named
+from ..motion.integrators import check_supported, integrator_named
 from ..motion.state import state_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
@@ -156,7 +156,7 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
     setup, _ = _setup(own, body_mesh)
     if ghost.integrator:
         try:
-            check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
+            check_supported(setup.integrator, needs_of(setup, (), setup.string.attached))
         except CommandRefused as refusal:
             raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
     return setup

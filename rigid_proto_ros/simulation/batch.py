@@ -82,7 +82,7 @@ _VARIANTS = (
 )
 _Flights = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool, np.ndarray]
 """Arrays of a block, in the order of _VARIANTS."""
-_LOOKS = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
+_SAMPLING = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
 _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1])
 
 
@@ -96,18 +96,18 @@ def _fly(  # noqa: PLR0913
     methods: np.ndarray,
     commands: np.ndarray,
     loads: np.ndarray,
-    looks_ns: np.ndarray,
+    sample_ns: np.ndarray,
     stops: np.ndarray,
     context: np.ndarray,
     tables: tuple,
     states: np.ndarray,
 ) -> tuple[int, int]:
-    """One flight: fills states (m, STATE) at looks_ns (m,) ascending, each before what acts at that very time.
+    """One flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
 
     settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods:
     motion/integrators/stepping.py. commands (c, 3) in the order in which they act and loads (c, LOAD). stops (k, 3):
-    the flight ends at the first look at which one holds. context: simulation/quantities.py, filled here. tables: arrays
-    of simulation/flight.py with room for all. Returns how many looks it reached, and which stop held or −1; 0 looks:
+    the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled here. tables: arrays
+    of simulation/flight.py with room for all. Returns how many samples it reached, and which stop held or −1; 0 samples:
     the simulation must say what is wrong.
     """
     f, n, rows_ns, rows, events = tables
@@ -116,7 +116,7 @@ def _fly(  # noqa: PLR0913
         if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
             return 0, -1
     n[:] = 0
-    n[fl.HELD] = fl.NOBODY
+    n[fl.HELD] = fl.NONE_HELD
     row = f[fl.ROW : fl.ROW + 13]
     if not b.initial_row(settings, row):
         return 0, -1
@@ -135,14 +135,14 @@ def _fly(  # noqa: PLR0913
         rows[c, :LOAD] = loads[c]
     n[fl.DUE_END] = count
     fl.begin_segment(f, n, rows, methods)
-    for look in range(looks_ns.shape[0]):
-        if fl.fly(f, n, rows_ns, rows, events, methods, looks_ns[look]) != fl.REACHED:
+    for sample in range(sample_ns.shape[0]):
+        if fl.fly(f, n, rows_ns, rows, events, methods, sample_ns[sample]) != fl.REACHED:
             return 0, -1
-        states[look, :13], states[look, 13] = row, 0.0
-        stop = which_is_met(stops, states[look], context)
+        states[sample, :13], states[sample, 13] = row, 0.0
+        stop = which_is_met(stops, states[sample], context)
         if stop >= 0:
-            return look + 1, stop
-    return looks_ns.shape[0], -1
+            return sample + 1, stop
+    return sample_ns.shape[0], -1
 
 
 @njit(cache=True, error_model="numpy")
@@ -157,7 +157,7 @@ def _one(  # noqa: PLR0913
     chooses: bool,
     methods: np.ndarray,
     body: np.ndarray,
-    looks_ns: np.ndarray,
+    sample_ns: np.ndarray,
     stops: np.ndarray,
     context: np.ndarray,
     tables: tuple,
@@ -173,7 +173,7 @@ def _one(  # noqa: PLR0913
     method = methods[own_times[b.DEGREE]]
     gyroscopic = constants[GYROSCOPIC]
     return _fly(
-        own, own_times, body, gyroscopic, chooses, method, command, load, looks_ns, stops, context, tables, states
+        own, own_times, body, gyroscopic, chooses, method, command, load, sample_ns, stops, context, tables, states
     )
 
 
@@ -197,7 +197,7 @@ def _fly_block(  # noqa: PLR0913
     variants: _Flights,
     references: _Flights,
     has_references: bool,
-    looks_ns: np.ndarray,
+    sample_ns: np.ndarray,
     watched: np.ndarray,
     stops: np.ndarray,
     measures: np.ndarray,
@@ -206,29 +206,29 @@ def _fly_block(  # noqa: PLR0913
     """Variations first to last − 1."""
     status, end_ns, stop, measured, finals = results
     body, context, tables = np.zeros(BODY), np.zeros(CONTEXT), _tables(variants, references)
-    states = np.zeros((looks_ns.shape[0], STATE))
-    others = np.zeros((looks_ns.shape[0] if has_references else 1, STATE))
+    states = np.zeros((sample_ns.shape[0], STATE))
+    others = np.zeros((sample_ns.shape[0] if has_references else 1, STATE))
     # One place that flies, whichever it is: a second one would be compiled a second time.
     sides, kept, ends = (references, variants), (others, states), (np.zeros((0, 3)), stops)
     for i in range(first, last):
         status[i] = 0
         reached = 0
         for side in range(0 if has_references else 1, 2):
-            reached, stop[i] = _one(i, *sides[side], body, looks_ns, ends[side], context, tables, kept[side])
+            reached, stop[i] = _one(i, *sides[side], body, sample_ns, ends[side], context, tables, kept[side])
             if reached == 0:
                 break
         if reached == 0:
             continue
         status[i] = 1
-        end_ns[i] = looks_ns[reached - 1]
+        end_ns[i] = sample_ns[reached - 1]
         finals[i, :] = states[reached - 1, :13]
-        measure_flight(measures, states, others, looks_ns, watched, reached, context, measured[i])
+        measure_flight(measures, states, others, sample_ns, watched, reached, context, measured[i])
 
 
 @cache
 def _compiled() -> Callable:
     """``_fly_block`` compiled, or loaded from the cache: when it is first wanted and not at import."""
-    block = (types.Tuple(_VARIANTS), types.Tuple(_VARIANTS), boolean, *_LOOKS, types.Tuple(_RESULTS))
+    block = (types.Tuple(_VARIANTS), types.Tuple(_VARIANTS), boolean, *_SAMPLING, types.Tuple(_RESULTS))
     signature = types.void(int64, int64, *block)
     return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_block)
 
@@ -247,7 +247,7 @@ def _methods(integrator: Integrator) -> np.ndarray:
 def fly_variants(
     variants: Variants,
     references: Variants | None,
-    looks_ns: np.ndarray,
+    sample_ns: np.ndarray,
     watched: np.ndarray,
     stops: np.ndarray,
     measures: np.ndarray,
@@ -258,5 +258,5 @@ def fly_variants(
     filled = (results.status, results.end_ns, results.stop, results.measured, results.states)
     own = variants.arrays
     other = own if references is None else references.arrays
-    _compiled()(0, rows, own, other, references is not None, looks_ns, watched, stops, measures, filled)
+    _compiled()(0, rows, own, other, references is not None, sample_ns, watched, stops, measures, filled)
     return results

@@ -15,7 +15,7 @@ from enum import IntEnum
 from ..base.errors import CommandRefused
 from ..motion.frames import Frame
 from ..motion.loads import Load, load_of_bytes
-from .flight import CLEAR
+from .flight import CLEAR, HELD_WRENCH, IMPULSE, PULSE
 from .setup import Setup
 
 FARTHEST = 1e100
@@ -208,3 +208,13 @@ class Pending:
     def load(self) -> Load | None:
         """The load, where it is settled."""
         return load_of_bytes(self.row) if self.row else None
+
+    def settle(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
+        """The load of the command, a wrench or poke, was settled under this setup."""
+        self.settled_for, self.row = setup, row
+        if command.held:
+            self.kind = HELD_WRENCH
+        elif command.frame.impulse:
+            self.kind = IMPULSE
+        else:
+            self.kind, self.duration_ns = PULSE, command.duration_ns

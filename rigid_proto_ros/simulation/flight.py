@@ -4,7 +4,7 @@
 Everything a flight is stands in a few arrays: doubles ``f``, integers ``n``, and tables whose rows are loads
 (``times``, ``loads``). Commands cut it into segments; ``fly`` goes from event to event until the time asked for, and
 writes down what began and ended on the way. What it can't do (a ray, a change of parameters, a string tied or let go)
-is brought about between two calls, by the same functions.
+is applied between two calls, by the same functions.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ TIED, STRING_BEGIN_NS, STRING_END_NS = 18, 19, 20
 WAITS = 21  # for a kernel, in the middle of a call
 INTEGERS = 22
 
-NOBODY = -1
+NONE_HELD = -1
 """HELD, when no held wrench acts."""
 
 # A row of times. AT_NS: when a command acts, or a load began. DURATION_NS of a pulse: −1 as the setting for pokes says.
@@ -166,7 +166,7 @@ def sample(f: np.ndarray, n: np.ndarray, methods: np.ndarray, at_ns: int, row: n
 
 
 @njit(cache=True, error_model="numpy")
-def carry(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> int:
+def advance_segment(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> int:
     """Go on in the segment to ``until_ns``: full steps, then one shorter step that ends exactly there, on a copy."""
     n[WAITS] = 0 if is_provided(methods, n[METHOD]) else 1
     if n[WAITS] != 0:
@@ -229,7 +229,7 @@ def finish_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.
 
 @njit(cache=True, error_model="numpy")
 def cut_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
-    """End the segment at NOW_NS by the step that looking there took, and begin another."""
+    """End the segment at NOW_NS by the step that sampling there took, and begin another."""
     if n[NOW_NS] > n[COMMITTED_NS] and methods[n[METHOD], SLEEPS] == 0:
         n[TAKEN] += 1
     finish_segment(f, n, loads, methods)
@@ -262,7 +262,7 @@ def end_due(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndar
             continue
         _write(n, events, ENDED, times[row, ID], row)
         if n[HELD] == row:
-            n[HELD] = NOBODY
+            n[HELD] = NONE_HELD
     ended = kept != n[ACTING]
     n[ACTING] = kept
     return ended
@@ -272,10 +272,10 @@ def end_due(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndar
 def end_held(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray) -> None:
     """End the held wrench, if there is one."""
     held = n[HELD]
-    if held == NOBODY:
+    if held == NONE_HELD:
         return
     _write(n, events, ENDED, times[held, ID], held)
-    n[HELD] = NOBODY
+    n[HELD] = NONE_HELD
     for row in range(held + 1, n[ACTING]):
         _keep(n, times, loads, row - 1, row)
     n[ACTING] -= 1
@@ -286,7 +286,7 @@ def end_all(n: np.ndarray, times: np.ndarray, events: np.ndarray) -> None:
     """End everything that acts."""
     for row in range(n[ACTING]):
         _write(n, events, ENDED, times[row, ID], row)
-    n[ACTING], n[HELD] = 0, NOBODY
+    n[ACTING], n[HELD] = 0, NONE_HELD
 
 
 @njit(cache=True, error_model="numpy")
@@ -308,7 +308,7 @@ def _begin(n: np.ndarray, times: np.ndarray, loads: np.ndarray, body: np.ndarray
 
 @njit(cache=True, error_model="numpy")
 def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray, row: int) -> None:
-    """Bring about the command of a row at NOW_NS. Rows before it may be taken by loads that act."""
+    """Apply the command of a row at NOW_NS. Rows before it may be taken by loads that act."""
     kind, body = times[row, KIND], f[BODY : BODY + of_body.BODY]
     if kind != CLEAR:
         n[LOAD_IDS] += 1
@@ -362,7 +362,7 @@ def fly(
     while True:
         # 1. Until the next event: full steps, then one shorter step that ends exactly there.
         event_ns = min(next_event_ns(n, times), until_ns)
-        came = carry(f, n, methods, event_ns)
+        came = advance_segment(f, n, methods, event_ns)
         if came != REACHED or event_ns == until_ns:
             return came
         # 2. What ends, then what begins; with new loads a new segment.

@@ -88,7 +88,7 @@ def _share_anew(at: int) -> int:
     f, n, times, loads, _, _ = _arrays(at)
     for row in range(n[fl.ACTING]):
         share_of(loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], loads[row, fl.SHARE :])
-    if n[fl.HELD] != fl.NOBODY:
+    if n[fl.HELD] != fl.NONE_HELD:
         times[n[fl.HELD], fl.END_NS] = fl.end_of_held(n, times[n[fl.HELD], fl.AT_NS])
     return 0
 
@@ -182,7 +182,7 @@ class FlightArrays:
         return came == fl.REACHED
 
     def apply(self) -> None:
-        """Bring about the command due next, at the time of the flight."""
+        """Apply the command due next, at the time of the flight."""
         n = self.n
         n[fl.EVENTS] = 0
         fl.apply(self.f, n, self.times, self.loads, self.events, int(n[fl.DUE]))
@@ -206,7 +206,7 @@ class FlightArrays:
     # Segments
 
     def cut_segment(self) -> None:
-        """End the segment at the time of the flight by the step that looking there took, and begin another."""
+        """End the segment at the time of the flight by the step that sampling there took, and begin another."""
         fl.cut_segment(self.f, self.n, self.loads, self.methods)
 
     def finish_segment(self) -> None:
@@ -276,7 +276,7 @@ class FlightArrays:
         first = -(at // 8 + INTEGERS + fl.ROOM) % _LINE
         self._at = at + 8 * first
         integers = whole[first : first + INTEGERS].view(np.int64)
-        self._head = memoryview(integers)
+        self._head = integers.data
         self._head[DOUBLES], self._head[fl.ACTING] = doubles, 0
         self.n = integers[: fl.INTEGERS]
         self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
@@ -287,7 +287,7 @@ class FlightArrays:
         kept = self._head[fl.ACTING]
         before = (self.times[:kept], self.loads[:kept]) if kept else None
         self._tables = np.zeros(sum(_sizes(rows)), np.int64)
-        self._table_bytes = memoryview(self._tables).cast("B")
+        self._table_bytes = self._tables.data.cast("B")
         self._head[TABLES_AT], self._head[TABLE_ROWS] = address_of_array(self._tables), rows
         if before is not None:
             self.times[:kept], self.loads[:kept] = before

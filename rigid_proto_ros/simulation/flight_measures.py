@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is measured of one flight, from its states at the looks: one number a measure.
+"""What is measured of one flight, from its states at the sample times: one number a measure.
 
 A measure is a row (MEASURE,): a kind, a quantity or difference by number (simulation/quantities.py), and what the kind
 needs.
@@ -17,7 +17,7 @@ from .quantities import START, difference, met, quantity
 
 FINAL, SAMPLE, LARGEST, SMALLEST, FIRST, FLIPS, DIFFERENCE, LARGEST_DIFFERENCE = range(8)
 KIND, CODE, A, B, C, D, MEASURE = range(7)
-"""SAMPLE: A the look's number. FIRST: A sign and B limit of the condition. FLIPS: A margin, B to D the axis in the
+"""SAMPLE: A the sample's number. FIRST: A sign and B limit of the condition. FLIPS: A margin, B to D the axis in the
 body, all zero for that of the first spin.
 """
 
@@ -65,15 +65,15 @@ def measure_flight(
     measures: np.ndarray,
     states: np.ndarray,
     others: np.ndarray,
-    looks_ns: np.ndarray,
+    sample_ns: np.ndarray,
     watched: np.ndarray,
     reached: int,
     context: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Fill out (k,) with the measures (k, MEASURE) of a flight that reached so many of its looks.
+    """Fill out (k,) with the measures (k, MEASURE) of a flight that reached so many of its samples.
 
-    states, others (m, STATE): at looks_ns (m,), of the flight and of its reference. watched (m,): which looks count for
+    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. watched (m,): which looks count for
     extremes and firsts. NaN where there is nothing to say: an event that didn't happen, a sample after the end.
     """
     last = states[reached - 1]
@@ -92,7 +92,7 @@ def measure_flight(
             condition = np.array([measure[CODE], measure[A], measure[B]])
             for k in range(reached):
                 if watched[k] and met(condition, states[k], context):
-                    out[j] = looks_ns[k] * 1e-9
+                    out[j] = sample_ns[k] * 1e-9
                     break
         elif kind == FLIPS:
             out[j] = count_flips(measure, states, watched, reached, context)

@@ -38,7 +38,7 @@ def flight_start(setup: Setup) -> FlightStart:
     f[fl.COMMON : fl.COMMON + SIZE] = setup.problem
     f[fl.ACCURACY], f[fl.DEGREE] = setup.accuracy, degree
     n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = setup.step_ns, setup.wrench_timeout_ns, setup.poke_duration_ns
-    n[fl.CHOOSES], n[fl.HELD] = setup.integrator.chooses, fl.NOBODY
+    n[fl.CHOOSES], n[fl.HELD] = setup.integrator.chooses, fl.NONE_HELD
     # None yet: the first that adapts its steps gets a clean workspace, as every other does.
     n[fl.METHOD] = -1
     methods = method_table(setup.integrator, degree)

@@ -19,7 +19,7 @@ EFFORT_PERIOD_NS = 50_000_000
 """[ns, simulated] How often observers are told what the motion has cost."""
 
 
-class Narrator:
+class EventNotifier:
     """Tells one observer, and only what it listens to."""
 
     def __init__(self, observer: Observer) -> None:
@@ -31,7 +31,7 @@ class Narrator:
         self.observer = observer
         self._told: dict[str, str] = {}
         self.shows_loads = listens(observer, "load_began")
-        self.hears_loads = any(listens(observer, m) for m in ("applied", "load_began", "load_ended"))
+        self.wants_loads = any(listens(observer, m) for m in ("applied", "load_began", "load_ended"))
         self._shows_status = listens(observer, "status")
         self._shows_string = listens(observer, "string_changed")
 

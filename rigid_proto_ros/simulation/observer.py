@@ -115,7 +115,7 @@ class Observer:
     def event(self, time_ns: int, line: str) -> None:
         """One JSON line of the event log (command, parameter change, service), as applied."""
 
-    def hears_events(self) -> bool:
+    def wants_events(self) -> bool:
         """Whether it would do anything with the line of an event now; without anybody who does, none is written."""
         return listens(self, "event")
 
@@ -153,18 +153,18 @@ class Observers(Observer):
             elif methods:
                 setattr(self, name, _in_turn(methods))
 
-    def hears_events(self) -> bool:
+    def wants_events(self) -> bool:
         """Whether one of them does."""
-        return any(observer.hears_events() for observer in self._observers)
+        return any(observer.wants_events() for observer in self._observers)
 
 
 def listens(observer: Observer, method: str) -> bool:
     """Whether the observer does anything with a method of the interface."""
-    return method in vars(observer) or method in _methods_of(type(observer))
+    return method in vars(observer) or method in _methods_of(type(observer))  # type: ignore[arg-type]  # mypy: no class is hashable
 
 
 @functools.cache
-def _methods_of(kind: type) -> frozenset[str]:
+def _methods_of(kind: type[Observer]) -> frozenset[str]:
     """The methods of the interface that a kind of observer has of its own."""
     return frozenset(name for name in _METHODS if getattr(kind, name) is not getattr(Observer, name))
 
@@ -177,4 +177,4 @@ def _in_turn(methods: Sequence[Callable[..., None]]) -> Callable[..., None]:
     return call
 
 
-_METHODS = [name for name in vars(Observer) if not name.startswith("_") and name != "hears_events"]
+_METHODS = [name for name in vars(Observer) if not name.startswith("_") and name != "wants_events"]

@@ -47,7 +47,7 @@ class Readings:
 
     @property
     def steps(self) -> int:
-        """Steps committed since start or reset; looking takes none."""
+        """Steps committed since start or reset; sampling takes none."""
         return self._arrays.steps
 
     @property
@@ -57,7 +57,7 @@ class Readings:
 
     @property
     def choice(self) -> str:
-        """Which method carries the body now, and why."""
+        """Which method advances the body now, and why."""
         return self._segment.choice
 
     @property

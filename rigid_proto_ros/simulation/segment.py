@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A stretch of simulated time in which all commands are constant, as it can be read off a flight.
 
-Steps count from the segment's start, and only full ones are committed; looking at a time in between takes one shorter
+Steps count from the segment's start, and only full ones are committed; sampling a time in between takes one shorter
 step on a copy. So the motion depends on where segments begin and end, that is on commands and their times, and not on
 how often or in which portions it was asked for.
 """

@@ -2,7 +2,7 @@
 """The simulation: commands in, motion out.
 
 Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/segment.py); within one,
-commands are constant and an integrator carries the body. ``advance`` is the whole story.
+commands are constant and an integrator advances the body. ``advance`` is the whole story.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from ..base.errors import CommandRefused, InputError
-from ..motion.integrators import check_carried
+from ..base.rotation import cross, times
+from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import (
     ANGULAR_DAMPING,
     MAX_SPEED,
@@ -21,7 +22,7 @@ from ..motion.integrators.integrator import (
     STRING,
     needs_of_load,
 )
-from ..motion.loads import Load, cross, light_row, settle
+from ..motion.loads import Load, light_row, load_of_bytes, settle
 from ..motion.state import State
 from . import flight as fl
 from .commands import (
@@ -38,7 +39,7 @@ from .commands import (
 )
 from .event_log import EventLog, Noted
 from .flight_arrays import FlightArrays
-from .notifier import Narrator, snapshot
+from .notifier import EventNotifier, snapshot
 from .observer import BodySnapshot, Observer
 from .readings import Readings
 from .setup import Setup
@@ -63,13 +64,13 @@ class Simulation(Readings):
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
         self.observer = observer or Observer()
-        self._narrator = Narrator(self.observer)
+        self._notifier = EventNotifier(self.observer)
         self.follower: Follower | None = None
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self.listed: Listed | None = None
-        check_carried(setup.integrator, needs_of(setup, (), setup.string.attached))
+        check_supported(setup.integrator, needs_of(setup, (), setup.string.attached))
         self._arrays = FlightArrays(setup)
         self._start_over()
 
@@ -78,27 +79,27 @@ class Simulation(Readings):
     def watch(self, observer: Observer) -> None:
         """Tell this observer from now on, and no other."""
         self.observer = observer
-        self._narrator.watch_for(observer)
+        self._notifier.watch_for(observer)
 
     def introduce(self, observer: Observer) -> None:
         """Tell an observer that comes in flight about the body, what acts on it and the string."""
-        Narrator(observer).introduce(self)
+        EventNotifier(observer).introduce(self)
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
-        self._narrator.body(self)
+        self._notifier.body(self)
 
     def tell_status(self, paused: bool = False) -> None:
         """Tell the observer what the body is doing, where that changed since it was last told."""
-        self._narrator.status(self, paused)
+        self._notifier.status(self, paused)
 
     def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
         """The body as an observer is told of it; of another setup, when one is given."""
         return snapshot(setup or self.setup)
 
     def log(self, kind: str, content: dict) -> None:
-        """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever brings it about."""
-        if self.observer.hears_events():
+        """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
+        if self.observer.wants_events():
             self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
         else:
             self.events.note([(self.time_ns, Noted(kind, content))])
@@ -121,8 +122,8 @@ class Simulation(Readings):
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
         row, setup = (judge(command, self.setup), self.setup) if judged is None else judged
         pending = Pending(when_ns, command, listed)
-        if row:
-            _settle(pending, row, setup)
+        if row and isinstance(command, WrenchCommand):
+            pending.settle(command, row, setup)
         self._push(pending)
         if self.follower is not None:
             self.follower.submit(command, when_ns, listed)
@@ -140,10 +141,10 @@ class Simulation(Readings):
         self.observer.refused(self.time_ns, error.reason, str(error))
 
     def check_change(self, new: Setup) -> None:
-        """Raises CommandRefused (``integrator``) when the new setup's integrator can't carry what acts, or will."""
+        """Raises CommandRefused (``integrator``) when the new setup's integrator doesn't support what acts, or will."""
         # A string that is to be tied at time 0 will be, at the next reset, though it was let go since.
         tied = new.string.attached or (self.string is not None and not self.setup.string.attached)
-        check_carried(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
+        check_supported(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
 
     def reset(self, setup: Setup | None = None) -> None:
         """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
@@ -163,25 +164,25 @@ class Simulation(Readings):
     # The story
 
     def advance(self, until_ns: int) -> State:
-        """Carry the body to ``until_ns`` and return its state there, before what acts at that very time.
+        """Take the body to ``until_ns`` and return its state there, before what acts at that very time.
 
         Running away (|x|, |v| or |ω| past 1e100) stops at the last good state and sets ``failure``.
         """
         if until_ns < self.time_ns:
             raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
         while True:
-            # 1. What loads alone bring about on the way is handed to the compiled flight.
+            # 1. Commands that are nothing but loads are handed to the compiled flight.
             event_ns, due = self._hand_over(until_ns)
             # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
             if not self._fly(event_ns, due):
                 return self._stop_in_last_good_state()
             if event_ns == until_ns:
                 return self.state
-            # 3. That event is brought about; with what acts now a new segment begins.
+            # 3. That event is applied; with what acts now a new segment begins.
             self._act()
 
     def _hand_over(self, until_ns: int) -> tuple[int, list[Pending]]:
-        """Until when the compiled flight gets along, and the commands that it carries out on the way."""
+        """Until when the compiled flight needs nobody, and the commands that it applies on the way."""
         tied, pending = self._string.tied, self._pending
         if tied is not None and tied.release_ns is not None:
             until_ns = min(until_ns, tied.release_ns)
@@ -207,7 +208,7 @@ class Simulation(Readings):
         if not isinstance(pending.command, WrenchCommand):
             return isinstance(pending.command, ClearWrench)
         try:
-            return self._still_holds(pending)
+            return self._still_holds(pending, pending.command)
         except CommandRefused:
             return False  # refused when it acts, and not before
 
@@ -220,7 +221,7 @@ class Simulation(Readings):
             for pending in due[waiting:]:
                 self._push(pending)
             del due[waiting:]
-        if due or self._narrator.hears_loads:
+        if due or self._notifier.wants_loads:
             self._tell(due)
         self.time_ns = until_ns if reached else arrays.time_ns
         self.state = State(self.time_ns, arrays.row.copy())
@@ -228,8 +229,8 @@ class Simulation(Readings):
 
     def _tell(self, due: list[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
-        observer, narrator = self.observer, self._narrator
-        if not (narrator.hears_loads or observer.hears_events()):
+        observer, notifier = self.observer, self._notifier
+        if not (notifier.wants_loads or observer.wants_events()):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
@@ -244,15 +245,17 @@ class Simulation(Readings):
                 self._log_command(command)
                 continue
             load = pending.load
-            if load is not None and what == fl.APPLIED:
+            if load is None or not isinstance(command, WrenchCommand):
+                continue
+            if what == fl.APPLIED:
                 observer.applied(now_ns, command, load, self.setup.body)
-            elif load is not None:
+            else:
                 kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
-                narrator.load_began(self, load_id, kind, load)
+                notifier.load_began(self, load_id, kind, load)
 
     def _log_command(self, command: Command) -> None:
         # A change that waited in a queue would keep its whole setup, mesh included.
-        if self.observer.hears_events() or isinstance(command, Change):
+        if self.observer.wants_events() or isinstance(command, Change):
             self.log(command.kind, command.content)
         else:
             self.events.note([(self.time_ns, command)])
@@ -279,13 +282,13 @@ class Simulation(Readings):
         if changed:
             arrays.tie(self._string.tied)
             arrays.cut_segment()
-            self._narrator.string(self)
+            self._notifier.string(self)
 
     def _apply(self, pending: Pending) -> None:
         command = pending.command
         if isinstance(command, WrenchCommand | ClearWrench):
-            if isinstance(command, WrenchCommand) and not self._still_holds(pending):
-                _settle(pending, _settled(command, self.setup, self.state), self.setup)
+            if isinstance(command, WrenchCommand) and not self._still_holds(pending, command):
+                pending.settle(command, _settled(command, self.setup, self.state), self.setup)
             self._arrays.put([pending])
             self._arrays.apply()
             self._tell([pending])
@@ -296,13 +299,13 @@ class Simulation(Readings):
         elif isinstance(command, TieString):
             self._string.tie_at(command, self.setup, self.state)
         elif isinstance(command, MoveString):
-            check_carried(self.setup.integrator, frozenset({STRING}))
+            check_supported(self.setup.integrator, frozenset({STRING}))
             self._string.move(command, self.setup, self.state)
         elif isinstance(command, ReleaseString):
             self._string.release()
         self._log_command(command)
 
-    def _still_holds(self, pending: Pending) -> bool:
+    def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
         """Whether the load settled at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
 
         Raises CommandRefused when the body or the integrator that there is now can't take it.
@@ -312,10 +315,10 @@ class Simulation(Readings):
             return True
         if before is None or before.surface is not setup.surface:
             return False
-        load = pending.load
+        load = load_of_bytes(pending.row)
         if before.body is not setup.body:
             load.check_magnitude(setup.body)
-        _check_load_carried(pending.command, load, setup)
+        _check_load_supported(command, load, setup)
         pending.settled_for = setup
         return True
 
@@ -327,7 +330,7 @@ class Simulation(Readings):
         old, self.setup = self.setup, new
         moved = new.body.center_of_mass - old.body.center_of_mass
         if new.geometry == old.geometry and moved.any():
-            shift = (self.state.rotation * moved).sum(axis=1)
+            shift = times(self.state.rotation, moved)
             row = self._arrays.row
             row[0:3] += shift
             row[7:10] += cross(self.state.angular_velocity, shift)
@@ -348,8 +351,8 @@ class Simulation(Readings):
         self.state = State(0, self.setup.initial.copy())
         self._string = StringControl(self.setup, self.state)
         self._arrays.start_over(self.setup, self._string.tied)
-        self._narrator.start_over()
-        self._narrator.string(self)
+        self._notifier.start_over()
+        self._notifier.string(self)
 
     def _stop_in_last_good_state(self) -> State:
         when = f"{self._segment.committed_ns * 1e-9:.9g} s"
@@ -366,39 +369,27 @@ def judge(command: Command, setup: Setup) -> bytes:
         row = _settled(command, setup, None)
         return b"" if command.frame.point[0] == "ray" else row
     if isinstance(command, MoveString):
-        check_carried(setup.integrator, frozenset({STRING}))
+        check_supported(setup.integrator, frozenset({STRING}))
     return b""
 
 
 def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
     """The row of the load, which body and integrator can take."""
     frame, force, torque = command.frame, command.force, command.torque
-    if setup.integrator.carries_loads or frame.impulse:
+    if setup.integrator.supports_loads or frame.impulse:
         row = light_row(frame, force, torque, setup.light_amount)
         if row:
             return row
     load = settle(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
     load.check_magnitude(setup.body)
-    _check_load_carried(command, load, setup)
+    _check_load_supported(command, load, setup)
     return load.packed
 
 
-def _settle(pending: Pending, row: bytes, setup: Setup) -> None:
-    """The load, as the tables of a flight take it, was settled under this setup."""
-    command = pending.command
-    pending.settled_for, pending.row = setup, row
-    if command.held:
-        pending.kind = fl.HELD_WRENCH
-    elif command.frame.impulse:
-        pending.kind = fl.IMPULSE
-    else:
-        pending.kind, pending.duration_ns = fl.PULSE, command.duration_ns
-
-
-def _check_load_carried(command: WrenchCommand, load: Load, setup: Setup) -> None:
+def _check_load_supported(command: WrenchCommand, load: Load, setup: Setup) -> None:
     # An impulse acts at once: the integrator never sees it.
-    if not (setup.integrator.carries_loads or command.frame.impulse):
-        check_carried(setup.integrator, needs_of_load(load))
+    if not (setup.integrator.supports_loads or command.frame.impulse):
+        check_supported(setup.integrator, needs_of_load(load))
 
 
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:

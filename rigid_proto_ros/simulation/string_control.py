@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import CommandRefused
+from ..base.rotation import Vector, transposed_times, vector
 from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State
@@ -83,17 +84,16 @@ def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
     """Where a command ties the string (3,) in mesh coordinates, before it is taken onto the surface."""
     point = np.asarray(command.point, dtype=float)
     if command.axes == "world":
-        R, away = state.rotation, point - state.position
-        point = R[0] * away[0] + R[1] * away[1] + R[2] * away[2]
+        point = transposed_times(state.rotation, point - state.position)
     return point if command.axes == "mesh" else body.mesh_point(point)
 
 
-def _attach(command: TieString, setup: Setup, state: State) -> tuple[float, float, float]:
+def _attach(command: TieString, setup: Setup, state: State) -> Vector:
     """The knot in mesh coordinates, on the surface where there is one."""
     point = mesh_point(command, setup.body, state)
     if setup.surface is not None:
         point = setup.surface.nearest_point(point)
-    return tuple(float(x) for x in point)
+    return vector(point)
 
 
 def _checked(tied: Tied, body: Body, state: State) -> Tied:

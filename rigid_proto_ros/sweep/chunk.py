@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Some rows of a study, flown and measured: what a thread here and a worker of a cluster both do.
 
-Rows that differ in numbers alone go through the compiled batch together. Those that it can't carry or judge are flown
+Rows that differ in numbers alone go through the compiled batch together. Those that it can't fly or judge are flown
 one by one by the simulation, with the same bits.
 """
 
@@ -21,7 +21,7 @@ from .forms import VERTEX, Draw, as_text
 from .groups import Group, is_structural
 from .row_flight import fly_row
 from .study import Study
-from .templates import NotCarried
+from .templates import NotBatchable
 from .variation import apply, body_mesh_of, plain, vertex_number
 
 GROUPS_KEPT = 512
@@ -60,8 +60,8 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     return Chunk(_table(study, rows, columns, flown), flown.simulated)
 
 
-def is_carried(study: Study, rows: np.ndarray) -> bool:
-    """Whether the compiled batch carries any of these rows (n,)."""
+def is_batchable(study: Study, rows: np.ndarray) -> bool:
+    """Whether the compiled batch can fly any of these rows (n,)."""
     columns = study.columns(rows)
     keys = [key for key, _ in _groups(study, columns, len(rows))]
     sides = (False, True) if study.reference is not None else (False,)
@@ -76,7 +76,8 @@ def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tup
         return
     members: dict[tuple, list[int]] = {}
     for i in range(count):
-        key = tuple(tuple(plain(c[i])) if isinstance(plain(c[i]), list) else plain(c[i]) for c in structural)
+        values = [plain(c[i]) for c in structural]
+        key = tuple(tuple(value) if isinstance(value, list) else value for value in values)
         members.setdefault(key, []).append(i)
     for key, listed in members.items():
         yield key, np.array(listed)
@@ -89,7 +90,7 @@ def _group(study: _ByFingerprint, key: tuple, with_reference: bool) -> Group | N
     structural = dict(zip(names, key, strict=True))
     try:
         return Group(own, structural, own.reference if with_reference else None)
-    except (NotCarried, InputError):
+    except (NotBatchable, InputError):
         return None
 
 
@@ -118,7 +119,7 @@ def _fly_group(study: Study, key: tuple, members: np.ndarray, columns: list[np.n
     if beside is not None:
         references, also_good = beside.variants(own, len(members))
         good &= also_good
-    done = fly_variants(variants, references, measures.looks_ns, measures.watched, measures.stops, measures.table)
+    done = fly_variants(variants, references, measures.sample_ns, measures.watched, measures.stops, measures.table)
     done.status[~good] = 0
     for name in ("status", "end_ns", "stop", "measured", "states"):
         getattr(flown.results, name)[members] = getattr(done, name)

@@ -8,6 +8,7 @@ it doesn't matter who computes it, or how often.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
+from typing import Any
 
 from ..base.errors import InputError
 from .chunk import Chunk, run_chunk
@@ -40,7 +41,7 @@ def cluster_chunks(
         content = client.submit(_same, study, pure=False)
         waiting = iter(todo)
         pending = distributed.as_completed(with_results=True, loop=client.loop)
-        numbers: dict[str, int] = {}
+        numbers: dict[Any, int] = {}
 
         def submit() -> bool:
             k = next(waiting, None)

@@ -26,7 +26,7 @@ from .study import Study, Vary, script_entries
 from .templates import (
     FAST,
     TIMES,
-    NotCarried,
+    NotBatchable,
     Script,
     Settler,
     checked_integrator,
@@ -50,7 +50,7 @@ def is_structural(vary: Vary) -> bool:
 
 
 class Group:
-    """Rows that share all but numbers. Making one raises InputError or NotCarried: then the simulation flies its rows,
+    """Rows that share all but numbers. Making one raises InputError or NotBatchable: then the simulation flies its rows,
     and says what is wrong.
     """
 
@@ -132,7 +132,7 @@ class Group:
                 script, loads = script_of(commands, self.settler)
                 checked_integrator(self.parameters, loads)
                 scripts.append(script)
-            except (NotCarried, InputError, TypeError, AttributeError, KeyError):
+            except (NotBatchable, InputError, TypeError, AttributeError, KeyError):
                 scripts.append(None)
                 good[i] = False
         longest = max((len(s.commands) for s in scripts if s), default=0)

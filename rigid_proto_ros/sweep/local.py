@@ -16,7 +16,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 
 import numpy as np
 
-from .chunk import Chunk, is_carried, run_chunk
+from .chunk import Chunk, is_batchable, run_chunk
 from .study import Study
 from .table import Parts
 
@@ -28,23 +28,23 @@ def cores() -> int:
 
 def chunk_rows(study: Study, workers: int) -> int:
     """Rows a chunk: enough that a chunk's own cost doesn't count, few enough that all workers have some."""
-    most = 4096 if carried(study) else 32
+    most = 4096 if goes_in_batches(study) else 32
     # A chunk keeps its commands in memory: long scripts make it shorter.
     most = max(1, min(most, 500_000 // max(1, len(study.entries))))
     return max(1, min(most, -(-study.rows // (2 * workers))))
 
 
-def carried(study: Study) -> bool:
-    """Whether the compiled batch carries the study's rows, judged by some of them."""
+def goes_in_batches(study: Study) -> bool:
+    """Whether the compiled batch can fly the study's rows, judged by some of them."""
     rows = np.unique(np.linspace(0, study.rows - 1, min(study.rows, 9)).astype(np.int64))
-    return is_carried(study, rows)
+    return is_batchable(study, rows)
 
 
 def local_chunks(
     study: Study, parts: Parts, todo: Iterable[int], workers: int
 ) -> Generator[tuple[int, Chunk], None, None]:
     """Chunks as they get done, a few ahead of whoever takes them."""
-    pool = _threads(workers) if carried(study) else _processes(workers)
+    pool = _threads(workers) if goes_in_batches(study) else _processes(workers)
     pending: dict[Future, int] = {}
     waiting = iter(todo)
     try:
@@ -76,5 +76,7 @@ def _depend_on_the_parent() -> None:
 
 
 def _end_with_the_parent() -> None:
-    multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
     os._exit(1)

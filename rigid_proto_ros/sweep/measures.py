@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a study measures and when it looks: names in the file become rows of numbers for the compiled measure."""
+"""What a study measures and when it samples the flight: names in the file become rows of numbers for the compiled measure."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..simulation import flight_measures as fm
 from ..simulation.quantities import DIFFERENCES, NAMES, QUANTITIES, TURNED
 from .fields import known_name, mapping, names, number
 
-MAX_LOOKS = 100_000
-"""Looks at one flight: a state is kept of each."""
+MAX_SAMPLES = 100_000
+"""Samples of one flight: a state is kept of each."""
 KINDS = ("final", "max", "min", "flips", "first", "samples", "difference", "max_difference")
 _STATE_PARTS = {"position": 3, "orientation": 4, "velocity": 3, "spin": 3}
 
 
 @dataclass(frozen=True)
 class Measures:
-    """columns: names of what is measured, rows of ``table`` (k, MEASURE). stops: names and (k, 3) conditions. looks_ns
+    """columns: names of what is measured, rows of ``table`` (k, MEASURE). stops: names and (k, 3) conditions. sample_ns
     (m,) ascending, the last at the end; watched (m,): which of them count for extremes, firsts, flips and stops.
     """
 
@@ -30,7 +30,7 @@ class Measures:
     table: np.ndarray
     stop_names: tuple[str, ...]
     stops: np.ndarray
-    looks_ns: np.ndarray
+    sample_ns: np.ndarray
     watched: np.ndarray
 
     @property
@@ -46,30 +46,30 @@ def read_measures(spec: Any, stop: Any, watch: float, duration_s: float, field: 
     samples_ns = _sample_times(spec["samples"], duration_s, f"{field}.samples") if "samples" in spec else []
     stops = _conditions({} if stop is None else stop, field.replace("measure", "stop"))
     watching = bool(stops) or bool({"max", "min", "flips", "first", "max_difference"} & set(spec))
-    if watching and duration_s * watch > MAX_LOOKS:
-        raise InputError("watch", watch, f"at most {MAX_LOOKS} samples in a run of {duration_s:g} s")
-    looks_ns, watched = _looks(watch if watching else 0.0, samples_ns, duration_ns)
+    if watching and duration_s * watch > MAX_SAMPLES:
+        raise InputError("watch", watch, f"at most {MAX_SAMPLES} samples in a run of {duration_s:g} s")
+    sample_ns, watched = _all_sample_times(watch if watching else 0.0, samples_ns, duration_ns)
     rows: list[tuple[str, list[float]]] = []
     for kind, value in spec.items():
-        rows += _rows(kind, value, f"{field}.{kind}", looks_ns)
+        rows += _rows(kind, value, f"{field}.{kind}", sample_ns)
     columns = [name for name, _ in rows]
     doubled = next((name for name in columns if columns.count(name) > 1), None)
     if doubled or not rows:
         raise InputError(field, doubled or {}, "each measure once" if doubled else "something to measure")
     table = np.array([row + [0.0] * (fm.MEASURE - len(row)) for _, row in rows])
     conditions = np.array(list(stops.values())).reshape(-1, 3)
-    return Measures(tuple(columns), table, tuple(stops), conditions, looks_ns, watched)
+    return Measures(tuple(columns), table, tuple(stops), conditions, sample_ns, watched)
 
 
-def _looks(watch: float, samples_ns: list[int], duration_ns: int) -> tuple[np.ndarray, np.ndarray]:
+def _all_sample_times(watch: float, samples_ns: list[int], duration_ns: int) -> tuple[np.ndarray, np.ndarray]:
     watched_ns = {duration_ns}
     if watch:
         k = 0
-        while (look_ns := publication_ns(k, watch)) < duration_ns:
-            watched_ns.add(look_ns)
+        while (time_ns := publication_ns(k, watch)) < duration_ns:
+            watched_ns.add(time_ns)
             k += 1
-    looks = sorted(watched_ns | set(samples_ns))
-    return np.array(looks, np.int64), np.array([look in watched_ns for look in looks])
+    times = sorted(watched_ns | set(samples_ns))
+    return np.array(times, np.int64), np.array([time_ns in watched_ns for time_ns in times])
 
 
 def _sample_times(spec: Any, duration_s: float, field: str) -> list[int]:
@@ -89,7 +89,7 @@ def _expanded(quantities: list[str]) -> list[str]:
     return found
 
 
-def _rows(kind: str, value: Any, field: str, looks_ns: np.ndarray) -> list[tuple[str, list[float]]]:
+def _rows(kind: str, value: Any, field: str, sample_ns: np.ndarray) -> list[tuple[str, list[float]]]:
     known = (*_STATE_PARTS, *(name for name in NAMES if name not in _STATE_PARTS))
     if kind == "final":
         chosen = _expanded(names(value, field, known))
@@ -100,7 +100,7 @@ def _rows(kind: str, value: Any, field: str, looks_ns: np.ndarray) -> list[tuple
     if kind == "samples":
         chosen = _expanded(names(value["of"], f"{field}, of", known))
         times = value["at"] if isinstance(value["at"], list) else [value["at"]]
-        at = [(float(t), int(np.searchsorted(looks_ns, nanoseconds(float(t))))) for t in times]
+        at = [(float(t), int(np.searchsorted(sample_ns, nanoseconds(float(t))))) for t in times]
         return [(f"{name}@{t:g}", [fm.SAMPLE, NAMES.index(name), k]) for t, k in at for name in chosen]
     if kind == "first":
         return [(f"first.{name}", [fm.FIRST, *condition]) for name, condition in _conditions(value, field).items()]

@@ -89,8 +89,8 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
 
 
 def make_overlay(study: Study, settler: Settler, wrench_timeout: float) -> tuple[Overlay, list]:
-    """The script ready for varied numbers, and the loads that the integrator has to carry; raises
-    NotCarried, InputError.
+    """The script ready for varied numbers, and the loads that the integrator has to support; raises
+    NotBatchable, InputError.
     """
     commands = expand_script(study.script, "script", wrench_timeout)
     commands.sort(key=lambda command: command.entry)

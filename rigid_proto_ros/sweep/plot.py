@@ -145,7 +145,8 @@ def _spread(axes: Any, text: np.ndarray) -> np.ndarray:
 
 def _drawable(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Text as matplotlib takes it for a category."""
-    return tuple(v.astype(str) if v.dtype == object else v for v in (x, y))
+    x, y = (v.astype(str) if v.dtype == object else v for v in (x, y))
+    return x, y
 
 
 def _as_grid(x: np.ndarray, y: np.ndarray, color: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """One row flown by ``Simulation``: what a row is by definition, and how those go that the compiled batch
-can't carry.
+can't fly.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def fly_row(study: Study, row: Variation) -> RowResult:
     """The row's flight, beside its reference if the study has one; a failure is told, not raised."""
     measures = study.measures
     measured = np.full(len(measures.table), np.nan)
-    states, others = np.zeros((len(measures.looks_ns), STATE)), np.zeros((len(measures.looks_ns), STATE))
+    states, others = np.zeros((len(measures.sample_ns), STATE)), np.zeros((len(measures.sample_ns), STATE))
     context = np.zeros(CONTEXT)
     try:
         scenario = row.scenario
@@ -51,28 +51,28 @@ def fly_row(study: Study, row: Variation) -> RowResult:
         return RowResult(" ".join(str(error).split()), -1, 0, measured, np.full(13, np.nan))
     if failure:
         return RowResult(failure, -1, 0, measured, np.full(13, np.nan))
-    looks = measures.looks_ns
-    measure_flight(measures.table, states, others, looks, measures.watched, reached, context, measured)
-    return RowResult("", stop, int(looks[reached - 1]), measured, states[reached - 1, :13].copy())
+    times = measures.sample_ns
+    measure_flight(measures.table, states, others, times, measures.watched, reached, context, measured)
+    return RowResult("", stop, int(times[reached - 1]), measured, states[reached - 1, :13].copy())
 
 
 def _fly(
     scenario: Scenario, row: Variation, measures: Measures, states: np.ndarray, context: np.ndarray, stops: np.ndarray
 ) -> tuple[int, int, str]:
-    """Fill ``states`` at the looks; how many were reached, which stop held, and why it failed."""
+    """Fill ``states`` at the times; how many were reached, which stop held, and why it failed."""
     simulation = OfflineRun(scenario, row.commands).simulation
     body = simulation.setup.body
     first = _state(simulation)
     begin(body.mass, body.inertia.ravel(), simulation.setup.gravity, first, context)
-    for k, look_ns in enumerate(measures.looks_ns.tolist()):
-        simulation.advance(look_ns)
+    for k, time_ns in enumerate(measures.sample_ns.tolist()):
+        simulation.advance(time_ns)
         if simulation.failure:
             return 0, -1, simulation.failure
         states[k] = _state(simulation)
         stop = which_is_met(stops, states[k], context)
         if stop >= 0:
             return k + 1, stop, _refusals(simulation)
-    return len(measures.looks_ns), -1, _refusals(simulation)
+    return len(measures.sample_ns), -1, _refusals(simulation)
 
 
 def _state(simulation: Simulation) -> np.ndarray:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import uint32, uint64
+from numpy import uint32, uint64
 
 from ..base.compilation import njit
 
@@ -21,7 +21,7 @@ _MULTIPLIER_HIGH, _MULTIPLIER_LOW = uint64(2549297995355413924), uint64(48655405
 
 
 @njit(cache=True)
-def _hashed(value: int, constant: int, multiplier: int) -> tuple[int, int]:
+def _hashed(value: uint32, constant: uint32, multiplier: uint32) -> tuple[uint32, uint32]:
     """The value hashed, and the next constant."""
     value = uint32(value ^ constant)
     constant = uint32(constant * multiplier)
@@ -30,7 +30,7 @@ def _hashed(value: int, constant: int, multiplier: int) -> tuple[int, int]:
 
 
 @njit(cache=True)
-def _mixed(x: int, y: int) -> int:
+def _mixed(x: uint32, y: uint32) -> uint32:
     result = uint32(uint32(x * uint32(0xCA01F9DD)) - uint32(y * uint32(0x4973F715)))
     return uint32(result ^ (result >> uint32(16)))
 
@@ -61,7 +61,7 @@ def _words(pool: np.ndarray, out: np.ndarray) -> None:
 
 
 @njit(cache=True)
-def _times(a: int, b: int) -> tuple[int, int]:
+def _times(a: uint64, b: uint64) -> tuple[uint64, uint64]:
     """Upper and lower half of the 128-bit product of two 64-bit words."""
     a0, a1, b0, b1 = a & _LOW, a >> uint64(32), b & _LOW, b >> uint64(32)
     low, middle, other = a0 * b0, a0 * b1, a1 * b0
@@ -71,7 +71,7 @@ def _times(a: int, b: int) -> tuple[int, int]:
 
 
 @njit(cache=True)
-def _stepped(high: int, low: int, added_high: int, added_low: int) -> tuple[int, int]:
+def _stepped(high: uint64, low: uint64, added_high: uint64, added_low: uint64) -> tuple[uint64, uint64]:
     """state · multiplier + increment, modulo 2¹²⁸."""
     product_high, product_low = _times(low, _MULTIPLIER_LOW)
     product_high += low * _MULTIPLIER_HIGH + high * _MULTIPLIER_LOW
@@ -116,7 +116,7 @@ def seed_words(seed: int) -> np.ndarray:
 
 
 @njit(cache=True)
-def _scrambled(value: int, key: int) -> int:
+def _scrambled(value: uint64, key: uint64) -> uint64:
     """A 64-bit hash of value and key (SplitMix64's finalizer; Steele, Lea and Flood, OOPSLA 2014)."""
     x = value + key * uint64(0x9E3779B97F4A7C15)
     x = (x ^ (x >> uint64(30))) * uint64(0xBF58476D1CE4E5B9)
@@ -125,7 +125,7 @@ def _scrambled(value: int, key: int) -> int:
 
 
 @njit(cache=True)
-def permuted(index: int, size: int, key: int) -> int:
+def permuted(index: int, size: int, key: uint64) -> uint64:
     """Where a random permutation of 0 … size − 1 takes ``index``: six Feistel rounds on the next power of four,
     repeated until within size (Black and Rogaway, CT-RSA 2002, "cycle walking"). No table, so any size costs the same.
     """

@@ -80,8 +80,9 @@ class Study:
     @property
     def grids(self) -> list[int]:
         """Points of each grid, then of the lists, if any."""
-        sizes = [len(v.form.values) for v in self.vary if v.form.kind == GRID]
-        return sizes + [len(v.form.values) for v in self.vary if v.form.kind == LIST][:1]
+        given = [v.form for v in self.vary if isinstance(v.form, Points)]
+        sizes = [len(form.values) for form in given if form.kind == GRID]
+        return sizes + [len(form.values) for form in given if form.kind == LIST][:1]
 
     @property
     def rows(self) -> int:
@@ -92,7 +93,8 @@ class Study:
         """The varied values of rows (n,), one array for each of ``vary``: numbers (n,) or (n, k), or objects (n,)."""
         points = self._points(rows)
         dimensions = sum(v.form.uniforms for v in self.vary if isinstance(v.form, Draw))
-        drawn = uniforms(self.sampler, self.seed, rows, self.samples, dimensions) if dimensions else None
+        none = np.empty((len(rows), 0))
+        drawn = uniforms(self.sampler, self.seed, rows, self.samples, dimensions) if dimensions else none
         found, at = [], 0
         for vary, index in zip(self.vary, points, strict=True):
             if isinstance(vary.form, Draw):
@@ -110,7 +112,8 @@ class Study:
             digits.append(rest % size)
             rest = rest // size
         digits.reverse()
-        found, at = [], 0
+        found: list[np.ndarray | None] = []
+        at = 0
         for vary in self.vary:
             if vary.form.kind == GRID:
                 found.append(digits[at])
@@ -231,7 +234,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[
         for probe in form.probes:
             _check_value(target, probe, field, values, entries)
         found.append(Vary(target, form))
-    lengths = {len(v.form.values) for v in found if v.form.kind == LIST}
+    lengths = {len(v.form.values) for v in found if isinstance(v.form, Points) and v.form.kind == LIST}
     if len(lengths) > 1:
         raise InputError(f"{name}, vary", sorted(lengths), "lists of one length: they go in step")
     return tuple(found)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import InputError, MeshError
 from ..motion.frames import Frame, parse_frame
-from ..motion.integrators import check_carried, integrator_named
+from ..motion.integrators import check_supported, integrator_named
 from ..motion.integrators.integrator import (
     ANGULAR_DAMPING,
     NO_GYROSCOPIC_TERM,
@@ -52,8 +52,8 @@ MAX_COMMANDS = 2000
 """Of a script in the compiled batch; longer ones are rare, and rows of them are the simulation's."""
 
 
-class NotCarried(Exception):
-    """The compiled batch can't carry the row; the simulation can, or knows why not."""
+class NotBatchable(Exception):
+    """The compiled batch can't fly the row; the simulation can, or knows why not."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def times_of(parameters: Parameters) -> np.ndarray:
 
 def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarray:
     """What of the mesh and the model doesn't change with a row's settings (CONSTANTS,); raises
-    NotCarried, InputError.
+    NotBatchable, InputError.
     """
     row = np.zeros(bb.CONSTANTS)
     model = parameters.inertia_model
@@ -99,7 +99,7 @@ def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarr
         row[bb.MODEL] = bb.EXPLICIT
         return row
     if body_mesh is None:
-        raise NotCarried
+        raise NotBatchable
     moments = body_mesh.moments.moments(model)
     try:
         row[bb.SOLID_MEASURE] = body_mesh.moments.moments("solid").measure
@@ -116,9 +116,9 @@ def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarr
 
 
 def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
-    """The integrator, if it can carry these loads; raises NotCarried."""
+    """The integrator, if it supports these loads; raises NotBatchable."""
     if parameters.string.attached:
-        raise NotCarried
+        raise NotBatchable
     integrator = integrator_named(parameters.integrator)
     needs = set().union(*map(needs_of_load, loads))
     if not parameters.gyroscopic:
@@ -126,9 +126,9 @@ def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
     if parameters.angular_damping:
         needs.add(ANGULAR_DAMPING)
     try:
-        check_carried(integrator, frozenset(needs))
+        check_supported(integrator, frozenset(needs))
     except InputError:
-        raise NotCarried from None
+        raise NotBatchable from None
     return integrator
 
 
@@ -141,11 +141,11 @@ class Settler:
         self._known: dict[str, tuple] = {}
 
     def frame(self, text: str) -> tuple[Frame, Load]:
-        """The frame, and a load of no force settled there; raises InputError, or NotCarried for a ray."""
+        """The frame, and a load of no force settled there; raises InputError, or NotBatchable for a ray."""
         if text not in self._known:
             frame = parse_frame(text, set(self._contacts))
             if frame.point[0] == "ray":
-                raise NotCarried
+                raise NotBatchable
             nothing = (0.0, 0.0, 0.0)
             load = settle(frame, nothing, nothing, None, self._surface, self._contacts, None)
             if len(self._known) > 100_000:
@@ -154,11 +154,11 @@ class Settler:
         return self._known[text]
 
     def numbers(self, command: ScriptCommand) -> tuple[list[int], np.ndarray, Load | None]:
-        """A command's integers, its load's numbers, and what the integrator has to carry of it."""
+        """A command's integers, its load's numbers, and what the integrator has to support of it."""
         if command.kind == "clear_wrench":
             return [command.t_ns, -1, fl.CLEAR], np.zeros(LOAD), None
         if command.kind not in ("wrench", "poke"):
-            raise NotCarried
+            raise NotBatchable
         frame, settled = self.frame(command.frame_id)
         held = command.kind == "wrench"
         WrenchCommand(held, frame, command.force, command.torque, command.t_ns, command.frame_id, b"")
@@ -169,11 +169,11 @@ class Settler:
 
 
 def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
-    """Commands, in order of time, as arrays, and the loads that the integrator has to carry; raises
-    NotCarried, InputError.
+    """Commands, in order of time, as arrays, and the loads that the integrator has to support; raises
+    NotBatchable, InputError.
     """
     if len(commands) > MAX_COMMANDS:
-        raise NotCarried
+        raise NotBatchable
     ordered = [settler.numbers(command) for command in commands]
     integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, 3)
     loads = np.array([row for _, row, _ in ordered]).reshape(-1, LOAD)

@@ -124,4 +124,4 @@ def test_discrete_gradient_keeps_energy_through_slack_and_taut_at_any_stiffness(
 
 
 def test_every_integrator_that_carries_a_string_says_so():
-    assert {n for n, i in INTEGRATORS.items() if STRING in i.carries} >= {"rk4", "rkmk4", "dop853", "auto"}
+    assert {n for n, i in INTEGRATORS.items() if STRING in i.supports} >= {"rk4", "rkmk4", "dop853", "auto"}

@@ -9,7 +9,7 @@ from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM
 
-WITHOUT = [name for name, i in INTEGRATORS.items() if NO_GYROSCOPIC_TERM in i.carries]
+WITHOUT = [name for name, i in INTEGRATORS.items() if NO_GYROSCOPIC_TERM in i.supports]
 SPIN = (0.3, 4.0, 0.2)
 
 

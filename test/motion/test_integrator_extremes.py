@@ -30,7 +30,7 @@ def hostile_flight(name, seed):
     row[7:10] = rng.normal(size=3) * magnitude(rng, -200, 9)
     row[10:13] = rng.normal(size=3) * rng.choice((0.0, magnitude(rng, -200, 6)))
     string = StringSettings()
-    if STRING in integrator.carries and rng.random() < 0.5:
+    if STRING in integrator.supports and rng.random() < 0.5:
         string = StringSettings(
             attached=True,
             attach=tuple(rng.normal(size=3) * magnitude(rng, -3, 1)),
@@ -47,7 +47,7 @@ def hostile_flight(name, seed):
         initial=row,
         gravity=np.array((0.0, 0.0, -9.81)) * rng.integers(0, 2),
         linear_damping=rng.choice((0.0, magnitude(rng, -12, 9))),
-        angular_damping=rng.choice((0.0, magnitude(rng, -12, 9))) if ANGULAR_DAMPING in integrator.carries else 0.0,
+        angular_damping=rng.choice((0.0, magnitude(rng, -12, 9))) if ANGULAR_DAMPING in integrator.supports else 0.0,
         string=string,
     )
 

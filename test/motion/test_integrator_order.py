@@ -18,7 +18,7 @@ FLOOR = 2e-15
 
 STEPS = (1, 2, 4, 5, 8, 10, 16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160, 200, 250, 320, 400, 500)
 ORDERED = [name for name, i in INTEGRATORS.items() if i.order is not None and name != "taylor"]
-ON_A_STRING = [name for name in ORDERED if STRING in INTEGRATORS[name].carries and name != "dop853"]
+ON_A_STRING = [name for name in ORDERED if STRING in INTEGRATORS[name].supports and name != "dop853"]
 
 STRINGS = {
     "bilateral": StringSettings(True, (0.3, -0.2, 0.25), (0.1, 0.2, 1.2), 300.0, 0.0, 0.1, 0.8, True),
@@ -71,8 +71,8 @@ def test_order_of_taylor_series_is_their_degree(degree):
 @pytest.mark.parametrize("name", ["euler", "midpoint", "rk4"])
 def test_order_without_the_gyroscopic_term_against_the_motion_of_that_equation(name):
     integrator = INTEGRATORS[name]
-    check(name, Scene(integrator.carries - {STRING}))
-    assert NO_GYROSCOPIC_TERM in integrator.carries
+    check(name, Scene(integrator.supports - {STRING}))
+    assert NO_GYROSCOPIC_TERM in integrator.supports
 
 
 @pytest.mark.parametrize("string", STRINGS)

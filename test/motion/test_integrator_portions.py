@@ -26,7 +26,7 @@ END = 10 * SECOND
 
 def flown(name, seed, portions):
     """A flight with thirty commands of all kinds at random times; those the integrator can't carry are refused."""
-    damping = 0.05 if ANGULAR_DAMPING in INTEGRATORS[name].carries else 0.0
+    damping = 0.05 if ANGULAR_DAMPING in INTEGRATORS[name].supports else 0.0
     simulation = flight(
         BODY,
         integrator=name,

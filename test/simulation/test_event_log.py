@@ -27,7 +27,7 @@ class Reader(Observer):
     def event(self, time_ns: int, line: str) -> None:
         self.lines.append(line)
 
-    def hears_events(self) -> bool:
+    def wants_events(self) -> bool:
         return self.listening
 
 

@@ -65,7 +65,7 @@ OFTEN = ("free_body", "rk4", "semi_implicit_euler")
 )
 def test_every_integrator_has_its_own_bits_in_a_batch(integrator: str) -> None:
     # Free flight is all that each of them carries; `taylor` and the rest get what more they can.
-    free = not INTEGRATORS[integrator].carries
+    free = not INTEGRATORS[integrator].supports
     spec = {
         "scene": "t_handle",
         "script": [] if free else [{"t": 0.01, "axes": "body", "torque": [0.001, 0.0, 0.0], "duration": 0.02}],

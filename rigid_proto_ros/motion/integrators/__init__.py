@@ -3,7 +3,7 @@
 
 An integrator takes the variables of a segment (motion/variables.py) forward in time under the segment's problem
 (motion/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone,
-and ``advance`` commits only steps at full length, so that looking at the motion never changes it.
+and ``advance`` commits only steps at full length, so that sampling the motion never changes it.
 
 Kernels divide as IEEE 754 does (``error_model="numpy"``): a step that explodes comes out as inf or NaN and is refused,
 where Python's rule would raise in the middle of it.
@@ -47,13 +47,13 @@ INTEGRATORS: dict[str, Integrator] = {
 }
 
 
-def check_carried(integrator: Integrator, needs: frozenset[str]) -> None:
+def check_supported(integrator: Integrator, needs: frozenset[str]) -> None:
     """Raises CommandRefused (``integrator``) naming those that can when ``integrator`` can't meet all ``needs``."""
     lacks = integrator.lacks(needs)
     if lacks:
         able = ", ".join(name for name, other in INTEGRATORS.items() if not other.lacks(needs))
         wanted = " and ".join(sorted(needs))
-        raise CommandRefused("integrator", "integrator", integrator.name, f"one that carries {wanted}: {able}")
+        raise CommandRefused("integrator", "integrator", integrator.name, f"one that supports {wanted}: {able}")
 
 
 def integrator_named(name: str) -> Integrator:

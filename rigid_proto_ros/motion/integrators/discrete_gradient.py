@@ -378,7 +378,7 @@ DISCRETE_GRADIENT = Integrator(
     limits="Bounded energy at any stiffness. A swing along the string that the step doesn't resolve has the wrong "
     "phase; where the string turns the body about many times within a step, the string counts as inextensible.",
     stability_limit=1.0,
-    carries=LOADS | {ANGULAR_DAMPING, STRING},
+    supports=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=discrete_gradient_steps,
     make_methods=fixed_steps,
     stiff=True,

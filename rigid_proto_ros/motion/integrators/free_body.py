@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """free_body: torque-free motion, exact to rounding for any time in one step.
 
-Its kernel can take many steps, for splittings and tests; in a simulation each look is one step from the segment's
+Its kernel can take many steps, for splittings and tests; in a simulation each sample is one step from the segment's
 start, so nothing accumulates. Attitude errs less than 50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear
 damping are closed form beside it.
 """
@@ -43,7 +43,7 @@ FREE_BODY = Integrator(
     source="Jacobi's elliptic functions; see integrators/free_body_step.py",
     limits="Torque-free motion alone, exact; the step has no bearing.",
     stability_limit=math.inf,
-    carries=frozenset(),
+    supports=frozenset(),
     kernel=free_body_steps,
     make_methods=_methods,
 )

@@ -56,7 +56,7 @@ FREE_BODY_4 = Integrator(
     source="Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313",
     limits="No string, no angular damping; pays when the body spins fast under weak loads.",
     stability_limit=math.inf,
-    carries=LOADS,
+    supports=LOADS,
     kernel=free_body_4_steps,
     make_methods=fixed_steps,
 )

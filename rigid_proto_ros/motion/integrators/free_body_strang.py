@@ -50,7 +50,7 @@ FREE_BODY_STRANG = Integrator(
     source="Strang, SIAM J. Numer. Anal. 5 (1968) 506",
     limits="No string; the error per step grows with torque times h³, not with the spin alone.",
     stability_limit=math.inf,
-    carries=LOADS | {ANGULAR_DAMPING},
+    supports=LOADS | {ANGULAR_DAMPING},
     kernel=free_body_strang_steps,
     make_methods=fixed_steps,
 )

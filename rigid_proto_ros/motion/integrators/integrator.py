@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every integrator is: a name, facts about it, what it can carry, and a way to make steps of a segment."""
+"""What every integrator is: a name, facts about it, what it supports, and a way to make steps of a segment."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Integrator:
     source: str
     limits: str
     stability_limit: float
-    carries: frozenset[str]
+    supports: frozenset[str]
     kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None
     make_methods: Callable[[Integrator], tuple[Method, ...]]
     string_kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None = None
@@ -68,14 +68,14 @@ class Integrator:
         return self.make_methods(self)
 
     @cached_property
-    def carries_loads(self) -> bool:
-        """Whether it carries every wrench and poke."""
-        return self.carries >= LOADS
+    def supports_loads(self) -> bool:
+        """Whether it supports every wrench and poke."""
+        return self.supports >= LOADS
 
     def kernel_for(self, problem: np.ndarray) -> Callable[[np.ndarray, np.ndarray, float, int], int] | None:
         """The kernel that steps this problem; only the ones used are ever compiled."""
         return self.string_kernel if problem[HAS_STRING] != 0.0 and self.string_kernel else self.kernel
 
     def lacks(self, needs: frozenset[str]) -> frozenset[str]:
-        """What of a scene's needs it can't carry; empty when it fits."""
-        return needs - self.carries
+        """What of a scene's needs it doesn't support; empty when it fits."""
+        return needs - self.supports

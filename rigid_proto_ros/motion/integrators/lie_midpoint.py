@@ -98,7 +98,7 @@ LIE_MIDPOINT = Integrator(
     source="Simo and Wong, Int. J. Numer. Meth. Engng 31 (1991) 19",
     limits="No string; keeps energy and momentum at any step it can solve, attitude errs with h².",
     stability_limit=1.0,
-    carries=LOADS | {ANGULAR_DAMPING},
+    supports=LOADS | {ANGULAR_DAMPING},
     kernel=lie_midpoint_steps,
     make_methods=fixed_steps,
 )

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.simd import Vector, arranged, component, filled, joined, load, number, store
+from ...base.simd import Packed, arranged, component, filled, joined, load, number, store
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
@@ -50,20 +50,20 @@ COLUMNS = 96
 
 
 @njit(cache=True, error_model="numpy")
-def _four(c: np.ndarray, at: int) -> Vector:
+def _four(c: np.ndarray, at: int) -> Packed:
     """Four times the number ``at`` of c."""
     x = load(c, at, filled(0.0, 1))
     return joined(x, x, x, x)
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(v: Vector) -> tuple[Vector, Vector, Vector]:
+def _spread(v: Packed) -> tuple[Packed, Packed, Packed]:
     x, y, z = component(v, 0), component(v, 1), component(v, 2)
     return joined(x, x, x, x), joined(y, y, y, y), joined(z, z, z, z)
 
 
 @njit(cache=True, error_model="numpy")
-def _rotation(c: np.ndarray, k: int, xs: Vector, ys: Vector, zs: Vector) -> Vector:
+def _rotation(c: np.ndarray, k: int, xs: Packed, ys: Packed, zs: Packed) -> Packed:
     """Coefficient k of R from the products x q, y q and z q."""
     xx, xy, xz, xw = number(xs, 0), number(xs, 1), number(xs, 2), number(xs, 3)
     yy, yz, yw = number(ys, 1), number(ys, 2), number(ys, 3)
@@ -82,13 +82,13 @@ def _rotation(c: np.ndarray, k: int, xs: Vector, ys: Vector, zs: Vector) -> Vect
 
 
 @njit(cache=True, error_model="numpy")
-def _vector(a: float, b: float, c: float, d: float) -> Vector:
+def _vector(a: float, b: float, c: float, d: float) -> Packed:
     """Four numbers side by side. What was stored one by one and is loaded together has to wait until it is written."""
     return joined(filled(a, 1), filled(b, 1), filled(c, 1), filled(d, 1))
 
 
 @njit(cache=True, error_model="numpy")
-def _keep(c: np.ndarray, k: int, q: Vector, w: Vector) -> None:
+def _keep(c: np.ndarray, k: int, q: Packed, w: Packed) -> None:
     """Coefficient k of q and ω, and what the products of q' and ω' take of it."""
     at = k * COLUMNS
     store(c, at + _Q, q)
@@ -114,7 +114,7 @@ def _span(c: np.ndarray, k: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _length(c: np.ndarray, k: int, squares: Vector, inverse: float) -> Vector:
+def _length(c: np.ndarray, k: int, squares: Packed, inverse: float) -> Packed:
     """Coefficient k > 0 of the knot's distance from the free end; squares: products of (a, l) without the first
     and the last; inverse: 1/l now."""
     ends = c[0, 24] * c[k, 24] + c[0, 25] * c[k, 25] + c[0, 26] * c[k, 26]
@@ -150,7 +150,7 @@ def _pull_to_the_end(c: np.ndarray, p: np.ndarray, k: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _pull(c: np.ndarray, p: np.ndarray, k: int, along: Vector, pull: Vector, heat: float, inverse: float) -> float:
+def _pull(c: np.ndarray, p: np.ndarray, k: int, along: Packed, pull: Packed, heat: float, inverse: float) -> float:
     """The same for a string with a length, from a and l up to k + 1 and from sums of older products: l n,
     T n and l'².
     """
@@ -171,7 +171,7 @@ def _pull(c: np.ndarray, p: np.ndarray, k: int, along: Vector, pull: Vector, hea
 
 
 @njit(cache=True, error_model="numpy")
-def _back(c: np.ndarray, i: int, j: int) -> Vector:
+def _back(c: np.ndarray, i: int, j: int) -> Packed:
     """A product's share in Rᵀ F: R from the row that begins at i, F from that at j."""
     at = i + _ROWS
     x, y, z = load(c, at, filled(0.0, 4)), load(c, at + 4, filled(0.0, 4)), load(c, at + 8, filled(0.0, 4))

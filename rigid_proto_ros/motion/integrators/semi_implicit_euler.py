@@ -75,7 +75,7 @@ SEMI_IMPLICIT_EULER = Integrator(
     limits="First order; a string stays bounded up to ω_s h of about 2, "
     "a spinning body gains energy beyond |ω|h of 0.1.",
     stability_limit=0.1,
-    carries=LOADS | {ANGULAR_DAMPING, STRING},
+    supports=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=semi_implicit_euler_steps,
     string_kernel=semi_implicit_euler_string_steps,
     make_methods=fixed_steps,

@@ -5,7 +5,7 @@ series.
 The length of a step is read off the coefficients (integrators/taylor_adaptive.py), so none is rejected. Where a
 pull-only string turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law,
 begun. A step is laid out at its full length first: a series from its start, and where the law changes within it a last
-one from that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and looking
+one from that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and sampling
 within it evaluate those same series.
 """
 
@@ -53,7 +53,7 @@ def rows(degree: int) -> int:
 
 
 def workspace(degree: int) -> np.ndarray:
-    """Room for the series, which stay there until the step is committed: every look before takes them once more."""
+    """Room for the series, which stay there until the step is committed: every sample before takes them once more."""
     return np.zeros((rows(degree), COLUMNS))
 
 
@@ -163,19 +163,25 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
 
 @njit(cache=True, error_model="numpy")
 def steps(
-    y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray, span_ns: int, look: bool
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    following: np.ndarray,
+    c: np.ndarray,
+    span_ns: int,
+    sampling: bool,
 ) -> int:
     """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c:
     workspace.
 
-    look: go span_ns into the step that waits instead, which is longer; returns 0 if that failed.
+    sampling: go span_ns into the step that waits instead, which is longer; returns 0 if that failed.
     """
     advanced = 0
     while True:
         if control[ctl.ACCEPTED_NS] == 0.0 and not _accept(y, p, control, following, c):
             control[ctl.FAILED] = 1.0
             return advanced
-        if look:
+        if sampling:
             out = np.empty(STORED)
             _reach(y, p, control, c, span_ns, out)
             y[:] = out

@@ -170,7 +170,7 @@ def knot_of(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
 
 @njit(cache=True, error_model="numpy")
 def first_spell(
-    start: np.ndarray, end: tuple[float, ...], h: float, x0: float, p: np.ndarray, taut: bool
+    start: np.ndarray | tuple[float, ...], end: tuple[float, ...], h: float, x0: float, p: np.ndarray, taut: bool
 ) -> tuple[float, bool]:
     """Middle of the first spell within h seconds, 0 for none, that the string is stretched (slack for a taut one) on
     the cubic through the knot's place and velocity at both ends (6,), and whether it ends before h. x0: stretch at the

@@ -122,14 +122,14 @@ def steps(
     following: np.ndarray,
     _room: np.ndarray,
     span_ns: int,
-    look: bool,
+    sampling: bool,
 ) -> int:
     """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays.
 
-    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
+    sampling: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
     failed.
     """
-    if look:
+    if sampling:
         return span_ns if free_body_strang_steps(y, p, span_ns * 1e-9, 1) == 1 else 0
     advanced = 0
     while True:

@@ -34,8 +34,8 @@ the variables stay.
 class Method:
     """A way to step, and the kernel that does it.
 
-    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, look), which commits steps, or
-    looks; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of
+    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
+    samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of
     the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
     sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
     with a string alone.
@@ -81,7 +81,7 @@ def method_table(integrator: Integrator, degree: int) -> np.ndarray:
 def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> None:
     """Compile a method's kernel, or load it from the cache, and put its address into the table."""
     kernel, way = integrator.methods[number].kernel, table[number, WAY]
-    if way != NOTHING and table[number, ADDRESS] == 0:
+    if kernel is not None and table[number, ADDRESS] == 0:
         table[number, ADDRESS] = address_of(kernel, ADAPTIVE_STEPS if way == ADAPTIVE else STEPS)
 
 

@@ -75,7 +75,7 @@ SERIES_ROW = STAGE_ROWS = 3 * STAGES + 2
 then a series.
 """
 
-_LOOKS = 8
+_SAMPLES = 8
 """At the string's law within half a step."""
 
 _PART_OF_FLOOR = 0.1
@@ -219,8 +219,8 @@ def _switch_in_half(y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.nd
     rates = np.zeros((STAGES, 3))
     stage_rates(V, h, rates)
     before, x0, place0 = 0.0, stretch(y, p)[0], knot_of(y, p)
-    for i in range(1, _LOOKS + 1):
-        s = i / _LOOKS
+    for i in range(1, _SAMPLES + 1):
+        s = i / _SAMPLES
         within(y, h, V, rates, s, at)
         margin, x = _margin(at, p, taut)
         place = knot_of(at, p)
@@ -407,7 +407,7 @@ def workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def _look(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray, span: float) -> bool:
+def _sample(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray, span: float) -> bool:
     """Take y ``span`` seconds on, less than the step that waits: one step mostly, but judged as that was;
     whether it was possible.
     """
@@ -434,16 +434,22 @@ def _look(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray, s
 
 @njit(cache=True, error_model="numpy")
 def steps(
-    y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray, span_ns: int, look: bool
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    following: np.ndarray,
+    c: np.ndarray,
+    span_ns: int,
+    sampling: bool,
 ) -> int:
     """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c:
     workspace.
 
-    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
+    sampling: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
     failed.
     """
-    if look:
-        return span_ns if _look(y, p, control, c, span_ns * 1e-9) else 0
+    if sampling:
+        return span_ns if _sample(y, p, control, c, span_ns * 1e-9) else 0
     advanced = 0
     while True:
         if control[ctl.ACCEPTED_NS] == 0.0:

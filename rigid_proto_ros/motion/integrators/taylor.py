@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import (
-    Vector,
+    Packed,
     arranged,
     component,
     filled,
@@ -50,30 +50,30 @@ COLUMNS = 64
 
 
 @njit(cache=True, error_model="numpy")
-def _four(x: Vector) -> Vector:
+def _four(x: Packed) -> Packed:
     return joined(x, x, x, x)
 
 
 @njit(cache=True, error_model="numpy")
-def _triple(array: np.ndarray, at: int, last: Vector) -> Vector:
+def _triple(array: np.ndarray, at: int, last: Packed) -> Packed:
     """Three numbers of an array and ``last``; where flights go side by side each number has one for every flight."""
     n = width(last)
     return joined(load(array, at * n, last), load(array, (at + 1) * n, last), load(array, (at + 2) * n, last), last)
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(v: Vector) -> tuple[Vector, Vector, Vector]:
+def _spread(v: Packed) -> tuple[Packed, Packed, Packed]:
     return _four(component(v, 0)), _four(component(v, 1)), _four(component(v, 2))
 
 
 @njit(cache=True, error_model="numpy")
-def _axes(q: Vector) -> tuple[Vector, Vector, Vector]:
+def _axes(q: Packed) -> tuple[Packed, Packed, Packed]:
     """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighed by the components of v is q ⊗ v."""
     return arranged(q, (3, 2, 5, 4)), arranged(q, (6, 3, 0, 5)), arranged(q, (1, 4, 3, 6))
 
 
 @njit(cache=True, error_model="numpy")
-def series_beside(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray, translates: bool, zero: Vector) -> None:
+def series_beside(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray, translates: bool, zero: Packed) -> None:
     """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u. zero: one number, or one for every flight
     that goes beside others; then y (≥ 13, n), p (SIZE, n) and c (degree + 1, COLUMNS n) hold the flights' numbers next
     to each other.
@@ -150,7 +150,7 @@ def series(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _sum(c: np.ndarray, at: int, degree: int, length: int, h: Vector, zeros: Vector) -> Vector:
+def _sum(c: np.ndarray, at: int, degree: int, length: int, h: Packed, zeros: Packed) -> Packed:
     """Of the part that begins at the number ``at`` of each row, h seconds on: even and odd powers by themselves, each
     from the smallest term (Horner), so that neither waits for the other.
     """
@@ -168,14 +168,14 @@ def _sum(c: np.ndarray, at: int, degree: int, length: int, h: Vector, zeros: Vec
 
 
 @njit(cache=True, error_model="numpy")
-def _put_triple(array: np.ndarray, at: int, vector: Vector, n: int) -> None:
+def _put_triple(array: np.ndarray, at: int, vector: Packed, n: int) -> None:
     store(array, at * n, component(vector, 0))
     store(array, (at + 1) * n, component(vector, 1))
     store(array, (at + 2) * n, component(vector, 2))
 
 
 @njit(cache=True, error_model="numpy")
-def sum_beside(c: np.ndarray, translates: bool, degree: int, h: Vector, out: np.ndarray, zero: Vector) -> None:
+def sum_beside(c: np.ndarray, translates: bool, degree: int, h: Packed, out: np.ndarray, zero: Packed) -> None:
     """The variables out (≥ 13, n), h seconds on, with unit quaternions; h as ``zero`` one number or one
     for every flight.
     """
@@ -222,7 +222,7 @@ TAYLOR = Integrator(
     source="Jorba and Zou, Experimental Mathematics 14 (2005) 99",
     limits="A held body-axes wrench, no world torque, no string; diverges beyond |ω|h of about 2.",
     stability_limit=1.0,
-    carries=frozenset({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING}),
+    supports=frozenset({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING}),
     kernel=taylor_steps,
     make_methods=fixed_steps,
 )

@@ -74,7 +74,7 @@ def step_length(growth: float, accuracy: float, degree: int, part: float) -> flo
 
 
 def workspace(degree: int) -> np.ndarray:
-    """Room for the coefficients, which stay there until the step is committed: every look before sums
+    """Room for the coefficients, which stay there until the step is committed: every sample before sums
     them once more.
     """
     return aligned((degree + 1, COLUMNS))
@@ -82,12 +82,18 @@ def workspace(degree: int) -> np.ndarray:
 
 @njit(cache=True, error_model="numpy")
 def steps(
-    y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray, span_ns: int, look: bool
+    y: np.ndarray,
+    p: np.ndarray,
+    control: np.ndarray,
+    following: np.ndarray,
+    c: np.ndarray,
+    span_ns: int,
+    sampling: bool,
 ) -> int:
     """Commit steps in y that fit into span_ns; returns how far it came [ns]. See control.py for the arrays; c:
     workspace.
 
-    look: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
+    sampling: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
     failed.
     """
     degree = int(control[ctl.DEGREE])
@@ -98,7 +104,7 @@ def steps(
             # What has just been committed is still in registers, or on its way to where it was copied from.
             series(following if follows else y, p, degree, c)
             control[ctl.SERIES] = 1.0
-        if look:
+        if sampling:
             sum_series(c, p, degree, span_ns * 1e-9, y)
             return span_ns if is_good(y) else 0
         if control[ctl.ACCEPTED_NS] == 0.0:
