@@ -26,12 +26,12 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
-from rigid_proto_ros.base.kernel_calls import ADAPTIVE_STEPS, entry_of
+from rigid_proto_ros.base.addresses import ADAPTIVE_STEPS, entry_of
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators import control as ctl
-from rigid_proto_ros.motion.integrators.stepping import ADAPTIVE
+from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
 from rigid_proto_ros.motion.variables import new_variables, to_row
 from rigid_proto_ros.simulation import batch_body as bb

@@ -5,8 +5,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import InputError
-from .nearest_name import one_of
+from .errors import InputError, one_of
 
 PACKAGE = "rigid_proto_ros"
 PACKAGE_FOLDER = Path(__file__).parent.parent

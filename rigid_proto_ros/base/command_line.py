@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any, NoReturn
 
-from .nearest_name import did_you_mean
+from .errors import did_you_mean
 
 NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
 """argparse knows no exponents and takes -2e-4 for an option."""

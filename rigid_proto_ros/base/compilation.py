@@ -17,24 +17,14 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
+from numba import config
 from numba.core import event
-from numba.core.caching import CacheImpl
+from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 from numba.extending import intrinsic as numba_intrinsic
 
 __all__ = ["intrinsic", "njit", "source_stamp", "told_when_compiling"]
 
-if TYPE_CHECKING:
-    _Function = TypeVar("_Function", bound=Callable[..., Any])
-
-    def njit(*signature: Any, **options: Any) -> Callable[[_Function], _Function]:
-        """numba's; to a type checker a compiled function is the function that it was compiled from."""
-
-    def intrinsic(*function: Callable, **options: Any) -> Any:
-        """numba's; what it makes takes the arguments without the first, and those are values and not types."""
-
-else:
-    njit, intrinsic = numba.njit, numba_intrinsic
-
+_CONFIG: Any = config  # its settings are made when it is imported
 PACKAGE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 
 _RELATIVE_IMPORT = re.compile(r"^[ \t]*from[ \t]+(\.+)([\w.]*)[ \t]+import[ \t]+(?:\(([^)]*)\)|([^\n]*))", re.MULTILINE)
@@ -77,7 +67,7 @@ def _stamp(own: Callable[[], object], file: str) -> tuple[object, bytes]:
     return own(), source_stamp(file)
 
 
-class _WithImports:
+class KernelLocator:
     """Where numba itself would keep a kernel of this package, with a stamp that knows what the kernel imports."""
 
     @classmethod
@@ -86,18 +76,42 @@ class _WithImports:
         path = os.path.realpath(file)
         if not path.startswith(PACKAGE + os.sep):
             return None
-        for standard in _STANDARD:
-            locator = standard.from_function(function, file)
+        for usual in (UserProvidedCacheLocator, InTreeCacheLocator, UserWideCacheLocator):
+            locator = usual.from_function(function, file)
             if locator is not None:
                 locator.get_source_stamp = functools.partial(_stamp, locator.get_source_stamp, path)
                 return locator
         return None
 
 
-# numba has no public way that all its releases share; without this list it caches as it always does.
-_STANDARD: list[Any] = getattr(CacheImpl, "_locator_classes", [])
-if _STANDARD:
-    CacheImpl._locator_classes = [_WithImports, *_STANDARD]  # type: ignore[list-item]
+_USUAL = "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator,ZipCacheLocator"
+"""numba's own list."""
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def njit(*signature: Any, **options: Any) -> Callable[[_Function], _Function]:
+    """numba's, with kernels kept by ``KernelLocator``. To a type checker what it makes is the Python function."""
+
+    def decorated(function: _Function) -> _Function:
+        # NUMBA_CACHE_LOCATOR_CLASSES, which numba reads when it is handed the function (tried with 0.68).
+        before = _CONFIG.CACHE_LOCATOR_CLASSES
+        _CONFIG.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__},{before or _USUAL}"
+        try:
+            return numba.njit(*signature, **options)(function)
+        finally:
+            _CONFIG.CACHE_LOCATOR_CLASSES = before
+
+    return decorated
+
+
+if TYPE_CHECKING:
+
+    def intrinsic(*function: Callable, **options: Any) -> Any:
+        """numba's; what it makes takes the arguments without the first, and those are values and not types."""
+
+else:
+    intrinsic = numba_intrinsic
 
 
 @contextmanager

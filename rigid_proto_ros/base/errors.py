@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The one error family: every message names the field and says what is wrong with it, in one line."""
 
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """Input that was refused: what was received and what is accepted; or, without ``accepted``, a sentence that says
@@ -31,3 +36,15 @@ class CommandRefused(InputError):
     def __init__(self, reason: str, field: str, received: object, accepted: str = "") -> None:
         self.reason = reason
         super().__init__(field, received, accepted)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """``did you mean X?`` for the known name nearest to ``name``; empty where none is near."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"did you mean {near[0]}?" if near else ""
+
+
+def one_of(name: str, known: Iterable[str]) -> str:
+    """What is accepted instead of ``name``: the nearest known name first, then all of them."""
+    known = list(known)
+    return " ".join(filter(None, [did_you_mean(name, known), f"one of {', '.join(known)}"]))

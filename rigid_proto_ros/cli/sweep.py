@@ -103,8 +103,8 @@ def _row_number(text, study) -> int:
 
 
 def _one_row(study, args) -> int:
-    from ..sweep.one_row import row_summary, write_scene
-    from ..sweep.variation import variation
+    from ..sweep.chunk import row_summary
+    from ..sweep.variation import variation, write_scene
     from .sweep_recordings import record_row
 
     row = _row_number(args.row, study)

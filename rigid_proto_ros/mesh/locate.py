@@ -11,8 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from ..base.bundled import PACKAGE_FOLDER
-from ..base.errors import MeshError
-from ..base.nearest_name import did_you_mean
+from ..base.errors import MeshError, did_you_mean
 
 BODIES = PACKAGE_FOLDER / "bodies"
 """Folder of the bundled meshes."""

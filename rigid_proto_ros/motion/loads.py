@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import boolean, float64
 
+from ..base.addresses import entry_of
 from ..base.compilation import njit
 from ..base.errors import CommandRefused
-from ..base.kernel_calls import entry_of
 from ..base.rotation import Numbers, Vector, matrix_elements, transposed_times, vector
 from . import body as of_body
 from .body import Body

@@ -105,23 +105,6 @@ class Tied:
         """x = l − rest length [m]; negative when slack."""
         return _length(self.span(body, state)) - self.rest_length
 
-    def pull(self, body: Body, state: State) -> np.ndarray:
-        """Force on the knot (3,) [N, world]."""
-        span = self.span(body, state)
-        length = _length(span)
-        arm = times(state.rotation, self.arm(body))
-        velocity = state.linear_velocity + cross(state.angular_velocity, arm) - self.hand_velocity(state.time_ns)
-        if self.rest_length == 0.0:
-            return -self.stiffness * span - self.damping * velocity
-        if length < NO_DIRECTION * self.rest_length:
-            return np.zeros(3)
-        direction = span / length
-        stretch = length - self.rest_length
-        tension = self.stiffness * stretch + self.damping * float((direction * velocity).sum())
-        if not self.bilateral and (stretch <= 0.0 or tension <= 0.0):
-            return np.zeros(3)
-        return -tension * direction
-
     def potential_energy(self, body: Body, state: State) -> float:
         """½ k x² while it pulls [J]."""
         stretch = self.stretch(body, state)

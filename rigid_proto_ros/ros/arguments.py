@@ -13,8 +13,7 @@ from pathlib import Path
 
 from ..base.bundled import scene_names
 from ..base.command_line import Parser, complete, completes
-from ..base.errors import InputError
-from ..base.nearest_name import did_you_mean
+from ..base.errors import InputError, did_you_mean
 from ..scene.offline import scene_file, scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scene_file import read_scene_file, typed_value

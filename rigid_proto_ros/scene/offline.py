@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..base.bundled import scene_names, scene_path
-from ..base.errors import CommandRefused, InputError
-from ..base.nearest_name import did_you_mean
+from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..base.progress import Progress
 from ..simulation.observer import Observer
 from ..simulation.simulation import Simulation, judge

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
 
-from ..base.errors import CommandRefused, InputError
-from ..base.nearest_name import did_you_mean
+from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..mass.properties import INERTIA_MODELS, MODEL_COMS
 from ..motion.frames import check_contact_name
 from ..motion.integrators import INTEGRATORS

@@ -12,8 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..base.errors import InputError
-from ..base.nearest_name import did_you_mean
+from ..base.errors import InputError, did_you_mean
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
 from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
 from .scenario import nanoseconds

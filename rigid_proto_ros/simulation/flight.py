@@ -16,9 +16,10 @@ from ..motion import body as of_body
 from ..motion import problem as pr
 from ..motion.integrators import control as ctl
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.integrator import MAX_SPEED
-from ..motion.integrators.stepping import ADAPTIVE, SLEEPS, WAY, commit, is_provided, reach
+from ..motion.integrators.equations import accelerations, stretch, tension_margin
+from ..motion.integrators.integrator import ADAPTIVE, MAX_SPEED
 from ..motion.integrators.stepping import EVALUATIONS as COST
+from ..motion.integrators.stepping import SLEEPS, WAY, commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, apply_impulse, is_zero, share_of
 from ..motion.variables import HAND_WORK, HEAT, STORED, to_good_row, to_variables
 
@@ -46,10 +47,8 @@ STEP_NS, TIMEOUT_NS, POKE_NS = range(3, 6)  # settings; a timeout of 0 is none
 METHOD, CHOOSES, SEGMENTS = range(6, 9)  # CHOOSES: by what the segment holds, as auto does; SEGMENTS begun so far
 TAKEN = 9  # steps of the segment, but for those that an adaptive kernel counts
 STEPS_BEFORE, EVALUATIONS_BEFORE = 10, 11
-ACTING, HELD = (
-    12,
-    13,
-)  # the loads that act are rows 0 to ACTING − 1, in the order in which they began; which of them is held
+ACTING = 12  # the loads that act are rows 0 to ACTING − 1, in the order in which they began
+HELD = 13  # which of them is held
 DUE, DUE_END = 14, 15  # rows of the commands that are to act next, in their order
 LOAD_IDS = 16  # given so far
 EVENTS = 17  # written so far in this call
@@ -86,18 +85,23 @@ def begin_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.n
     """Begin a segment at START: what acts is summed afresh, in the order in which it began, and the
     method is chosen.
     """
-    sums, p = f[SUMS : SUMS + LOADS_SIZE], f[PROBLEM : PROBLEM + pr.SIZE]
-    start, body = f[START : START + 13], f[BODY : BODY + of_body.BODY]
+    sums = f[SUMS : SUMS + LOADS_SIZE]
     sums[:] = 0.0
     for row in range(n[ACTING]):
         for k in range(LOADS_SIZE):
             sums[k] += loads[row, SHARE + k]
-    p[:] = f[COMMON : COMMON + pr.SIZE]
-    pr.begin_problem(p, sums, start)
-    if n[TIED] != 0:
-        string = f[STRING : STRING + pr.STRING]
-        pr.begin_string(p, body, string, n[STRING_BEGIN_NS], n[STRING_END_NS], start, n[START_NS])
+    segment_problem(f, n, f[START : START + 13], n[START_NS], f[PROBLEM : PROBLEM + pr.SIZE])
     begin_variables(f, n, methods)
+
+
+@njit(cache=True, error_model="numpy")
+def segment_problem(f: np.ndarray, n: np.ndarray, row: np.ndarray, time_ns: int, p: np.ndarray) -> None:
+    """The problem p of a segment under SUMS and the string that begins with the state ``row``."""
+    p[:] = f[COMMON : COMMON + pr.SIZE]
+    pr.begin_problem(p, f[SUMS : SUMS + LOADS_SIZE], row)
+    if n[TIED] != 0:
+        body, string = f[BODY : BODY + of_body.BODY], f[STRING : STRING + pr.STRING]
+        pr.begin_string(p, body, string, n[STRING_BEGIN_NS], n[STRING_END_NS], row, time_ns)
 
 
 @njit(cache=True, error_model="numpy")
@@ -176,6 +180,24 @@ def advance_segment(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns:
         return FAILED
     n[NOW_NS] = until_ns
     return REACHED
+
+
+@njit(cache=True, error_model="numpy")
+def accelerations_now(f: np.ndarray, n: np.ndarray) -> tuple[float, ...]:
+    """At NOW_NS, from the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six numbers."""
+    row, p, y = f[ROW : ROW + 13], np.zeros(pr.SIZE), np.zeros(STORED)
+    segment_problem(f, n, row, n[NOW_NS], p)
+    to_variables(row, p, y)
+    x, rate = stretch(y, p)
+    q, w, d, u = (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
+    ex, ey, ez, ax, ay, az, _, _ = accelerations(*q, *w, *d, *u, p, tension_margin(x, rate, p) > 0.0)
+    A, V, P, c = pr.REFERENCE_ACCELERATION, pr.REFERENCE_VELOCITY, pr.PRINCIPAL_AXES, p[pr.REFERENCE_DAMPING]
+    return (
+        *(p[A] - c * p[V] + ax, p[A + 1] - c * p[V + 1] + ay, p[A + 2] - c * p[V + 2] + az),
+        p[P] * ex + p[P + 1] * ey + p[P + 2] * ez,
+        p[P + 3] * ex + p[P + 4] * ey + p[P + 5] * ez,
+        p[P + 6] * ex + p[P + 7] * ey + p[P + 8] * ez,
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,19 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import int64
 
-from ..base.arrays_at import address_of_array, doubles_at, integers_at
+from ..base.addresses import address_of_array, doubles_at, entry_of, integers_at
 from ..base.compilation import njit
-from ..base.kernel_calls import entry_of
 from ..motion.body import BODY
-from ..motion.integrators.stepping import METHOD, Method, provide_kernel
+from ..motion.integrators.integrator import Method
+from ..motion.integrators.stepping import METHOD, provide_kernel
 from ..motion.loads import LOAD, LOADS_SIZE, Load, load_of_row, share_of
 from ..motion.problem import SIZE, STRING
 from ..motion.state import State
 from ..motion.string import Tied
 from . import flight as fl
 from .commands import Pending
-from .flight_start import FlightStart
-from .setup import Setup
+from .setup import FlightStart, Setup
 
 FIRST_ROWS = 8
 """Of the tables at first; they double as needed."""
@@ -224,6 +223,11 @@ class FlightArrays:
     def state(self) -> State:
         """The state now."""
         return State(self._head[fl.NOW_NS], self.row.copy())
+
+    def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
+        six = np.array(fl.accelerations_now(self.f, self.n))
+        return six[:3], six[3:]
 
     @property
     def acts(self) -> bool:

@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""What a simulation tells whoever watches it: the body, what acts on it, the string, and what the motion is doing."""
+"""What a simulation tells its observer: the body, what acts on it, the string, and what the motion is doing."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..motion.loads import Load
 from ..motion.string import Tied
 from .observer import BodySnapshot, Observer, ShownLoad, ShownString, listens
+from .readings import Readings
 from .setup import Setup
-
-if TYPE_CHECKING:
-    from .simulation import Simulation
 
 EFFORT_PERIOD_NS = 50_000_000
 """[ns, simulated] How often observers are told what the motion has cost."""
@@ -41,55 +37,53 @@ class EventNotifier:
         self._told_string: Tied | None = None
         self._next_effort_ns = 0
 
-    def introduce(self, simulation: Simulation) -> None:
+    def introduce(self, readings: Readings) -> None:
         """Tell an observer that comes in flight about the body, what acts on it and the string."""
-        self.body(simulation)
+        self.body(readings)
         if self.shows_loads:
-            for acting in simulation.acting:
-                self.load_began(simulation, acting.load_id, "wrench" if acting.held else "poke", acting.load)
-        self.string(simulation)
+            for acting in readings.acting:
+                self.load_began(readings, acting.load_id, "wrench" if acting.held else "poke", acting.load)
+        self.string(readings)
 
-    def body(self, simulation: Simulation) -> None:
+    def body(self, readings: Readings) -> None:
         """The body as it is now."""
-        self.observer.body_changed(simulation.time_ns, snapshot(simulation.setup))
+        self.observer.body_changed(readings.time_ns, snapshot(readings.setup))
 
-    def status(self, simulation: Simulation, paused: bool) -> None:
+    def status(self, readings: Readings, paused: bool) -> None:
         """What the body is doing, where that changed since it was last told."""
         if not self._shows_status:
             return
-        motion = "paused" if paused else "sleeping" if simulation.at_rest else "flying"
-        tracks = {"motion": motion, "method": simulation.choice}
-        string = simulation.string
+        motion = "paused" if paused else "sleeping" if readings.at_rest else "flying"
+        tracks = {"motion": motion, "method": readings.choice}
+        string = readings.string
         if string is not None:
-            slack = not string.bilateral and string.stretch(simulation.setup.body, simulation.state) < 0.0
+            slack = not string.bilateral and string.stretch(readings.setup.body, readings.state) < 0.0
             tracks["string"] = "slack" if slack else "taut"
         elif "string" in self._told:
             tracks["string"] = "loose"
         for track, value in tracks.items():
             if self._told.get(track) != value:
                 self._told[track] = value
-                self.observer.status(simulation.time_ns, track, value)
-        if simulation.time_ns >= self._next_effort_ns:
-            self._next_effort_ns = simulation.time_ns + EFFORT_PERIOD_NS
-            self.observer.effort(simulation.time_ns, simulation.steps, simulation.force_evaluations)
+                self.observer.status(readings.time_ns, track, value)
+        if readings.time_ns >= self._next_effort_ns:
+            self._next_effort_ns = readings.time_ns + EFFORT_PERIOD_NS
+            self.observer.effort(readings.time_ns, readings.steps, readings.force_evaluations)
 
-    def load_began(self, simulation: Simulation, load_id: int, kind: str, load: Load) -> None:
+    def load_began(self, readings: Readings, load_id: int, kind: str, load: Load) -> None:
         """A load begins to act; ``kind`` is wrench, poke or impulse."""
         if self.shows_loads:
-            shown = _shown_load(kind, load, simulation.setup)
-            self.observer.load_began(simulation.time_ns, load_id, shown)
+            shown = _shown_load(kind, load, readings.setup)
+            self.observer.load_began(readings.time_ns, load_id, shown)
 
-    def string(self, simulation: Simulation) -> None:
+    def string(self, readings: Readings) -> None:
         """The string, where it changed since it was last told."""
-        tied = simulation.string
+        tied = readings.string
         if tied is self._told_string:
             return
         self._told_string = tied
         if not self._shows_string:
             return
-        self.observer.string_changed(
-            simulation.time_ns, None if tied is None else _shown_string(tied, simulation.setup)
-        )
+        self.observer.string_changed(readings.time_ns, None if tied is None else _shown_string(tied, readings.setup))
 
 
 def snapshot(setup: Setup) -> BodySnapshot:

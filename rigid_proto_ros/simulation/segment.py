@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..motion.integrators import control as ctl
-from ..motion.integrators.stepping import NOTHING, ONE_STEP
+from ..motion.integrators.integrator import NOTHING, ONE_STEP
 from ..motion.problem import SIZE
 from ..motion.state import State
 from ..motion.variables import STORED

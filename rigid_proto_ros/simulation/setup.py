@@ -6,16 +6,32 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from ..motion.body import LENGTH, Body
+from ..base.addresses import address_of_array
+from ..motion.body import BODY, LENGTH, Body
 from ..motion.integrators.integrator import Integrator
+from ..motion.integrators.stepping import COLUMNS, ROWS, method_table
+from ..motion.integrators.taylor_adaptive import degree_for
 from ..motion.loads import light_amount
 from ..motion.problem import SIZE, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
-from .flight_start import FlightStart, flight_start
+from . import flight as fl
+
+
+class FlightStart(NamedTuple):
+    """f (ROOM,) and n (INTEGERS,) as simulation/flight.py lays them out; methods: the integrator's table, and its
+    address. room: of the largest workspace [doubles].
+    """
+
+    f: np.ndarray
+    n: np.ndarray
+    methods: np.ndarray
+    methods_at: int
+    room: int
 
 
 @dataclass(frozen=True)
@@ -66,8 +82,19 @@ class Setup:
 
     @cached_property
     def flight_start(self) -> FlightStart:
-        """What flights begin with (simulation/flight_start.py)."""
-        return flight_start(self)
+        """What flights under this setup begin with."""
+        f, n, degree = np.zeros(fl.ROOM), np.zeros(fl.INTEGERS, np.int64), degree_for(self.accuracy)
+        f[fl.ROW : fl.ROW + 13] = f[fl.START : fl.START + 13] = self.initial
+        f[fl.BODY : fl.BODY + BODY] = self.body_row
+        f[fl.COMMON : fl.COMMON + SIZE] = self.problem
+        f[fl.ACCURACY], f[fl.DEGREE] = self.accuracy, degree
+        n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = self.step_ns, self.wrench_timeout_ns, self.poke_duration_ns
+        n[fl.CHOOSES], n[fl.HELD] = self.integrator.chooses, fl.NONE_HELD
+        # None yet: the first that adapts its steps gets a clean workspace, as every other does.
+        n[fl.METHOD] = -1
+        methods = method_table(self.integrator, degree)
+        room = int((methods[:, ROWS] * methods[:, COLUMNS]).max())
+        return FlightStart(f, n, methods, address_of_array(methods), room)
 
     @cached_property
     def light_amount(self) -> float:

@@ -60,6 +60,16 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     return Chunk(_table(study, rows, columns, flown), flown.simulated)
 
 
+def row_summary(study: Study, row: int) -> dict:
+    """The row of the table by column, as JSON has it."""
+    columns = run_chunk(study, row, row + 1).columns
+    found = {}
+    for name, column in columns.items():
+        value = column[0] if column.dtype == object else column[0].item()
+        found[name] = None if value != value else value
+    return found
+
+
 def is_batchable(study: Study, rows: np.ndarray) -> bool:
     """Whether the compiled batch can fly any of these rows (n,)."""
     columns = study.columns(rows)

@@ -7,8 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..base.errors import InputError
-from ..base.nearest_name import one_of
+from ..base.errors import InputError, one_of
 
 
 def number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100, above: float = -math.inf) -> float:

@@ -12,8 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..base.errors import InputError
-from ..base.nearest_name import one_of
+from ..base.errors import InputError, one_of
 from ..scene.declaration import READ_ONLY, Parameter, Value
 from ..scene.parameters import parameter_named
 

@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 import copy
+import shlex
 from collections import ChainMap
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.output_file import output_file
 from ..scene.command_codec import ScriptCommand
 from ..scene.declaration import Value
 from ..scene.parameters import Parameters
@@ -95,3 +99,22 @@ def body_mesh_of(parameters: Parameters) -> BodyMesh | None:
 @lru_cache(maxsize=MESHES_KEPT)
 def _body_mesh(mesh: str, repair: bool, fallback: str, model: str) -> BodyMesh | None:
     return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback, inertia_model=model))
+
+
+def write_scene(study: Study, row: Variation, file: Path, time: float | None) -> dict:
+    """Write the row as a scene, its script beside it as NAME_script.yaml; returns the files and the
+    command that flies them.
+    """
+    duration = time if time is not None else study.duration_ns / 1e9
+    scenario, commands = row.scenario, row.commands
+    output_file("--as-scene", file)
+    try:
+        file.write_text(scenario.text, encoding="utf-8")
+        words = ["rigid_proto", "simulate", str(file), "--duration", repr(duration)]
+        if commands:
+            script = file.with_name(f"{file.stem}_script.yaml")
+            script.write_text(row.script_text, encoding="utf-8")
+            words += ["--script", str(script)]
+    except OSError as error:
+        raise InputError("--as-scene", str(file), f"a file that can be written ({error.strerror})") from None
+    return {"scene": str(file), "fly": shlex.join(words)}

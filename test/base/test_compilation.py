@@ -12,6 +12,9 @@ from rigid_proto_ros.base import compilation
 PACKAGE = Path(rigid_proto_ros.__file__).parent
 INNER = "from .compilation import njit\n\n\n@njit(cache=True)\ndef inner(x):\n    return x + {}\n"
 OUTER = "from .compilation import njit\nfrom .between import (\n    inner,\n)\n\n\n@njit(cache=True)\ndef outer(x):\n    return inner(x)\n"
+BROKEN = (
+    "numba no longer asks the locators that NUMBA_CACHE_LOCATOR_CLASSES names: base/compilation.py needs another way"
+)
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
 
@@ -27,7 +30,7 @@ def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tm
         ran = subprocess.run([sys.executable, "-c", CALL], cwd=tmp_path, capture_output=True, text=True, check=True)
         said.append(ran.stdout.split())
     # Value, and whether it came from the disk.
-    assert said == [["2", "0"], ["2", "1"], ["3", "0"]]
+    assert said == [["2", "0"], ["2", "1"], ["3", "0"]], BROKEN
 
 
 SUMS = """

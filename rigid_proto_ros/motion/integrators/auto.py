@@ -24,7 +24,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.rotation import multiply, normalize, rotate
+from ...base.rotation import exponential, multiply, normalize, rotate
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
@@ -47,17 +47,20 @@ from ..variables import damping_functions
 from . import series_steps, splitting_steps, stiff_steps, taylor_adaptive
 from .discrete_gradient import DISCRETE_GRADIENT
 from .equations import stretch
-from .exponential import exponential
 from .free_body import free_body_steps
 from .integrator import (
+    ADAPTIVE,
     ANGULAR_DAMPING,
+    FIXED_STEPS,
     LOADS,
     NO_GYROSCOPIC_TERM,
+    NOTHING,
+    ONE_STEP,
     STRING,
     Integrator,
+    Method,
 )
 from .runge_kutta import is_good
-from .stepping import ADAPTIVE, FIXED_STEPS, NOTHING, ONE_STEP, Method
 from .stiff_steps import damping_is_stiff
 from .taylor_adaptive import degree_for
 

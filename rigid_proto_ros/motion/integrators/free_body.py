@@ -15,8 +15,7 @@ import numpy as np
 from ...base.compilation import njit
 from ..problem import MOMENTS
 from .free_body_step import free_step
-from .integrator import MAX_SPEED, Integrator
-from .stepping import ONE_STEP, Method
+from .integrator import MAX_SPEED, ONE_STEP, Integrator, Method
 
 
 @njit(cache=True, error_model="numpy")

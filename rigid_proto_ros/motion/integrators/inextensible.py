@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.rotation import multiply, rotate, rotate_inverse
+from ...base.rotation import exponential, multiply, rotate, rotate_inverse
 from ..problem import (
     ACCELERATION_ADDED,
     ATTACH,
@@ -36,7 +36,6 @@ from ..problem import (
     STRING_DAMPING,
 )
 from ..variables import HAND_WORK, HEAT, LOW
-from .exponential import exponential
 from .free_body_step import free_step
 from .kick import kick, push
 from .knot import knot_and_stretch, moved_pair, unit_attitude

@@ -6,15 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..loads import Load
 from ..problem import HAS_STRING
-
-if TYPE_CHECKING:
-    from ..loads import Load
-    from .stepping import Method
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
@@ -36,6 +32,33 @@ def needs_of_load(load: Load) -> frozenset[str]:
     if load.axes == "world":
         return frozenset({WORLD_TORQUE}) if turns else frozenset()
     return frozenset(({BODY_TORQUE} if turns else set()) | ({BODY_FORCE} if any(load.force) else set()))
+
+
+NOTHING, ONE_STEP, FIXED_STEPS, ADAPTIVE = range(4)
+"""Ways to step. ONE_STEP: a single one from the segment's start, however far: for exact maps. NOTHING:
+the variables stay.
+"""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to step, and the kernel that does it.
+
+    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
+    samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of
+    the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
+    sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
+    with a string alone.
+    """
+
+    way: int
+    kernel: Callable | None
+    choice: Callable[[np.ndarray, float, float], str]
+    evaluations: int = 0
+    workspace: Callable[[int], np.ndarray] | None = None
+    sleeps: bool = False
+    floor_binds: bool = False
+    on_string: bool = False
 
 
 @dataclass(frozen=True)

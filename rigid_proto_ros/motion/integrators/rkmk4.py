@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.rotation import multiply, normalize
+from ...base.rotation import exponential, multiply, normalize
 from . import slack
 from .equations import accelerations
-from .exponential import exponential
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
 from .runge_kutta import is_good
 from .stepping import fixed_steps

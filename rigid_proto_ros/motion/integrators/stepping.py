@@ -8,47 +8,20 @@ takes one shorter step from there on a copy. So neither depends on when anybody 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ...base.compilation import njit
-from ...base.kernel_calls import (
+from ...base.addresses import (
     ADAPTIVE_STEPS,
     STEPS,
     adaptive_steps_at,
     address_of,
     steps_at,
 )
+from ...base.compilation import njit
 from . import control as ctl
-from .integrator import Integrator
-
-NOTHING, ONE_STEP, FIXED_STEPS, ADAPTIVE = range(4)
-"""Ways to step. ONE_STEP: a single one from the segment's start, however far: for exact maps. NOTHING:
-the variables stay.
-"""
-
-
-@dataclass(frozen=True)
-class Method:
-    """A way to step, and the kernel that does it.
-
-    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
-    samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of
-    the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
-    sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
-    with a string alone.
-    """
-
-    way: int
-    kernel: Callable | None
-    choice: Callable[[np.ndarray, float, float], str]
-    evaluations: int = 0
-    workspace: Callable[[int], np.ndarray] | None = None
-    sleeps: bool = False
-    floor_binds: bool = False
-    on_string: bool = False
+from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Integrator, Method
 
 
 def fixed_steps(integrator: Integrator) -> tuple[Method, ...]:

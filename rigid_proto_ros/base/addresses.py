@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Compiled functions as numbers, so that one loop can call whichever kernel a segment needs without compiling the
-others in.
+"""Compiled functions and arrays as numbers: what stands at an address is called or read without being handed over.
 
-A kernel's address stands in an array of integers; what is called there is the machine code that numba made of the
-kernel for one fixed signature. Compiling or loading it waits until somebody asks for the address.
+A kernel's address stands in an array of integers, so that one loop can call whichever kernel a segment needs without
+compiling the others in; what is called there is the machine code that numba made of the kernel for one fixed signature.
+Compiling or loading it waits until somebody asks for the address. Arrays are found by their addresses because a compiled
+function that is handed arrays inspects each of them first, at more cost than a short flight has: whoever gives an
+address away keeps the array.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from typing import Any
 
-from numba import boolean, config, float64, int64, types
+import numpy as np
+from numba import boolean, carray, config, float64, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 from numba.core.typing.templates import Signature
 
-from .compilation import intrinsic
+from .compilation import intrinsic, njit
 
 STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
 """A kernel (y, p, h, n)."""
@@ -66,7 +70,7 @@ def _function_at(taken_as: types.FunctionType) -> Callable:
             nothing = cgutils.get_null_value(cgutils.voidptr_t)
             function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
             function.py_addr, function.jit_addr = nothing, nothing
-            return function._getvalue()
+            return function._getvalue()  # noqa: SLF001 (so numba's guide to extensions does it)
 
         return taken_as(int64), code
 
@@ -75,3 +79,37 @@ def _function_at(taken_as: types.FunctionType) -> Callable:
 
 steps_at = _function_at(STEPS)
 adaptive_steps_at = _function_at(ADAPTIVE_STEPS)
+
+
+def address_of_array(array: np.ndarray) -> int:
+    """Where the first number of an array stands."""
+    return array.__array_interface__["data"][0]
+
+
+def _pointer_to(kind: types.Type) -> Callable:
+    @intrinsic
+    def pointer(_typing_context: Any, _address: Any) -> tuple:
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(types.CPointer(kind)))
+
+        return types.CPointer(kind)(int64), code
+
+    return pointer
+
+
+def _array_at(kind: types.Type, dtype: type) -> Callable:
+    """The function (address, shape) that gives a contiguous array of this kind."""
+    pointer = _pointer_to(kind)
+
+    @njit(cache=True, error_model="numpy")
+    def compiled(address: int, shape: tuple[int, ...]) -> np.ndarray:
+        return carray(pointer(address), shape)
+
+    def interpreted(address: int, shape: tuple[int, ...]) -> np.ndarray:
+        bytes_there = (ctypes.c_char * (8 * int(np.prod(shape)))).from_address(int(address))
+        return np.frombuffer(memoryview(bytes_there), dtype).reshape(shape)
+
+    return interpreted if _INTERPRETED else compiled
+
+
+doubles_at, integers_at = _array_at(float64, np.float64), _array_at(int64, np.int64)
