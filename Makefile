@@ -4,7 +4,12 @@
 SHELL := /bin/bash
 
 PY := .venv/bin/python
-READY := .venv/.pins
+# Each target installs what it needs and no more: `make run` has no use for what only tests import.
+FOR_RUN := .venv/.pins-run
+FOR_WORKBENCH := .venv/.pins-workbench
+READY := .venv/.pins-all
+# A ROS installation that .venv was made beside, and whose setup.bash wasn't sourced here.
+ROS := if [ -z "$$AMENT_PREFIX_PATH" ] && [ -f .venv/.ros ]; then source "$$(cat .venv/.ros)"; fi;
 # What the node says to others stays on this machine, unless the user has chosen otherwise.
 run up workbench pictures: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
@@ -13,18 +18,18 @@ help: ## this list
 
 setup: $(READY) ## .venv with all that run, up, test and lint need
 
-$(READY): requirements/base.txt requirements/ros.txt requirements/make_venv.py setup.py
+.venv/.pins-%: $(wildcard requirements/*) setup.py
 	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
-	@python3 requirements/make_venv.py
+	@python3 requirements/make_venv.py $*
 
-run: setup ## fly a bundled body, or MESH=path/to.obj, for about 10 s; leaves out/session.rrd
-	@.venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
+run: $(FOR_RUN) ## fly a bundled body, or MESH=path/to.obj, for about 10 s; leaves out/session.rrd
+	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
-up: setup ## node and viewer; stays until Ctrl-C
-	@.venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)")
+up: $(FOR_RUN) ## node and viewer; stays until Ctrl-C
+	@$(ROS) .venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)")
 
-workbench: setup ## node and interactive page; stays until Ctrl-C
-	@.venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
+workbench: $(FOR_WORKBENCH) ## node and interactive page; stays until Ctrl-C
+	@$(ROS) .venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
 
 # A wait that has run out says that the machine was busy or that a process wasn't discovered, and nothing about values: such a
 # test, and no other, is tried once more, and the report says which.
@@ -33,21 +38,21 @@ AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rR
 # Hundreds of processes are started: none of them should read our source anew.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
-	@$(PY) test/warm_kernels.py
-	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
+	@$(ROS) $(PY) test/warm_kernels.py
+	$(ROS) $(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 
-pictures: run ## fly, and draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
+pictures: setup run ## fly, and draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) test/workbench_pictures.py docs/workbench.png --compare docs/true_against_box.png
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
-	$(PY) -m colcon build --packages-select rigid_proto_ros
+	$(ROS) $(PY) -m colcon build --packages-select rigid_proto_ros
 
 bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU and versions
 	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -vE 'references|soak|clients'); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
@@ -59,10 +64,10 @@ bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU a
 	@touch $@
 
 soak: setup ## an hour of random commands, guests and changes; MINUTES=5 for the short form
-	$(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
+	$(ROS) $(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
 
 stress: setup ## long and hostile tests, and those of random examples with new ones
-	RIGID_PROTO_EXAMPLES=new $(PY) -m pytest -m "stress or hypothesis" $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen
+	$(ROS) RIGID_PROTO_EXAMPLES=new $(PY) -m pytest -m "stress or hypothesis" $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen
 
 clean: ## everything that was made here, the environments included
 	rm -rf .venv .venv-bench build install log out *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
@@ -70,6 +75,6 @@ clean: ## everything that was made here, the environments included
 
 PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip
 pins: setup ## for developers: newest versions into requirements/*.txt
-	$(PINS) requirements/base.in -o requirements/base.txt
+	$(PINS) requirements/all.in -o requirements/base.txt
 	$(PINS) requirements/ros.in -c requirements/base.txt -o requirements/ros.txt
 	sed -i '1i # Exact pins, made by `make pins`.' requirements/base.txt requirements/ros.txt

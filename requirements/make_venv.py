@@ -1,21 +1,34 @@
 # SPDX-License-Identifier: MIT
 """Make .venv with the pinned packages and this package in it; what is in the way is said in one line.
 
+    make_venv.py [run | workbench | all]
+
+``run``: what `make run` and `make up` need; ``workbench``: viser too; ``all``: also sweeps, tests, lint and colcon.
+
+Where a ROS installation is found, its rclpy, messages and numpy stay: the environment shares the system's packages, and only what
+is missing or too old there comes from pip. Elsewhere rclpy comes from PyPI.
+
 Written for any Python 3.6 or newer, so that an unsupported one can say so itself.
 """
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
-STAMP = VENV / ".pins"
-SUPPORTED = ((3, 11), (3, 13))
-NEEDED_BYTES = 2 * 1000**3  # the environment takes 1.5 GB, pip's unpacking some more
+ROS_SETUP = VENV / ".ros"  # the setup.bash of the ROS installation, for targets of the Makefile
+SUPPORTED = ((3, 11), (3, 14))
+STAGES = ("run", "workbench", "all")
+NEEDED_BYTES = {"run": 1.5e9, "workbench": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
+
+FIRST = ("numpy", "numba", "llvmlite", "pyyaml")
+"""What compiling the kernels needs: begun as soon as these are there, beside the installation of the rest."""
 
 
 def stop(message):
@@ -42,11 +55,37 @@ def runs(python, code):
     return subprocess.run([python, "-c", code], check=False, **quiet).returncode == 0
 
 
-def supported_python():
+def ros_setup():
+    """setup.bash of a ROS installation whose environment isn't on: that of $ROS_DISTRO, else the only one in /opt/ros."""
+    if "AMENT_PREFIX_PATH" in os.environ:
+        return None
+    folder = Path(os.environ.get("RIGID_PROTO_OPT_ROS", "/opt/ros"))
+    found = sorted(path for path in folder.glob("*/setup.bash") if list(path.parent.glob("lib/python3*/site-packages")))
+    asked = os.environ.get("ROS_DISTRO")
+    named = [path for path in found if path.parent.name == asked]
+    if not named and len(found) > 1:
+        names = ", ".join(path.parent.name for path in found)
+        stop("ROS_DISTRO: got {}; accepted: one of {}".format(asked or "nothing", names))
+    return (named or found or [None])[0]
+
+
+def enter(setup):
+    """Take over the environment that a setup.bash makes."""
+    command = ["bash", "-c", 'source "$0" >/dev/null && env -0', str(setup)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+    if done.returncode:
+        stop("{}: {}".format(setup, (done.stderr.decode(errors="replace").strip().splitlines() or ["failed"])[-1]))
+    for entry in done.stdout.decode(errors="replace").split("\0"):
+        name, equals, value = entry.partition("=")
+        if equals and name not in ("_", "SHLVL", "PWD"):
+            os.environ[name] = value
+
+
+def supported_python(in_ros):
     """An interpreter of a supported version: $PYTHON, this one, then newer to older ones on the PATH."""
     asked = os.environ.get("PYTHON")
-    candidates = [asked] if asked else [sys.executable, "python3.13", "python3.12", "python3.11"]
-    if not asked and "ROS_DISTRO" in os.environ:
+    candidates = [asked] if asked else [sys.executable, "python3.14", "python3.13", "python3.12", "python3.11"]
+    if not asked and in_ros:
         candidates = ["/usr/bin/python3", *candidates]  # the one that the installed rclpy was built for
     found = [pair for pair in map(interpreter, candidates) if pair]
     for path, version in found:
@@ -61,46 +100,108 @@ def supported_python():
     return None
 
 
-def called(*command):
-    """Run a command from the root; returns it with its output."""
-    environment = {key: value for key, value in os.environ.items() if key != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
-    return subprocess.run(
+def environment():
+    """This process's, without the mark that rclpy's wheels leave."""
+    return {key: value for key, value in os.environ.items() if key != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
+
+
+def started(*command):
+    """Start a command from the root."""
+    return subprocess.Popen(
         list(map(str, command)),
         cwd=str(ROOT),
-        env=environment,
+        env=environment(),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        check=False,
     )
 
 
-def installed_by_uv(python, files):
-    """Whether uv could install the pins: in a quarter of pip's time, half a minute instead of two.
+def called(*command):
+    """Run a command from the root; returns (status, output)."""
+    process = started(*command)
+    output = process.communicate()[0].decode(errors="replace")
+    return process.returncode, output
+
+
+class Progress:
+    """A line that says what is being done; on a terminal it counts while the work goes on."""
+
+    def __init__(self, text):
+        self.text, self.start = text, time.monotonic()
+        self.live = sys.stdout.isatty()
+        if not self.live:
+            print(text, flush=True)
+
+    def wait(self, process):
+        """(status, output) of a process, when it has ended."""
+        while self.live:
+            packages = len(list(VENV.glob("lib/python3*/site-packages/*.dist-info")))
+            kernels = len(list((ROOT / "rigid_proto_ros").glob("**/__pycache__/*.nbc")))
+            seconds = time.monotonic() - self.start
+            line = "{}: {} packages, {} compiled kernels, {:.0f} s".format(self.text, packages, kernels, seconds)
+            print("\r\033[K" + line[:100], end="", flush=True)
+            try:
+                output = process.communicate(timeout=0.5)[0]
+                break
+            except subprocess.TimeoutExpired:
+                continue
+        else:
+            output = process.communicate()[0]
+        if self.live:
+            print("\r\033[K", end="", flush=True)
+        return process.returncode, output.decode(errors="replace")
+
+
+def pins():
+    """The pinned lines of requirements/base.txt, by package; a package has several where Pythons differ."""
+    found = {}
+    for line in (ROOT / "requirements" / "base.txt").read_text(encoding="utf-8").splitlines():
+        if "==" in line and not line.startswith("#"):
+            found.setdefault(normalized(line.partition("==")[0]), []).append(line)
+    return found
+
+
+def wanted(file):
+    """The requirements of a list and of the lists that it refers to."""
+    lines = []
+    for line in file.read_text(encoding="utf-8").splitlines():
+        text = line.partition("#")[0].strip()
+        if text.startswith("-r "):
+            lines += wanted(file.parent / text[3:].strip())
+        elif text:
+            lines.append(text)
+    return lines
+
+
+def normalized(name):
+    """A package's name as indexes compare it."""
+    return re.sub(r"[-_.]+", "-", name.strip()).lower()
+
+
+def installed_by_uv(python, first, files, compiling):
+    """Whether uv could install the pins: in a quarter of pip's time. ``compiling`` is called when what it needs is there.
 
     Not tried where pip has been told of an index or a proxy, which uv wouldn't know.
     """
-    pin = next((line for line in files[0].read_text().splitlines() if line.startswith("uv==")), None)
-    settings = called(python, "-m", "pip", "config", "list").stdout.decode(errors="replace")
+    pin = pins().get("uv", [None])[0]
+    settings = called(python, "-m", "pip", "config", "list")[1]
     if pin is None or "index-url" in settings or "proxy" in settings:
         return False
-    requirements = [part for file in files for part in ("-r", file)]
-    steps = (
-        (python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", pin.split()[0]),
-        (VENV / "bin" / "uv", "pip", "install", "--quiet", "--python", python, *requirements),
-    )
-    if any(called(*step).returncode for step in steps):
+    if called(python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", pin.split()[0])[0]:
         return False
-    # As pip does, but on all cores, and not what is never imported. A file for another Python's grammar is no failure.
-    called(python, "-m", "compileall", "-q", "-j", "0", "-x", "site-packages/.*/tests?/", VENV / "lib")
-    return True
+    uv = (VENV / "bin" / "uv", "pip", "install", "--quiet", "--python", python)
+    if Progress("packages that the kernels need").wait(started(*uv, *first))[0]:
+        return False
+    compiling()
+    return Progress("the other packages; kernels beside them").wait(started(*uv, *files))[0] == 0
 
 
 def install(python, *arguments):
     """Run pip in .venv; a failure ends with the reason in one line, the whole output in .venv/setup.log."""
-    done = called(python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", *arguments)
-    if done.returncode == 0:
+    process = started(python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", *arguments)
+    status, output = Progress("packages, by pip").wait(process)
+    if status == 0:
         return
-    output = done.stdout.decode(errors="replace")
     log = VENV / "setup.log"
     try:
         log.write_text(output, encoding="utf-8")
@@ -124,45 +225,107 @@ def install(python, *arguments):
     stop("{} (log: {})".format(errors[-1], log))
 
 
-def main():
-    """Bring .venv up to the pins, or do nothing when it is."""
-    python, version = supported_python()
+def install_beside_ros(python, stage):
+    """What the system hasn't got, at the pinned versions; what it has stays where its version is accepted, numpy always."""
+    seen = "import importlib.metadata as m; print(*{d.metadata['Name'] + '=' + d.version for d in m.distributions()})"
+    words = called(python, "-c", seen)[1].split()
+    known = {normalized(name): version for name, _, version in (word.partition("=") for word in words)}
+    limits = VENV / "constraints.txt"
+    numpy = known.get("numpy")
+    lines = [line for name, found in pins().items() if name not in known and name != "numpy" for line in found]
+    requirements = wanted(ROOT / "requirements" / (stage + ".in"))
+    # A numpy of our own would stand before the one that the messages' code was compiled for.
+    old_numpy = numpy is not None and int(numpy.partition(".")[0]) < 2
+    if numpy is not None:
+        lines.append("numpy==" + numpy)
+        requirements = ["numpy" if normalized(re.split("[<>=]", line)[0]) == "numpy" else line for line in requirements]
+    if old_numpy:
+        # It asks for numpy 2 and runs with 1.26: tools/fresh_machine tries it.
+        requirements = [line for line in requirements if not line.startswith("rerun-sdk")]
+        requirements += ["attrs", "pillow", "psutil>=7", "pyarrow", "typing_extensions"]
+    limits.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    install(python, "-c", limits, *requirements)
+    if old_numpy:
+        install(python, "--no-deps", *pins()["rerun-sdk"])
+
+
+def compile_kernels(python):
+    """Start compiling what the first flight needs, on two cores."""
+    script = ROOT / "requirements" / "compile_kernels.py"
+    return [(part, started(python, script, part)) for part in ("integrators", "flight")]
+
+
+def main(stage):
+    """Bring .venv up to the pins of a stage, or do nothing when it is."""
+    setup = ros_setup()
+    if setup is not None:
+        enter(setup)
+    python, version = supported_python("ROS_DISTRO" in os.environ)
     ros_installed = runs(python, "import rclpy")
-    files = [ROOT / "requirements" / "base.txt"]
-    if not ros_installed:
-        files.append(ROOT / "requirements" / "ros.txt")
+    folder = ROOT / "requirements"
+    pinned = [folder / "base.txt"] + ([] if ros_installed else [folder / "ros.txt"])
     described = "{} {} ros-installed={}\n".format(ROOT, version, ros_installed)
-    pins = hashlib.sha256(
-        described.encode() + b"".join(f.read_bytes() for f in [*files, ROOT / "setup.py"])
-    ).hexdigest()
-    if STAMP.is_file() and STAMP.read_text() == pins:
-        STAMP.touch()
+    inputs = [*pinned, *sorted(folder.glob("*.in")), ROOT / "setup.py"]
+    state = hashlib.sha256(described.encode() + b"".join(f.read_bytes() for f in inputs)).hexdigest()
+    stamps = {name: VENV / (".pins-" + name) for name in STAGES}
+    if any(s.is_file() and s.read_text() == state for s in [stamps[n] for n in STAGES[STAGES.index(stage) :]]):
+        stamps[stage].write_text(state)
         return
     if not runs(python, "import ensurepip, venv"):
         stop("python3-venv is missing; install it with: sudo apt install python{}.{}-venv".format(*version))
-    free = shutil.disk_usage(str(ROOT)).free
-    if not VENV.is_dir() and free < NEEDED_BYTES:
-        stop("disk: got {:.1f} GB free in {}; accepted: 2 GB or more".format(free / 1000**3, ROOT))
+    needed, free = NEEDED_BYTES[stage], shutil.disk_usage(str(ROOT)).free
+    if not VENV.is_dir() and free < needed:
+        stop("disk: got {:.1f} GB free in {}; accepted: {:.1f} GB or more".format(free / 1e9, ROOT, needed / 1e9))
+    start = time.monotonic()
     inner = VENV / "bin" / "python"
     config = VENV / "pyvenv.cfg"
     shares = config.is_file() and "include-system-site-packages = true" in config.read_text()
     if not config.is_file() or shares != ros_installed or (interpreter(str(inner)) or (None, None))[1] != version:
-        print("making .venv with Python {}.{}".format(*version), flush=True)
+        source = "beside the ROS installation's packages" if ros_installed else "with rclpy from PyPI"
+        print("making .venv for {}, Python {}.{}, {}".format(stage, version[0], version[1], source), flush=True)
         options = ["--clear"] + (["--system-site-packages"] if ros_installed else [])
-        made = subprocess.run(
-            [python, "-m", "venv", *options, str(VENV)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
-        )
-        if made.returncode:
-            stop("python -m venv: " + (made.stdout.decode(errors="replace").strip().splitlines() or ["failed"])[-1])
-    source = "the ROS installation's rclpy" if ros_installed else "rclpy from PyPI"
-    print("installing the pinned packages (about 1.5 GB, half a minute to some minutes; {})".format(source), flush=True)
-    # Where the system's own packages count as installed, pip knows which they are.
-    if ros_installed or not installed_by_uv(inner, files):
-        install(inner, *(part for file in files for part in ("-r", file)))
-    install(inner, "--no-build-isolation", "--no-deps", "-e", ROOT)
-    STAMP.write_text(pins)
-    print("ready: {}".format(VENV), flush=True)
+        status, output = called(python, "-m", "venv", *options, VENV)
+        if status:
+            stop("python -m venv: " + (output.strip().splitlines() or ["failed"])[-1])
+    for stamp in stamps.values():
+        if stamp.is_file():
+            stamp.unlink()
+    compiling = []
+
+    def begin_compiling():
+        compiling.extend(compile_kernels(inner))
+
+    lists = ["-r", folder / (stage + ".in"), *([] if ros_installed else ["-r", folder / "ros.in"])]
+    lists += [part for file in pinned for part in ("-c", file)]
+    first = [line.split()[0] for name in FIRST for line in pins()[name][:1]]
+    try:
+        if ros_installed:
+            install_beside_ros(inner, stage)
+        elif not installed_by_uv(inner, first, lists, begin_compiling):
+            install(inner, *lists)
+        install(inner, "--no-build-isolation", "--no-deps", "-e", ROOT)
+        if not compiling:
+            begin_compiling()
+        progress = Progress("kernels, compiled once")
+        for part, process in compiling:
+            status, output = progress.wait(process)
+            if status:
+                stop("kernels ({}): {}".format(part, (output.strip().splitlines() or ["failed"])[-1]))
+    finally:
+        for _, process in compiling:
+            if process.poll() is None:
+                process.terminate()
+    if setup is not None:
+        ROS_SETUP.write_text(str(setup), encoding="utf-8")
+    elif ROS_SETUP.is_file():
+        ROS_SETUP.unlink()
+    for name in STAGES[: STAGES.index(stage) + 1]:
+        stamps[name].write_text(state)
+    print("ready: {} in {:.0f} s".format(VENV, time.monotonic() - start), flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    asked = sys.argv[1] if len(sys.argv) > 1 else "all"
+    if asked not in STAGES:
+        stop("stage: got {}; accepted: {}".format(asked, ", ".join(STAGES)))
+    main(asked)
