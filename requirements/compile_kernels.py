@@ -12,8 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from rigid_proto_ros.base.bundled import scene_path
-from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.integrators import auto
+from rigid_proto_ros.motion.integrators import INTEGRATORS, auto
 from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel
 from rigid_proto_ros.ros.warm_up import warm_up
 from rigid_proto_ros.scene.offline import read_scene
