@@ -22,7 +22,7 @@ setup: $(READY) ## .venv with all that run, up, test and lint need
 	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
 	@python3 requirements/make_venv.py $*
 
-run: $(FOR_RUN) ## fly a bundled body, or MESH=path/to.obj, for about 10 s; leaves out/session.rrd
+run: $(FOR_RUN) ## fly a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
 up: $(FOR_RUN) ## node and viewer; stays until Ctrl-C

@@ -315,6 +315,10 @@ def main(stage):
         for _, process in compiling:
             if process.poll() is None:
                 process.terminate()
+    if stage != "all":
+        # 70 MB that no flight needs: the installer, and headers for C++ packages that come with rclpy's wheels.
+        called(inner, "-m", "pip", "--disable-pip-version-check", "uninstall", "--quiet", "--yes", "uv")
+        shutil.rmtree(str(VENV / "include"), ignore_errors=True)
     if setup is not None:
         ROS_SETUP.write_text(str(setup), encoding="utf-8")
     elif ROS_SETUP.is_file():

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -61,14 +60,6 @@ class Processes:
         process = subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent, env=environment)
         self._running.append(process)
         return process
-
-    def wait_for(self, process: subprocess.Popen, while_running: subprocess.Popen) -> int:
-        """Wait until a process has ended; returns its status, or that of the other one when it ended before."""
-        while process.poll() is None:
-            if while_running.poll() is not None:
-                return while_running.returncode or 1
-            time.sleep(0.05)
-        return process.returncode
 
     def end(self, process: subprocess.Popen) -> int:
         """SIGINT, then after a while SIGKILL; returns the status."""

@@ -8,13 +8,16 @@ a recording of its own; see observer.py for what users see of that.
 from __future__ import annotations
 
 import threading
+import time
 import uuid
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
 from ..simulation.mailbox import Block, Mailbox, Mark
 from .rerun_internals import forget_closed_recordings
+from .rrd_file import add_index
 from .streams import (
     FileStream,
     LiveServer,
@@ -25,6 +28,9 @@ from .writer import SceneWriter
 
 FLUSH_PERIOD_S = 0.5
 """What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead."""
+
+INDEX_S = 3.0
+"""What the files of a session may take for their index, all together: whoever ends a node waits 5 s for it."""
 
 TIMEOUT_S = 10.0
 """A disk that doesn't take what waits in this time is given up."""
@@ -47,6 +53,7 @@ class Flusher:
         self._run = 1
         self._on_error = on_error
         self._open_ended = open_ended
+        self._without_index: list[Path] = []
         self._writer = SceneWriter(initial_view)
         self._ghost_block: Block | None = None
         self._ghost_sent = 0
@@ -208,7 +215,7 @@ class Flusher:
                     stream.close()
                     if moved:
                         kept = f"{stream.path.stem}.run{self._run - 1}{stream.path.suffix}"
-                        stream.path.rename(stream.path.with_name(kept))
+                        self._without_index.append(stream.path.rename(stream.path.with_name(kept)))
                     file = FileStream(stream.path, self.run_id, self.run_name, self._open_ended)
                 except (OSError, InputError) as error:
                     self._lost(str(error))
@@ -230,6 +237,18 @@ class Flusher:
                 stream.close()
             except OSError as error:
                 self._lost(str(error))
+                continue
+            self._without_index.append(stream.path)
+        self._add_indices()
+
+    def _add_indices(self) -> None:
+        """What a file of unknown length lacks, once it is whole; a process that is killed meanwhile leaves it as it was."""
+        end = time.monotonic() + INDEX_S
+        while self._open_ended and self._without_index:
+            path = self._without_index.pop(0)
+            reason = add_index(path, max(0.0, end - time.monotonic()))
+            if reason:
+                self._on_error(f"{path}: no index ({reason}); rigid_proto replay {path} --repair COPY.rrd makes one")
 
     def _give_up_file(self, error: OSError) -> None:
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:

@@ -27,6 +27,9 @@ KINDS = (0, 1, 2, 3)
 
 REPAIR_TIMEOUT_S = 600.0
 
+INDEXED_BYTES = 256_000_000
+"""Half an hour of a usual flight. The whole recording is in memory while its index is made."""
+
 
 def whole_bytes(path: Path) -> tuple[int, bool]:
     """How many bytes from the start hold whole frames, and whether the stream was ended.
@@ -69,24 +72,46 @@ def whole_part(path: Path) -> Iterator[Path]:
 
 def repair(path: Path, repaired: Path) -> None:
     """Write a finished recording with all that is whole in ``path``; InputError where that can't be."""
-    program = viewer_program()
-    if program is None:
-        raise InputError("--repair", str(repaired), "the rerun program to be installed (pip install rerun-sdk)")
     if repaired.exists() and repaired.samefile(path):
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
     with whole_part(path) as whole:
+        reason = _write_indexed(whole, repaired, REPAIR_TIMEOUT_S)
+    if reason:
+        raise InputError("--repair", str(repaired), f"a file that can be written from a readable recording ({reason})")
+
+
+def add_index(path: Path, timeout_s: float) -> str:
+    """Give a recording that was ended without one its index, in place and at once or not at all; returns the reason for not."""
+    if path.stat().st_size > INDEXED_BYTES:
+        return f"larger than {INDEXED_BYTES / 1e6:.0f} MB"
+    indexed = path.with_name(f".{path.stem}.indexed.rrd")
+    try:
+        reason = _write_indexed(path, indexed, timeout_s)
+        if not reason:
+            os.replace(indexed, path)
+        return reason
+    finally:
+        indexed.unlink(missing_ok=True)
+
+
+def _write_indexed(path: Path, indexed: Path, timeout_s: float) -> str:
+    """The recording again, with an index; returns why it couldn't be written, or nothing."""
+    program = viewer_program()
+    if program is None:
+        return "the rerun program is missing (pip install rerun-sdk)"
+    try:
         done = subprocess.run(
-            [program, "rrd", "optimize", str(whole), "-o", str(repaired)],
+            [program, "rrd", "optimize", str(path), "-o", str(indexed)],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=REPAIR_TIMEOUT_S,
+            timeout=timeout_s,
             check=False,
             env={**os.environ, "RERUN_APP_ONLY": "true", "NO_COLOR": "1"},
         )
-    if done.returncode != 0:
-        reason = (done.stderr.strip().splitlines() or ["unknown reason"])[-1]
-        raise InputError("--repair", str(repaired), f"a file that can be written from a readable recording ({reason})")
+    except subprocess.TimeoutExpired:
+        return f"it took longer than {timeout_s:g} s"
+    return "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["unknown reason"])[-1]
 
 
 def _copy_start(source: Path, target: Path, size: int) -> None:

@@ -94,13 +94,13 @@ class Stream(ABC):
 class FileStream(Stream):
     """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
 
-    open_ended: nobody knows how long the run will be, so the file gets no index: the library would gather that in
-    memory, 3 kB for each piece that it writes, 200 MB an hour.
+    open_ended: nobody knows how long the run will be, so the file is written without an index: the library would gather
+    that in memory, 3 kB for each piece that it writes, 200 MB an hour. ``add_index`` makes it from the finished file.
     """
 
     def __init__(self, path: Path, recording_id: str, name: str, open_ended: bool = False) -> None:
         self.path = path
-        self._open_ended = open_ended
+        self.open_ended = open_ended
         if path.suffix != ".rrd":
             raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
         output_file("record", path)
@@ -127,7 +127,7 @@ class FileStream(Stream):
             self.flush()
         finally:
             self.abandon()
-        if self._open_ended:
+        if self.open_ended:
             end_without_index(self.path)
 
     def abandon(self) -> None:

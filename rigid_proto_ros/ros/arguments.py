@@ -6,6 +6,7 @@ a stack of errors.
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import textwrap
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from ..base.errors import InputError, did_you_mean
 from ..scene.offline import scene_file, scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scene_file import read_scene_file, typed_value
+from ..scene.script import MAX_TIME_S
 
 NODE_NAME = "rigid_body"
 
@@ -40,13 +42,13 @@ EXAMPLES = (
 
 
 def own_arguments(argv: list[str]) -> argparse.Namespace:
-    """``bodies``: the files behind ``--bodies``. Everything else outside ``--ros-args ... [--]`` ends the process:
+    """``bodies``: the files behind ``--bodies``; ``until``: seconds, or None. Everything else outside ``--ros-args ... [--]`` ends the process:
     --help with 0, what isn't known with 2 and the nearest option. Options inside that rcl wouldn't know are refused,
     too.
     """
     parser = Parser(
         prog="rigid_body_node",
-        usage="rigid_body_node [--bodies SCENE ...] [--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
+        usage="rigid_body_node [--bodies SCENE ...] [--until S] [--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
         description="Simulate a rigid body as a ROS 2 node until Ctrl-C. A scene is a ROS parameter file.",
         examples=EXAMPLES,
     )
@@ -56,6 +58,9 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         default=[],
         metavar="SCENE",
         help="several bodies: scene files or bundled names, a node each",
+    )
+    parser.add_argument(
+        "--until", type=_seconds, metavar="S", help="end, in order, when simulated time reaches this many seconds"
     )
     completes(bodies, scene_names)
     own, ros = _split(argv[1:])
@@ -67,6 +72,17 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         raise InputError(own[0], f"not an option; a scene is given by --ros-args --params-file {own[0]}")
     complete(parser)
     return parser.parse_args(own)
+
+
+def _seconds(text: str) -> float:
+    """A time that a flight can end at; argparse says the rest of the refusal."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0.0 < seconds <= MAX_TIME_S:
+        raise argparse.ArgumentTypeError(f"got {text}; accepted: seconds above 0, up to {MAX_TIME_S:g}")
+    return seconds
 
 
 def _split(words: list[str]) -> tuple[list[str], list[str]]:

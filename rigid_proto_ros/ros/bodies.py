@@ -15,7 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from ..base.compilation import told_when_compiling
 from ..base.errors import InputError
 from ..scene.parameters import PARAMETERS
-from ..scene.scenario import Scenario
+from ..scene.scenario import Scenario, nanoseconds
 from ..simulation.observer import Observer
 from .arguments import NODE_NAME, given_arguments, read_bodies, remapped_node_name
 from .diagnostics import Reports
@@ -26,13 +26,16 @@ from .warm_up import warm_up
 
 class Bodies:
     """The nodes of this process. files: what stands behind ``--bodies``. request_end() is called when the process
-    should end by itself.
+    should end by itself: after a fault, or when simulated time has come to until_s.
     """
 
-    def __init__(self, argv: list[str], files: list[str], request_end: Callable[[], None]) -> None:
+    def __init__(
+        self, argv: list[str], files: list[str], request_end: Callable[[], None], until_s: float | None = None
+    ) -> None:
         self._argv = argv
         self._files = files
         self._request_end = request_end
+        self._until_s = until_s
         self._ending = False
         self._crashed = False
         self._nodes: list[RigidBodyNode] = []
@@ -56,6 +59,8 @@ class Bodies:
                 self._nodes.append(RigidBodyNode(self._physics, {**values, **given}, _make_viewer, name))
             for node in self._nodes:
                 node.states.pack_all(warm_up(node.loop.scenario.setup))
+                if self._until_s is not None:
+                    node.loop.end_at(nanoseconds(self._until_s), self._request_end)
         self._executor = SingleThreadedExecutor()
         for node in self._nodes:
             self._executor.add_node(node)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_body_node``: start the node and keep it until SIGINT or SIGTERM.
+"""``rigid_body_node``: start the node and keep it until SIGINT or SIGTERM, or ``--until``.
 
 The main thread waits for the end and does nothing else: what starts the node runs on a thread of its own, imports
 included, since compiling kernels can take minutes and nothing interrupts it.
@@ -52,10 +52,10 @@ class _Start(threading.Thread):
         try:
             from .arguments import own_arguments
 
-            files = own_arguments(self._argv).bodies
+            own = own_arguments(self._argv)
             from .bodies import Bodies
 
-            self._bodies = Bodies(self._argv, files, self._shutdown.request)
+            self._bodies = Bodies(self._argv, own.bodies, self._shutdown.request, own.until)
             self._bodies.start()
         except BaseException as error:  # raised again by the main thread
             self._error = error

@@ -71,7 +71,13 @@ class SimulationLoop:
         self._paused_publication_ns = 0
         self._next_listener_check_ns = 0
         self._caught_up = True
+        self._end_ns: int | None = None
+        self._on_end: Callable[[], None] = lambda: None
         self._anchor()
+
+    def end_at(self, time_ns: int, on_end: Callable[[], None]) -> None:
+        """Stop when simulated time reaches ``time_ns``, and call on_end()."""
+        self._end_ns, self._on_end = time_ns, on_end
 
     # For functions that other threads hand over
 
@@ -191,6 +197,9 @@ class SimulationLoop:
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return
+        ends = self._end_ns is not None and present_ns >= self._end_ns
+        if self._end_ns is not None:
+            present_ns = min(present_ns, self._end_ns)
         if not self._has_listeners and self._caught_up and (self._pace.factor > 0.0 or self._pace.followed):
             self._publications.pass_over(present_ns)
         due_ns = self._publications.next_ns
@@ -205,8 +214,11 @@ class SimulationLoop:
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
         self._commands_come = self._take_commands(wall_ns, False)
-        if not self._has_listeners or self._pace.followed or not self._caught_up:
+        if ends or not self._has_listeners or self._pace.followed or not self._caught_up:
             self.catch_up()
+        if ends and self._end_ns is not None and self.simulation.time_ns >= self._end_ns:
+            self.timekeeping.paused = True
+            self._on_end()
 
     def _check_listeners(self) -> None:
         self._has_subscribers = self._anybody_listens()

@@ -13,7 +13,7 @@ import pytest
 import rerun_flight as flight
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view import RerunObserver, flusher, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
@@ -216,21 +216,42 @@ def test_a_run_that_never_left_time_zero_is_not_kept_at_a_reset(tmp_path, states
     assert read_session(path).rows.tobytes() == states[1:2].tobytes()
 
 
-@pytest.mark.filterwarnings("ignore:RRD file has no footer")
-def test_a_recording_of_unknown_length_is_complete_without_an_index_that_would_grow_in_memory(tmp_path):
-    sizes = {}
+def verified_by_rerun(path):
+    """What the viewer's own check of a recording says."""
+    program = viewers.viewer_program()
+    return subprocess.run([program, "rrd", "verify", path], capture_output=True, text=True, check=False)
+
+
+def test_a_recording_of_unknown_length_gets_the_index_at_its_end_that_would_grow_in_memory(tmp_path):
     for open_ended in (False, True):
         path = tmp_path / f"{open_ended}.rrd"
         observer = RerunObserver(record=str(path), open_ended=open_ended)
         flight.fly(observer, flight.rows(80))
+        observer.reset()
+        flight.fly(observer, flight.rows(40))
         observer.close()
         session = read_session(path)
-        assert session.complete and session.rows.tobytes() == flight.rows(80).tobytes()
-        sizes[open_ended] = path.stat().st_size
-        assert whole_bytes(path)[1]
-        # What stands behind the last piece: the mark of the end, and the index or nothing.
-        assert (sizes[open_ended] - whole_bytes(path)[0] == FRAME_HEAD.size) == open_ended
-    assert sizes[True] < sizes[False]
+        assert session.complete and session.rows.tobytes() == flight.rows(40).tobytes()
+        for run in (path, path.with_name(f"{open_ended}.run1.rrd")):
+            done = verified_by_rerun(run)
+            assert done.returncode == 0, done.stderr
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_a_recording_whose_index_is_not_made_in_time_is_complete_without(tmp_path, monkeypatch):
+    monkeypatch.setattr(flusher, "INDEX_S", 0.0)
+    path, told = tmp_path / "session.rrd", []
+    observer = RerunObserver(record=str(path), open_ended=True, on_error=told.append)
+    flight.fly(observer, flight.rows(80))
+    observer.close()
+    session = read_session(path)
+    assert session.complete and session.rows.tobytes() == flight.rows(80).tobytes()
+    # What stands behind the last piece is the mark of the end.
+    assert path.stat().st_size - whole_bytes(path)[0] == FRAME_HEAD.size
+    (line,) = told
+    assert "no index" in line and "--repair" in line
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_recording_can_be_switched_on_and_off_in_flight(tmp_path, states):
