@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """ament_python package; `pip install` and `colcon build` both use this file."""
 
+import os
+import sys
 from glob import glob
 from pathlib import Path
 
@@ -12,8 +14,14 @@ VERSION = next(
     line.split('"')[1] for line in Path(NAME, "__init__.py").read_text("utf-8").splitlines() if "__version__" in line
 )
 
-# Real rclpy on Fast DDS from PyPI. An extra, because a machine with a ROS installation must keep that one's.
-ROS = ["ros-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
+# Real rclpy on Fast DDS from PyPI. An extra, and not part of `all`, because a machine with a ROS
+# installation must keep that one's. Jazzy's has no wheels for Python 3.14, Kilted's has.
+ROS = [
+    'ros-rclpy[fastrtps]==7.1.6; python_version < "3.14"',
+    'ros-jazzy-common-interfaces==5.3.6; python_version < "3.14"',
+    'ros-rclpy[fastrtps]==9.1.2; python_version >= "3.14"',
+    'ros-kilted-common-interfaces==5.5.1; python_version >= "3.14"',
+]
 MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
@@ -35,6 +43,20 @@ TEST = [
     "ipykernel>=6",
 ]
 
+
+def environments_python() -> str:
+    """What the executables that colcon installs start with: the system's Python has no numba, so that where it builds, the
+    active virtual environment's is taken, else that of `make setup`, else its own.
+    """
+    places = [Path(os.environ["VIRTUAL_ENV"])] if os.environ.get("VIRTUAL_ENV") else []
+    places.append(Path(__file__).resolve().parent / ".venv")
+    found = [str(place / "bin" / "python3") for place in places if (place / "bin" / "python3").is_file()]
+    if sys.prefix != sys.base_prefix or not found:
+        return sys.executable
+    # The first line of a script can hold no blank.
+    return found[0] if len(found[0].split()) == 1 else "/usr/bin/env python3"
+
+
 setup(
     name=NAME,
     version=VERSION,
@@ -50,9 +72,10 @@ setup(
         ),
         *((f"{SHARE}/{folder}", found) for folder in ("launch",) if (found := sorted(glob(f"{folder}/*.py")))),
     ],
-    python_requires=">=3.11,<3.14",
+    python_requires=">=3.11",
     install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0"],
     extras_require={
+        "all": [*RERUN, *MCAP, *WORKBENCH, *SWEEP, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
         "rerun": RERUN,
@@ -63,15 +86,28 @@ setup(
         "test": TEST,
     },
     zip_safe=False,
+    options={"build_scripts": {"executable": environments_python()}},
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",
     description="Prototype the properties of a rigid body: exact inertia from a mesh, flight under wrenches, Rerun",
+    long_description=Path("README.md").read_text("utf-8"),
+    long_description_content_type="text/markdown",
     license="MIT",
+    license_files=["LICENSE"],
+    keywords=["robotics", "ros2", "rigid body", "inertia", "simulation", "rerun"],
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Developers",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        *(f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13, 14)),
+        "Topic :: Scientific/Engineering :: Physics",
+    ],
     entry_points={
         "console_scripts": [
-            f"rigid_proto = {NAME}.cli.main:main",
-            f"rigid_body_node = {NAME}.ros.main:main",
-            f"poke_client = {NAME}.ros.poke_client:main",
+            f"rigid_proto = {NAME}.cli.executables:rigid_proto",
+            f"rigid_body_node = {NAME}.cli.executables:rigid_body_node",
+            f"poke_client = {NAME}.cli.executables:poke_client",
         ]
     },
 )

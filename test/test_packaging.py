@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The package installs by pip and by colcon, with its executables, bodies, scenes and examples where they are looked for."""
 
+import importlib.metadata
 import importlib.util
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 import rigid_proto_ros
 from rigid_proto_ros.base import bundled
@@ -32,7 +33,7 @@ def source_copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("rigid_proto_ros", "config", "msg_examples", "launch", "resource"):
         if (SOURCE / name).is_dir():
             shutil.copytree(SOURCE / name, copy / name, ignore=skipped)
-    for name in ("setup.py", "setup.cfg", "package.xml", "pyproject.toml", "LICENSE"):
+    for name in ("setup.py", "setup.cfg", "package.xml", "pyproject.toml", "LICENSE", "README.md"):
         shutil.copy(SOURCE / name, copy / name)
     return copy
 
@@ -128,9 +129,10 @@ def test_every_source_file_names_its_licence() -> None:
     assert not lacking
 
 
-ROSDEP_KEYS = {"python3-numba", "python3-numpy", "python3-pytest", "python3-yaml"}
+ROSDEP_KEYS = {"python3-numpy", "python3-pytest", "python3-yaml"}
 """Those of rosdistro's rosdep/python.yaml that this package asks for; ROS packages are keys by their names. None ends in -pip:
-Ubuntu 24.04 lets pip install nothing beside apt (PEP 668), so that rosdep would stop there."""
+Ubuntu lets pip install nothing beside apt (PEP 668), so that rosdep would stop there. python3-numba is a key for every Ubuntu,
+and no package in 24.04: numba comes by `make setup`."""
 
 ROS_PACKAGES = {
     *("diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs"),
@@ -145,21 +147,23 @@ def test_every_dependency_is_a_rosdep_key() -> None:
     assert asked == ROSDEP_KEYS | ROS_PACKAGES
 
 
-def test_what_pip_is_to_install_has_the_versions_of_setup_py() -> None:
-    declared = set(re.findall(r'"([a-z-]+[><=][^"]*)"', (SOURCE / "setup.py").read_text("utf-8")))
-    install = (SOURCE / "README.md").read_text("utf-8").partition("## Install")[2].partition("\n## ")[0]
-    for text in (install, (SOURCE / "package.xml").read_text("utf-8")):
-        told = re.findall(r'"([a-z-]+[><=][^"]*)"', text)
-        assert [requirement.split(">")[0] for requirement in told] == [
-            "rerun-sdk",
-            "mcap",
-            "viser",
-            "pyarrow",
-            "trimesh",
-            "rich",
-            "argcomplete",
-        ]
-        assert set(told) <= declared
+def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None:
+    """One list of versions for users of pip, another for `make setup`: they agree."""
+    metadata = importlib.metadata.metadata("rigid_proto_ros")
+    requirements = [Requirement(text) for text in metadata.get_all("Requires-Dist") or []]
+    pins = {}
+    for name in ("base.txt", "ros.txt"):
+        for line in (SOURCE / "requirements" / name).read_text("utf-8").splitlines():
+            if line and not line.startswith("#"):
+                pin = Requirement(line)
+                if pin.marker is None or pin.marker.evaluate():
+                    pins[pin.name.lower()] = next(iter(pin.specifier)).version
+    needed = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": "all"})]
+    assert {"numba", "rerun-sdk", "mcap", "viser", "distributed", "rich"} <= {r.name for r in needed}
+    assert not [r.name for r in needed if r.name.startswith("ros-")], "a ROS installation keeps its own"
+    for requirement in requirements:
+        if any(requirement.marker is None or requirement.marker.evaluate({"extra": e}) for e in ("all", "ros", "test")):
+            assert requirement.specifier.contains(pins[requirement.name.lower()]), requirement
 
 
 def test_every_ros_package_that_the_code_imports_is_declared() -> None:

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+"""An executable that lacks what it needs ends in one line that says what to install."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import pytest
+
+from rigid_proto_ros.cli import executables
+
+START = {name: getattr(executables, name) for name in ("rigid_proto", "rigid_body_node", "poke_client")}
+
+
+def without(monkeypatch: pytest.MonkeyPatch, *packages: str) -> None:
+    """Hide packages from those who look whether they are installed."""
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in packages else find(name))
+
+
+@pytest.mark.parametrize("program", START)
+def test_without_numba_an_executable_names_it_and_the_command_that_installs_it(program, monkeypatch, capsys) -> None:
+    without(monkeypatch, "numba")
+    assert START[program]() == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{program}: numba not found by ") and "make setup" in line and "pip install numba" in line
+
+
+@pytest.mark.parametrize("program", ["rigid_body_node", "poke_client"])
+def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(program, monkeypatch, capsys) -> None:
+    without(monkeypatch, "rclpy")
+    assert START[program]() == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "/opt/ros/" in line and "rigid_proto_ros[ros]" in line
