@@ -35,9 +35,10 @@ def generate_launch_description() -> LaunchDescription:
 
 def nodes(context: LaunchContext) -> list[Node]:
     """The body's node, and a poke client where a script is named."""
-    # Only here: a launch file is listed on machines on which the package isn't on the path.
+    # Only here: a launch file is listed on machines on which the package isn't on the path. Only what needs no numba: launch
+    # runs with the system's Python, the node with that of its environment.
     from rigid_proto_ros.base.bundled import example_path
-    from rigid_proto_ros.scene.offline import scene_file
+    from rigid_proto_ros.scene.scene_file import scene_file
 
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
     parameters = {"viewer": given["viewer"], "use_sim_time": given["use_sim_time"].lower() in ("true", "1", "yes")}

@@ -138,6 +138,12 @@ def test_each_outside_package_is_imported_in_its_own_place_alone() -> None:
     assert not complaints(allowed)
 
 
+def test_a_launch_file_needs_no_numba() -> None:
+    """ros2 launch runs with the system's Python; numba is in the environment that the node is started with."""
+    code = f"import sys, {PACKAGE}.base.bundled, {PACKAGE}.scene.scene_file; print('numba' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"
+
+
 @pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.replay"])
 def test_simulating_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
     # scipy is not among them: numba loads it where it is installed, for linear algebra that we don't use.

@@ -29,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Become the node: signals reach it directly."""
-    from ..scene.offline import read_scene, scene_file
+    from ..scene.offline import read_scene
+    from ..scene.scene_file import scene_file
     from .processes import text_parameter
 
     overrides = text_parameter("mesh", args.mesh) if args.mesh else []

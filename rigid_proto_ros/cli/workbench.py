@@ -110,8 +110,9 @@ def _ended(name: str, status: int) -> int:
 def _node_arguments(scene: str, mesh: str | None) -> tuple[list[str], int | None]:
     """How to start the node, and the page's port where the scene asks for one; what is wrong with it is said before anything
     starts."""
-    from ..scene.offline import read_scene, scene_file
+    from ..scene.offline import read_scene
     from ..scene.parameters import PARAMETERS
+    from ..scene.scene_file import scene_file
     from .processes import text_parameter
 
     port = read_scene(scene, {"mesh": mesh} if mesh else {}).parameters.workbench_port

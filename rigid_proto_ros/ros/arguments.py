@@ -15,9 +15,9 @@ from pathlib import Path
 from ..base.bundled import scene_names
 from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError, did_you_mean
-from ..scene.offline import scene_file, scene_values
+from ..scene.offline import scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
-from ..scene.scene_file import read_scene_file, typed_value
+from ..scene.scene_file import read_scene_file, scene_file, typed_value
 from ..scene.script import MAX_TIME_S
 
 NODE_NAME = "rigid_body"

@@ -7,8 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from ..base.bundled import scene_names, scene_path
-from ..base.errors import CommandRefused, InputError, did_you_mean
+from ..base.errors import CommandRefused, InputError
 from ..base.progress import Progress
 from ..simulation.observer import Observer
 from ..simulation.simulation import Simulation, judge
@@ -16,22 +15,8 @@ from .command_codec import ScriptCommand, core_command
 from .ghost import ghost_of
 from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
-from .scene_file import read_scene_file, scalar
+from .scene_file import read_scene_file, scalar, scene_file
 from .script import with_contacts
-
-
-def scene_file(name: str) -> Path:
-    """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
-    path = Path(name)
-    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
-        return scene_path(name.removesuffix(".yaml"))
-    if not path.exists():
-        hint = did_you_mean(Path(name).stem, scene_names())
-        known = f"the bundled scenes are {', '.join(scene_names())}"
-        raise InputError(
-            "scene", f"there is no file and no bundled scene {name!r}; {' '.join(filter(None, [hint, known]))}"
-        )
-    return path
 
 
 def read_scene(

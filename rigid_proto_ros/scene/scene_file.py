@@ -16,7 +16,8 @@ from pathlib import Path
 
 import yaml
 
-from ..base.errors import InputError
+from ..base.bundled import scene_names, scene_path
+from ..base.errors import InputError, did_you_mean
 from .yaml_text import compose_yaml, read_text
 
 _TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
@@ -25,6 +26,20 @@ _INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
 _DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
 _SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
 _HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\Z")
+
+
+def scene_file(name: str) -> Path:
+    """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
+    path = Path(name)
+    if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in scene_names():
+        return scene_path(name.removesuffix(".yaml"))
+    if not path.exists():
+        hint = did_you_mean(Path(name).stem, scene_names())
+        known = f"the bundled scenes are {', '.join(scene_names())}"
+        raise InputError(
+            "scene", f"there is no file and no bundled scene {name!r}; {' '.join(filter(None, [hint, known]))}"
+        )
+    return path
 
 
 @dataclass

@@ -21,9 +21,10 @@ import numpy as np
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError
 from ..scene.declaration import READ_ONLY, Value
-from ..scene.offline import OfflineRun, scene_file, scene_values
+from ..scene.offline import OfflineRun, scene_values
 from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
 from ..scene.scenario import Scenario, make_scenario, nanoseconds
+from ..scene.scene_file import scene_file
 from ..scene.script import expand_script
 from ..scene.yaml_text import load_plain_yaml, read_text
 from .fields import mapping, number, whole
