@@ -51,7 +51,8 @@ def environments_python() -> str:
     places = [Path(os.environ["VIRTUAL_ENV"])] if os.environ.get("VIRTUAL_ENV") else []
     places.append(Path(__file__).resolve().parent / ".venv")
     found = [str(place / "bin" / "python3") for place in places if (place / "bin" / "python3").is_file()]
-    if sys.prefix != sys.base_prefix or not found:
+    # Not sys.prefix: colcon sets it to the folder that it installs into.
+    if (Path(sys.executable).parent.parent / "pyvenv.cfg").is_file() or not found:
         return sys.executable
     # The first line of a script can hold no blank.
     return found[0] if len(found[0].split()) == 1 else "/usr/bin/env python3"
@@ -75,7 +76,7 @@ setup(
     python_requires=">=3.11",
     install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0"],
     extras_require={
-        "all": [*RERUN, *MCAP, *WORKBENCH, *SWEEP, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
         "rerun": RERUN,

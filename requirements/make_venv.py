@@ -232,8 +232,11 @@ def install_beside_ros(python, stage):
     known = {normalized(name): version for name, _, version in (word.partition("=") for word in words)}
     limits = VENV / "constraints.txt"
     numpy = known.get("numpy")
-    lines = [line for name, found in pins().items() if name not in known and name != "numpy" for line in found]
     requirements = wanted(ROOT / "requirements" / (stage + ".in"))
+    if known.pop("coverage", None):
+        # colcon brings the system's; numba doesn't even start beside an old one (Debian 13's 7.6).
+        requirements.append("coverage")
+    lines = [line for name, found in pins().items() if name not in known and name != "numpy" for line in found]
     # A numpy of our own would stand before the one that the messages' code was compiled for.
     old_numpy = numpy is not None and int(numpy.partition(".")[0]) < 2
     if numpy is not None:
