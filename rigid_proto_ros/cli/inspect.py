@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     completes(mesh, body_names)
     mass = parser.add_mutually_exclusive_group()
     mass.add_argument("--density", type=float, metavar="D", help=f"kg/m^3 (default {DENSITY:g})")
-    mass.add_argument("--mass", type=float, default=0.0, metavar="M", help="kg; takes precedence over density")
+    mass.add_argument("--mass", type=float, metavar="M", help="kg; takes precedence over density")
     parser.add_argument("--scale", nargs="+", default=["1"], metavar="S", help="one or three numbers (0.001: mm to m)")
     parser.add_argument("--model", choices=MODELS, default="solid", help="inertia model (default solid)")
     parser.add_argument(
@@ -68,6 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--verify", action="store_true", help="compare with exact rational arithmetic (exit 1 above 1e-13)"
     )
     parser.add_argument("--compare", metavar="ROBOT", help="show the errors of the inertials in a URDF, SDF or MJCF")
+    parser.add_argument("--link", metavar="NAME", help="with --compare: this link alone")
+    parser.add_argument(
+        "--package-path", type=Path, action="append", default=[], metavar="DIR",
+        help="with --compare: a folder that holds the packages or models that the file names; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--record", metavar="FILE.rrd", help="record mesh, COM, axes and boxes for the Rerun viewer")
     parser.add_argument("--frame", choices=FRAMES, default="mesh", help="origin of the exported link's frame")
     output = parser.add_mutually_exclusive_group()
@@ -82,8 +87,8 @@ def _scale_and_mesh(args: argparse.Namespace) -> tuple[list[float], str | None]:
     words, mesh = list(args.scale), args.mesh
     if mesh is None and len(words) > 1 and _as_number(words[-1]) is None:
         mesh = words.pop()
-    scale = [_as_number(word) for word in words]
-    if None in scale or len(scale) not in (1, 3):
+    scale = [number for word in words if (number := _as_number(word)) is not None]
+    if len(scale) != len(words) or len(scale) not in (1, 3):
         raise InputError("scale", " ".join(words), "one or three numbers, each with 1e-9 <= |s| <= 1e9")
     return scale, mesh
 
@@ -98,14 +103,18 @@ def _as_number(word: str) -> float | None:
 def run(args: argparse.Namespace) -> int:
     """Inspect, print, and return the exit status; raises InputError for what is refused."""
     scale, mesh_name = _scale_and_mesh(args)
-    _check_amount("mass", args.mass, zero=True)
     density = DENSITY if args.density is None else args.density
-    _check_amount("density", density, zero=False)
+    for name, value in (("mass", args.mass), ("density", density)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InputError(name, value, "a finite number > 0")
+    mass = args.mass or 0.0
     scale_vector(scale)
     if args.max_triangles < 1:
         raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
     if args.compare is not None:
         return _compare(args, mesh_name, scale)
+    if args.link is not None or args.package_path:
+        raise InputError("--link" if args.link is not None else "--package-path", "takes --compare ROBOT with it")
     if mesh_name is None:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     path = resolve_mesh(mesh_name)
@@ -113,9 +122,7 @@ def run(args: argparse.Namespace) -> int:
         mesh = load_mesh(mesh_name, max_triangles=args.max_triangles)
     with Progress(f"examining {len(mesh.triangles)} triangles", len(mesh.triangles) > LARGE_MESH):
         body = mesh_body(mesh, repair=args.repair, fallback=args.fallback)
-        inspection = inspect_mesh(
-            body, model=args.model, scale=scale, mass=args.mass, density=density, ballast=args.ballast
-        )
+        inspection = inspect_mesh(body, model=args.model, scale=scale, mass=mass, density=density, ballast=args.ballast)
     report = as_json(inspection)
     if inspection.refusal is not None:
         if args.json:
@@ -160,14 +167,9 @@ def _verify(inspection: Inspection, report: dict, to_json: bool) -> int:
     return 1
 
 
-def _check_amount(name: str, value: float, *, zero: bool) -> None:
-    if not (value > 0.0 or (zero and value == 0.0)) or value == float("inf"):
-        raise InputError(name, value, "a finite number > 0")
-
-
 def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:
     """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to 1e-3, otherwise 1."""
-    from ..mass.diagnosis import compare_robot  # XML and all: only who compares pays for it
+    from ..mass.diagnosis import OK, Options, compare_robot  # XML and all: only who compares pays for it
 
     for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
         if getattr(args, flag):
@@ -179,13 +181,12 @@ def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> 
     if mesh is None and scale != [1.0]:
         raise InputError("--scale", scale, "the MESH of one link with it; without, the robot's file says each scale")
     chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
-    density = args.density or 0.0
-    diagnoses = compare_robot(
-        Path(args.compare), mesh=mesh, scale=chosen, mass=args.mass, density=density,
-        repair=args.repair, fallback=args.fallback, max_triangles=args.max_triangles,
-    )  # fmt: skip
+    options = Options(
+        args.mass or 0.0, args.density or 0.0, args.repair, args.fallback, args.max_triangles, tuple(args.package_path)
+    )
+    diagnoses = compare_robot(Path(args.compare), options, mesh=mesh, scale=chosen, link=args.link)
     if args.json:
         print(json.dumps({"compare": args.compare, "links": [d.as_dict() for d in diagnoses]}))
     else:
         print_diagnoses(diagnoses)
-    return 0 if all(d.status == "ok" for d in diagnoses) else 1
+    return 0 if all(d.status == OK for d in diagnoses) else 1

@@ -100,23 +100,34 @@ def _row(values: Iterable[float]) -> str:
 
 
 def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
-    """What ``--compare`` prints: a paragraph for each link."""
+    """What ``--compare`` prints: a paragraph for each link, one line for those that merely have no inertial, and a count."""
     styles = {"ok": "green", "off": "bold red"}
     for d in diagnoses:
-        line(
-            (d.link, "bold"),
-            f" ({d.mesh}): ",
-            (d.status, styles.get(d.status, "yellow")),
-            f"; {d.note}" if d.note else "",
-        )
+        if d.status == "missing":
+            continue
+        by = f" by its {d.judged_by} shapes" if d.judged_by and d.status != "unknown" else ""
+        note = f"; {d.note}" if d.note else ""
+        line((d.link, "bold"), f" ({d.mesh}): ", (d.status, styles.get(d.status, "yellow")), f"{by}{note}")
         if d.inertia_error is not None:
             off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
-            line(
-                f"  relative errors: inertia {d.inertia_error:.2g}, centre of mass {d.center_of_mass_error:.2g} of the size{off}"
-            )
+            center = f"centre of mass {d.center_of_mass_error:.2g} of the size"
+            line(f"  relative errors: inertia {d.inertia_error:.2g}, {center}{off}")
         for cause in d.causes:
             line(f"  cause: {cause}")
-        if d.status == "off" and d.expected is not None:
-            center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
-            line(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
-            line("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))
+        if d.status == "off":
+            _print_expected(d)
+    missing = [d for d in diagnoses if d.status == "missing"]
+    for d in missing:
+        line((d.link, "bold"), f" ({d.mesh}): ", ("missing", "yellow"), f": {', '.join(d.causes)}")
+        _print_expected(d)
+    counts = {status: sum(d.status == status for d in diagnoses) for status in ("ok", "off", "missing", "unknown")}
+    if len(diagnoses) > 1:
+        line(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items() if count)}")
+
+
+def _print_expected(d: LinkDiagnosis) -> None:
+    if d.expected is None:
+        return
+    center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
+    line(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
+    line("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))

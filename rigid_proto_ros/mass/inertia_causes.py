@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+"""Which usual mistakes turn the true tensor or COM of a link into the ones that its file gives."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ..base.errors import InputError
+from .link_shapes import LinkShapes
+from .properties import MassProperties
+from .robot_files import Shape
+from .tensor import six_from_tensor
+
+LIMIT = 1e-3
+"""Differences up to this are taken for rounding of printed numbers."""
+
+_INCH = 1.0 / 0.0254
+_POUND = 1.0 / 0.45359237
+_FACTORS = {
+    1e6: "tensor in kg mm^2 (lengths in mm)",
+    1e4: "tensor in kg cm^2 (lengths in cm)",
+    1e3: "tensor in g m^2",
+    1e9: "tensor in g mm^2",
+    1e7: "tensor in g cm^2",
+    1e-3: "tensor in t m^2",
+    1e-6: "lengths divided by 1000 twice",
+    1e-4: "lengths divided by 100 twice",
+    _INCH**2: "tensor in kg in^2 (lengths in inches)",
+    1.0 / _INCH**2: "lengths taken for inches",
+    _POUND: "mass in pounds",
+    _POUND * _INCH**2: "tensor in lb in^2",
+}
+_WEIGHT = np.array([1.0, 2.0, 2.0, 1.0, 2.0, 1.0])  # how often each of the six entries stands in the matrix
+
+
+def _parallel(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
+    """Inertia about a point ``offset`` away from the COM."""
+    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+
+
+def _candidate_shapes(parts: LinkShapes, mass: float) -> list[tuple[str, MassProperties]]:
+    """The solid first, then what other tools and habits put in its place, in link axes."""
+    shapes = []
+    phrases = {
+        "solid": "",
+        "shell": "a thin shell",
+        "points": "point masses at the vertices",
+        "bounding_box": "the bounding box",
+    }
+    for model, phrase in phrases.items():
+        try:
+            properties = parts.properties(mass, model)
+        except InputError:
+            continue
+        shapes.append((phrase and f"tensor of {phrase}, not of the solid", properties))
+    hull = parts.hull(mass)
+    if hull is not None:
+        shapes.append(("tensor of the convex hull, not of the solid", hull))
+    return shapes
+
+
+def _frame_mistakes(truth: MassProperties, mass: float, stated: np.ndarray, use: Shape) -> list[tuple[str, np.ndarray]]:
+    """The true tensor (3, 3), and what comes out when it is taken about another point or in other axes."""
+    com = truth.center_of_mass
+    return [
+        ("", truth.inertia),
+        ("taken about the link's origin, not about the COM", _parallel(truth.inertia, mass, com)),
+        ("taken about the mesh's origin, not about the COM", _parallel(truth.inertia, mass, com - use.position)),
+        ("taken about the stated origin, not about the COM", _parallel(truth.inertia, mass, com - stated)),
+        ("moved from the COM to the origin the wrong way round", _parallel(truth.inertia, -mass, com)),
+        ("in the mesh's axes, not in the link's", use.rotation.T @ truth.inertia @ use.rotation),
+    ]
+
+
+def _entry_mistakes(inertia: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """The six entries of ``inertia`` (3, 3), and what they become by a wrong sign, order or exchange of axes."""
+    xx, xy, xz, yy, yz, zz = six_from_tensor(inertia)
+    rows = [
+        ("", (xx, xy, xz, yy, yz, zz)),
+        ("signs of the products: written as plus the integrals of xy, xz, yz", (xx, -xy, -xz, yy, -yz, zz)),
+        ("products left out", (xx, 0.0, 0.0, yy, 0.0, zz)),
+        ("order of entries: xx yy zz xy xz yz where xx xy xz yy yz zz belongs", (xx, yy, zz, xy, xz, yz)),
+        ("order of entries: xx xy xz yy yz zz where xx yy zz xy xz yz belongs", (xx, yy, yz, xy, zz, xz)),
+        ("order of products: xy yz xz", (xx, xy, yz, yy, xz, zz)),
+        ("order of products: yz xz xy", (xx, yz, xz, yy, xy, zz)),
+    ]
+    for order in itertools.permutations(range(3)):
+        if order == (0, 1, 2):
+            continue
+        turned = inertia[np.ix_(order, order)]
+        moved = [k for k in range(3) if order[k] != k]
+        if len(moved) == 3:
+            rows.append(("axes exchanged cyclically", six_from_tensor(turned)))
+            continue
+        i, j = moved
+        rows.append((f"axes {'xyz'[i]} and {'xyz'[j]} exchanged", six_from_tensor(turned)))
+        flip = np.ones(3)
+        flip[i] = -1.0
+        quarter = f"a quarter turn about {'xyz'[3 - i - j]} left out (as between y up and z up)"
+        rows.append((quarter, six_from_tensor(turned * np.outer(flip, flip))))
+    return [(text, np.array(six)) for text, six in rows]
+
+
+def explain_inertia(
+    given: np.ndarray, mass: float, stated: np.ndarray, parts: LinkShapes, limit: float = LIMIT
+) -> tuple[str, ...]:
+    """The fewest usual mistakes that turn the true tensor into ``given`` (3, 3), to ``limit``; empty when none do.
+
+    stated (3,): the COM that the file gives [m, link axes].
+    """
+    if not np.any(given):
+        return ("all entries zero",)
+    have = np.array(six_from_tensor(given))
+    found: list[tuple[int, int, tuple[str, ...]]] = []
+    for shape, truth in _candidate_shapes(parts, mass):
+        for frame, inertia in _frame_mistakes(truth, mass, stated, parts.first):
+            for entry, want in _entry_mistakes(inertia):
+                size = float(np.sum(_WEIGHT * want * want))
+                fitted = float(np.sum(_WEIGHT * want * have)) / size if size > 0.0 else 0.0
+                for factor in (1.0, fitted):
+                    if factor > 0.0 and np.max(np.abs(have - factor * want)) <= limit * factor * np.max(np.abs(want)):
+                        causes = tuple(
+                            text for text in (shape, frame, entry, _factor_name(factor, mass, limit)) if text
+                        )
+                        found.append((len(causes), len(found), causes))
+                        break
+    if found:
+        return min(found)[2]
+    diagonal = np.diag(given)
+    if not np.any(given - np.diag(diagonal)) and np.ptp(diagonal) <= 1e-9 * np.max(np.abs(diagonal)):
+        return (f"a placeholder: {diagonal[0]:g} on the diagonal",)
+    return ()
+
+
+def _factor_name(factor: float, mass: float, limit: float) -> str:
+    if abs(factor - 1.0) <= limit:
+        return ""
+    for known, text in _FACTORS.items():
+        if abs(factor / known - 1.0) <= limit:
+            return (
+                f"{text}: {factor:.4g} times too large" if factor > 1.0 else f"{text}: {1 / factor:.4g} times too small"
+            )
+    return f"{factor:.6g} times the tensor for this mass: computed for {factor * mass:.6g} kg (another density?)"
+
+
+def explain_center(
+    given: np.ndarray, parts: LinkShapes, truth: MassProperties, limit: float = LIMIT
+) -> tuple[str, ...]:
+    """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
+    com, use = truth.center_of_mass, parts.first
+    bare = use.rotation.T @ (com - use.position)
+    guesses = [
+        ("COM left at the link's origin", np.zeros(3)),
+        ("COM at the mesh's origin", use.position),
+        ("COM at the bounding box's centre", parts.middle),
+        ("COM in mesh coordinates: the mesh's pose in the link left out", bare),
+        ("COM without the mesh's position in the link", com - use.position),
+        ("COM without the mesh's scale", use.rotation @ (bare / use.scale) + use.position),
+        ("COM in mm", 1000.0 * com),
+        ("COM in cm", 100.0 * com),
+        ("COM in inches", 39.37007874015748 * com),
+        ("COM 1000 times too small", com / 1000.0),
+        ("COM with the opposite sign", -com),
+        ("COM with y and z exchanged", com[[0, 2, 1]]),
+        ("COM after a quarter turn about x", np.array([com[0], -com[2], com[1]])),
+        ("COM after a quarter turn about x", np.array([com[0], com[2], -com[1]])),
+    ]
+    for model, phrase in (("points", "mean of the vertices"), ("shell", "centroid of the surface")):
+        try:
+            guesses.append((f"COM at the {phrase}", parts.properties(truth.mass, model).center_of_mass))
+        except InputError:
+            pass
+    hull = parts.hull(truth.mass)
+    if hull is not None:
+        guesses.append(("COM of the convex hull", hull.center_of_mass))
+    for text, guess in guesses:
+        if np.max(np.abs(given - guess)) <= limit * max(parts.diagonal, float(np.max(np.abs(guess)))):
+            return (text,)
+    return ()

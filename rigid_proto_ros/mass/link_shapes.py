@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""The shapes of a link put together as solids of one density: meshes, and primitives by closed form."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..mesh.hull import convex_hull
+from .from_mesh import MeshBody
+from .moments import referenced_vertices, solid_moments
+from .properties import MassProperties
+from .robot_files import Shape
+
+
+def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarray]:
+    """(volume, second moments (3,) of x², y², z² over it) of a primitive about its centre, ``size`` as in
+    PRIMITIVES.
+    """
+    if not size or not all(0.0 < value < math.inf for value in size):
+        raise InputError(kind, size, "finite sizes > 0")
+    if kind == "box":
+        return math.prod(size), math.prod(size) * np.square(size) / 12.0
+    if kind in ("sphere", "ellipsoid"):
+        axes = np.array(size * 3 if kind == "sphere" else size)
+        volume = 4.0 / 3.0 * math.pi * float(np.prod(axes))
+        return volume, volume * axes**2 / 5.0
+    r, length = size
+    volume = math.pi * r * r * length
+    square = np.array([volume * r * r / 4.0, volume * r * r / 4.0, volume * length * length / 12.0])
+    if kind == "capsule":
+        # Two half balls whose flat sides lie length/2 from the centre; their centroids 3r/8 beyond.
+        ball = 4.0 / 3.0 * math.pi * r**3
+        across = ball * r * r / 5.0
+        along = across + ball * (length * length / 4.0 + 2.0 * (length / 2.0) * (3.0 * r / 8.0))
+        return volume + ball, square + np.array([across, across, along])
+    return volume, square
+
+
+def _half_box(shape: Shape) -> np.ndarray:
+    """Half the sides (3,) of a primitive's box in its own frame."""
+    if shape.kind == "box":
+        return 0.5 * np.array(shape.size)
+    if shape.kind in ("sphere", "ellipsoid"):
+        return np.array(shape.size * 3 if shape.kind == "sphere" else shape.size)
+    r, length = shape.size
+    return np.array([r, r, 0.5 * length + (r if shape.kind == "capsule" else 0.0)])
+
+
+class LinkShapes:
+    """Shapes, meshes with their body, in a link's frame."""
+
+    def __init__(self, parts: list[tuple[Shape, MeshBody | None]]) -> None:
+        self.parts = parts
+        self.first = parts[0][0]
+
+    @property
+    def names(self) -> str:
+        """What the shapes are called: mesh names and kinds."""
+        return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Vertices and corners (n, 3) of boxes around primitives, in the link's frame."""
+        found = []
+        for shape, body in self.parts:
+            if body is None:
+                own = np.array(list(product((-1.0, 1.0), repeat=3))) * _half_box(shape)
+            else:
+                own = referenced_vertices(body.vertices, body.moments.triangles) * shape.scale
+            found.append(own @ shape.rotation.T + shape.position)
+        return np.concatenate(found)
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the box, in the first shape's axes, around all."""
+        return float(np.linalg.norm(np.ptp(self.points @ self.first.rotation, axis=0)))
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Centre (3,) of that box, in the link's frame."""
+        local = self.points @ self.first.rotation
+        return self.first.rotation @ (0.5 * (local.min(axis=0) + local.max(axis=0)))
+
+    def volume(self) -> float:
+        """Volume [m³], what overlaps counted twice; raises InputError for a mesh that bounds none."""
+        return self._whole("solid")[0]
+
+    def properties(self, mass: float, model: str = "solid") -> MassProperties:
+        """Mass properties of ``mass`` kg spread evenly over the shapes, in the link's axes; other models
+        of meshes alone.
+        """
+        measure, first, second = self._whole(model)
+        center = first / measure
+        moment = second / measure - np.outer(center, center)
+        return MassProperties(mass, center, mass * (np.trace(moment) * np.eye(3) - moment))
+
+    def _whole(self, model: str) -> tuple[float, np.ndarray, np.ndarray]:
+        """Measure, first (3,) and second (3, 3) moments of all shapes at unit density, about the link's origin."""
+        measure, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+        for shape, body in self.parts:
+            size, center, moment = self._part(shape, body, model)
+            measure += size
+            first += size * center
+            second += size * np.outer(center, center) + moment
+        return measure, first, second
+
+    def _part(self, shape: Shape, body: MeshBody | None, model: str) -> tuple[float, np.ndarray, np.ndarray]:
+        """Measure, centroid (3,) and second moments (3, 3) about it of one shape, in the link's axes."""
+        R = shape.rotation
+        if body is None:
+            if model != "solid":
+                raise InputError("model", model, "solid, for a primitive shape")
+            size, squares = primitive_solid(shape.kind, shape.size)
+            return size, shape.position, R @ np.diag(squares) @ R.T
+        stretch = math.prod(np.abs(shape.scale).tolist())
+        if model == "shell":
+            size = body.moments.moments("shell", shape.scale).measure * float(shape.scale[0]) ** 2
+        else:
+            size = body.moments.moments(model).measure * (1.0 if model == "points" else stretch)
+        properties = body.moments.mass_properties(model, scale=shape.scale, mass=size)
+        moment = 0.5 * np.trace(properties.inertia) * np.eye(3) - properties.inertia
+        return size, R @ properties.center_of_mass + shape.position, R @ moment @ R.T
+
+    def hull(self, mass: float) -> MassProperties | None:
+        """The convex hull of a single mesh as a solid of ``mass``; None when it has no volume."""
+        if self._hull is None:
+            return None
+        center, unit = self._hull
+        return MassProperties(mass, center, mass * unit)
+
+    @cached_property
+    def _hull(self) -> tuple[np.ndarray, np.ndarray] | None:
+        if len(self.parts) > 1 or self.parts[0][1] is None:
+            return None
+        try:
+            hull = solid_moments(self.points, convex_hull(self.points))
+        except InputError:
+            return None
+        xx, xy, xz, yy, yz, zz = hull.second / hull.measure
+        return hull.centroid, np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: MIT
+"""The inertia doctor on files as robots have them: packages, default classes, several shapes a link, primitives, digits."""
+
+import json
+
+import numpy as np
+import pytest
+from mass_solids import box
+from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
+from test_inertia_doctor import words
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.diagnosis import Options, compare_robot
+from rigid_proto_ros.mass.link_shapes import LinkShapes, primitive_solid
+from rigid_proto_ros.mass.robot_files import Shape, printed_steps, rotation_from_rpy
+
+CUBE = CUBE_VERTICES - 0.5  # about its centre: inertia m/6 on the diagonal
+SIXTH = 1.0 / 6.0
+
+
+def inertial(mass="1.0000", moment=SIXTH, center="0 0 0") -> str:
+    entries = " ".join(
+        f'{name}="{moment if name[1] == name[2] else 0.0:.9g}"' for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    return f'<inertial><origin xyz="{center}"/><mass value="{mass}"/><inertia {entries}/></inertial>'
+
+
+def mesh(file, scale="1 1 1", role="visual", xyz="0 0 0") -> str:
+    return f'<{role}><origin xyz="{xyz}"/><geometry><mesh filename="{file}" scale="{scale}"/></geometry></{role}>'
+
+
+def urdf(folder, *links: str):
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "robot.urdf"
+    path.write_text(
+        '<robot name="r">' + "".join(f'<link name="l{k}">{text}</link>' for k, text in enumerate(links)) + "</robot>"
+    )
+    return path
+
+
+def judge(path, **options):
+    return {d.link: d for d in compare_robot(path, Options(**options))}
+
+
+def test_a_mesh_is_matched_by_its_whole_path(tmp_path):
+    # Both meshes are called base: the visual one is drawn in mm and carries the scale.
+    for name, scale in (("visual", 1000.0), ("collision", 1.0)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "base.stl").write_bytes(stl(scale * CUBE))
+    shapes = mesh("visual/base.stl", "0.001 0.001 0.001") + mesh("collision/base.stl", role="collision")
+    path = urdf(tmp_path, shapes + inertial())
+    for name in ("visual", "collision"):
+        (link,) = compare_robot(path, Options(), mesh=str(tmp_path / name / "base.stl"))
+        assert (link.status, link.judged_by) == ("ok", name) and link.inertia_error < 1e-6
+    (tmp_path / "base.stl").write_bytes(stl(CUBE))
+    with pytest.raises(InputError, match="whole path"):
+        compare_robot(path, Options(), mesh=str(tmp_path / "base.stl"))
+
+
+def mjcf(folder, text: str):
+    (folder / "assets").mkdir(parents=True, exist_ok=True)
+    (folder / "assets" / "cube.stl").write_bytes(stl(1000.0 * CUBE))
+    path = folder / "robot.xml"
+    path.write_text(f"<mujoco>{text}</mujoco>")
+    return path
+
+
+BODY = '<inertial pos="0.3 0 0" mass="1" diaginertia="0.1666667 0.1666667 0.1666667"/>'
+MILLIMETRES = 'scale="0.001 0.001 0.001"'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f'<default><mesh {MILLIMETRES}/><geom type="mesh" pos="0.3 0 0"/></default><asset><mesh name="c" file="assets/cube.stl"/></asset>'
+        f'<worldbody><body name="b"><geom mesh="c"/>{BODY}</body></worldbody>',
+        f'<default><default class="mm"><mesh {MILLIMETRES}/><geom pos="9 9 9"/><default class="arm"><geom type="mesh" pos="0.3 0 0"/></default></default></default>'
+        '<asset><mesh name="c" class="mm" file="assets/cube.stl"/></asset>'
+        f'<worldbody><body name="b" childclass="arm"><geom mesh="c"/>{BODY}</body></worldbody>',
+        '<compiler meshdir="assets"/><include file="parts.xml"/>'
+        f'<worldbody><body name="b"><include file="geoms.xml"/>{BODY}</body></worldbody>',
+        f'<asset><mesh name="c" file="assets/cube.stl" {MILLIMETRES}/></asset><worldbody><frame><body name="b">'
+        f'<frame pos="0.2 0.1 0" euler="0 0 90"><geom type="mesh" mesh="c" pos="-0.1 -0.1 0"/></frame>{BODY}</body></frame></worldbody>',
+        '<compiler angle="radian"/><worldbody><body name="b"><geom type="box" size="0.5 0.5 0.5" pos="0.3 0 0" '
+        f'euler="0 0 1.5707963267948966"/>{BODY}</body></worldbody>',
+    ],
+    ids=["defaults", "classes", "include", "frame", "primitive"],
+)  # fmt: skip
+def test_mjcf_is_read_as_its_compiler_reads_it(tmp_path, text):
+    mujoco = pytest.importorskip("mujoco")
+    path = mjcf(tmp_path, text)
+    (tmp_path / "parts.xml").write_text(
+        f'<mujoco><asset><mesh name="c" file="cube.stl" {MILLIMETRES}/></asset></mujoco>'
+    )
+    (tmp_path / "geoms.xml").write_text('<mujocoinclude><geom type="mesh" mesh="c" pos="0.3 0 0"/></mujocoinclude>')
+    link = judge(path)["b"]
+    assert (link.status, link.causes) == ("ok", ())
+    assert link.expected.center_of_mass == pytest.approx([0.3, 0.0, 0.0], abs=1e-7)
+    # MuJoCo's own opinion of the same geoms, at a density that gives 1 kg.
+    path.write_text(
+        path.read_text().replace(
+            "<mujoco>", '<mujoco><compiler inertiafromgeom="true"/><default><geom density="1"/></default>', 1
+        )
+    )
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.body_ipos[1] == pytest.approx(link.expected.center_of_mass, abs=1e-6)
+    assert model.body_inertia[1] / model.body_mass[1] == pytest.approx([SIXTH] * 3, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words_of_refusal"),
+    [
+        ('<include file="robot.xml"/>', "included once"),
+        ('<include file="none.xml"/>', "none.xml"),
+        (f'<worldbody><body name="b"><geom class="no" type="sphere"/>{BODY}</body></worldbody>', "default class no"),
+        ('<compiler coordinate="global"/>', "coordinate"),
+    ],
+)
+def test_mjcf_that_cannot_be_honoured_is_refused(tmp_path, text, words_of_refusal):
+    with pytest.raises(InputError, match=words_of_refusal):
+        compare_robot(mjcf(tmp_path, text), Options())
+
+
+def test_mjcf_mesh_attributes_that_are_not_known_leave_the_link_unknown(tmp_path):
+    asset = '<asset><mesh name="c" file="assets/cube.stl" refpos="1 0 0"/></asset>'
+    path = mjcf(tmp_path, f'{asset}<worldbody><body name="b"><geom type="mesh" mesh="c"/>{BODY}</body></worldbody>')
+    link = judge(path)["b"]
+    assert link.status == "unknown" and "refpos" in link.note
+
+
+def test_packages_are_found_upwards_by_name_by_package_xml_and_where_one_says(tmp_path):
+    folder = tmp_path / "ws" / "src" / "my_robot"
+    (folder / "meshes").mkdir(parents=True)
+    (folder / "meshes" / "a b.stl").write_bytes(stl(CUBE))
+    links = [
+        mesh("package://my_robot/meshes/a b.stl"),
+        mesh("model://my_robot/meshes/a%20b.stl"),
+        mesh("file://../meshes/a b.stl"),
+    ]
+    path = urdf(folder / "urdf", *(text + inertial() for text in links))
+    assert {d.status for d in judge(path).values()} == {"ok"}
+    folder.rename(tmp_path / "ws" / "src" / "clone")
+    path = tmp_path / "ws" / "src" / "clone" / "urdf" / "robot.urdf"
+    assert judge(path)["l0"].status == "unknown"
+    assert "--package-path" in judge(path)["l0"].note
+    (path.parent.parent / "package.xml").write_text("<package><name>my_robot</name></package>")
+    assert judge(path)["l0"].status == "ok"
+    elsewhere = urdf(tmp_path / "elsewhere", mesh("package://my_robot/meshes/a b.stl") + inertial())
+    assert judge(elsewhere)["l0"].status == "unknown"
+    assert judge(elsewhere, folders=(path.parent.parent,))["l0"].status == "ok"
+
+
+def test_several_shapes_of_a_link_are_put_together(tmp_path):
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    two = mesh("cube.obj", xyz="1 0 0") + mesh("cube.obj", xyz="-1 0 0")
+    # Two cubes of half a kilogram, one metre to each side.
+    entries = 'ixx="{0:.9g}" iyy="{1:.9g}" izz="{1:.9g}" ixy="0" ixz="0" iyz="0"'.format(SIXTH, SIXTH + 1.0)
+    text = f'<inertial><mass value="1.000000"/><inertia {entries}/></inertial>'
+    boxes = "".join(
+        f'<collision><origin xyz="{x} 0 0"/><geometry><box size="1 1 1"/></geometry></collision>' for x in (-1, 1)
+    )
+    links = judge(urdf(tmp_path, two + text, boxes + text))
+    assert [(d.status, d.judged_by) for d in (links["l0"], links["l1"])] == [("ok", "visual"), ("ok", "collision")]
+
+
+def test_visual_and_collision_are_judged_and_the_better_is_named(tmp_path):
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    (tmp_path / "open.obj").write_bytes(obj(CUBE, CUBE_TRIANGLES[:-1]))
+    coarse = '<collision><geometry><box size="1 1.2 1"/></geometry></collision>'
+    links = judge(
+        urdf(
+            tmp_path,
+            mesh("cube.obj") + coarse + inertial(),
+            mesh("open.obj") + mesh("cube.obj", role="collision") + inertial(),
+        )
+    )
+    assert [(d.status, d.judged_by) for d in (links["l0"], links["l1"])] == [("ok", "visual"), ("ok", "collision")]
+
+
+@pytest.mark.parametrize(("kind", "size"), [("box", (1.0, 2.0, 3.0)), ("cylinder", (0.5, 2.0)), ("sphere", (0.7,)), ("capsule", (0.5, 1.5)), ("ellipsoid", (0.3, 0.5, 0.9))])  # fmt: skip
+def test_primitives_by_closed_form_are_what_many_points_in_them_give(kind, size):
+    volume, squares = primitive_solid(kind, size)
+    n = 160
+    half = 1.6
+    axis = (np.arange(n) + 0.5) / n * 2 * half - half
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    inside = {
+        "box": lambda: (abs(x) < size[0] / 2) & (abs(y) < size[1] / 2) & (abs(z) < size[-1] / 2),
+        "cylinder": lambda: (x * x + y * y < size[0] ** 2) & (abs(z) < size[-1] / 2),
+        "sphere": lambda: x * x + y * y + z * z < size[0] ** 2,
+        "capsule": lambda: x * x + y * y + np.maximum(abs(z) - size[-1] / 2, 0.0) ** 2 < size[0] ** 2,
+        "ellipsoid": lambda: (x / size[0]) ** 2 + (y / size[1 % len(size)]) ** 2 + (z / size[-1]) ** 2 < 1.0,
+    }[kind]()
+    cell = (2 * half / n) ** 3
+    assert inside.sum() * cell == pytest.approx(volume, rel=0.01)
+    for values, expected in zip((x, y, z), squares, strict=True):
+        assert (values[inside] ** 2).sum() * cell == pytest.approx(expected, rel=0.02)
+
+
+def test_the_digits_printed_excuse_what_they_leave_open_and_no_more(tmp_path):
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    true = 0.0124  # printed as 0.012: 3.3 % off, and the tensor with six digits is of the true mass
+    right = mesh("cube.obj") + inertial("0.012", true / 6.0)
+    wrong = mesh("cube.obj") + inertial("0.012000", true / 6.0)
+    far = mesh("cube.obj") + inertial("0.012", 0.0132 / 6.0)
+    coarse = mesh("cube.obj") + inertial("1.00000", 0.17)
+    links = judge(urdf(tmp_path, right, wrong, far, coarse))
+    assert [links[f"l{k}"].status for k in range(4)] == ["ok", "off", "off", "ok"]
+
+
+def test_the_last_digits_step_is_of_the_group():
+    assert printed_steps(["0.012"]) == pytest.approx([0.0005])
+    assert printed_steps(["1e-3"]) == pytest.approx([0.0005])
+    assert printed_steps(["0.5", "0.123456", "0"]) == pytest.approx([5e-7] * 3)  # dropped zeros
+    assert printed_steps(["1.23456", "2.34567e-05"]) == pytest.approx([5e-6, 5e-11])
+    assert printed_steps(["0", "0.0"]).tolist() == [0.0, 0.0]
+
+
+def test_missing_inertials_stand_apart_and_the_rest_is_ranked(tmp_path, capsys):
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    shape = mesh("cube.obj")
+    path = urdf(tmp_path, shape, shape + inertial(moment=0.2), shape + inertial(), shape + inertial(moment=20.0))
+    diagnoses = compare_robot(path, Options())
+    assert [(d.link, d.status) for d in diagnoses] == [("l3", "off"), ("l1", "off"), ("l0", "missing"), ("l2", "ok")]
+    assert main(["inspect", "--compare", str(path)]) == 1
+    out = capsys.readouterr().out
+    assert "l0 (cube): missing: no <inertial>" in out and "4 links: 1 ok, 2 off, 1 missing" in out
+    assert main(["inspect", "--compare", str(path), "--link", "l2", "--json"]) == 0
+    assert [link["link"] for link in json.loads(capsys.readouterr().out)["links"]] == ["l2"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--link", "x2", "--compare"], ["--mass", "0", "--compare"], ["hammer", "--link", "a"], ["hammer", "--mass", "0"], ["hammer", "--package-path", "."]],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(tmp_path, capsys, arguments):
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    path = urdf(tmp_path, mesh("cube.obj") + inertial())
+    assert main(["inspect", *arguments, *([str(path)] if arguments[-1] == "--compare" else [])]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_xacro_in_comments_is_no_xacro_and_the_rest_is_expanded_where_it_is_installed(tmp_path, monkeypatch):
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    path = urdf(tmp_path, mesh("cube.obj") + inertial())
+    plain = path.read_text()
+    path.write_text("<!-- made by xacro: <xacro:macro/> -->" + plain)
+    assert judge(path)["l0"].status == "ok"
+    path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match="expand it first"):
+        judge(path)
+    program = tmp_path / "xacro"
+    program.write_text(f"#!/bin/sh\n/bin/cat <<'END'\n{plain}\nEND\n")
+    program.chmod(0o755)
+    assert judge(path)["l0"].status == "ok"
+    program.write_text("#!/bin/sh\necho no such argument >&2\nexit 3\n")
+    with pytest.raises(InputError, match="no such argument"):
+        judge(path)
+
+
+def test_each_meshs_hull_is_made_once_a_link(tmp_path, monkeypatch):
+    from rigid_proto_ros.mass import link_shapes
+
+    calls = []
+    hull = link_shapes.convex_hull
+    monkeypatch.setattr(link_shapes, "convex_hull", lambda points: calls.append(1) or hull(points))
+    vertices, triangles = box((1.0, 2.0, 3.0), 3)
+    (tmp_path / "part.obj").write_bytes(obj(vertices, triangles))
+    assert judge(urdf(tmp_path, mesh("part.obj") + inertial(moment=7.0, center="0.2 0.3 0.4")))["l0"].status == "off"
+    assert len(calls) == 1
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -0.7, 1.1)])
+def test_primitives_and_their_meshes_agree_wherever_they_lie(turn):
+    from rigid_proto_ros.mass.from_mesh import mesh_body
+    from rigid_proto_ros.mesh.reading import Mesh
+
+    vertices, triangles = box((1.0, 2.0, 3.0))
+    body = mesh_body(Mesh("b", "/b.obj", vertices, triangles, None, f"box {turn}"))
+    R, p = rotation_from_rpy(*turn), np.array([0.3, -0.2, 0.9])
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    first = LinkShapes([(Shape("visual", "mesh", R, p), body)]).properties(2.0)
+    second = LinkShapes([(Shape("visual", "box", R, p + R @ middle, size=(1.0, 2.0, 3.0)), None)]).properties(2.0)
+    assert words(first.center_of_mass) and first.center_of_mass == pytest.approx(second.center_of_mass, abs=1e-14)
+    assert first.inertia == pytest.approx(second.inertia, abs=1e-13)
