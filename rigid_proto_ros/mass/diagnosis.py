@@ -15,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.nearest_name import did_you_mean
+from ..base.errors import InputError, did_you_mean
 from ..mesh.locate import Search, resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .from_mesh import MeshBody, mesh_body
