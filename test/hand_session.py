@@ -13,8 +13,7 @@ from rigid_proto_ros.messages.session_messages import PROJECTIONS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
-from rigid_proto_ros.session.mesh import scene_sha256
-from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, Rank, ReleaseString, WrenchCommand
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation

@@ -45,8 +45,8 @@ ALLOWED = {
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser
-    "mcap": ("session.mcap_file",),
-    "zstandard": ("session.mcap_file",),  # comes with mcap
+    "mcap": ("session.mcap_reading", "session.mcap_writing"),
+    "zstandard": ("session.mcap_reading", "session.mcap_writing"),  # comes with mcap
 }
 
 

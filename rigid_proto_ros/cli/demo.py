@@ -13,10 +13,16 @@ import time
 from pathlib import Path
 
 from ..base.errors import InputError
+from .options import add_mesh
 
 FLIGHT_S = 10.0
 OUT = Path("out")
 
+SPIN = 4.0
+"""rad/s about the middle axis: a flip or two in ten seconds for most bodies."""
+
+DRIFT = 0.12
+"""Body diagonals a second that the push at the COM gives: it stays in the picture."""
 
 EXAMPLES = (
     ("rigid_proto demo", "the bundled T-handle, poked, 10 s"),
@@ -26,7 +32,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh instead of the bundled T-handle")
+    add_mesh(parser, "simulate this mesh instead of the bundled T-handle")
     parser.add_argument(
         "--out", type=Path, default=OUT, metavar="FOLDER", help="folder for the recording (default out)"
     )
@@ -51,8 +57,6 @@ def run(args: argparse.Namespace) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     session = args.out / "session.rrd"
     if args.mesh:
-        from .demo_scene import write_demo
-
         scene, script = write_demo(args.mesh, args.out)
     else:
         scene, script = scene_path("t_handle"), example_path("flip_and_poke")
@@ -78,6 +82,48 @@ def run(args: argparse.Namespace) -> int:
         print(f"rigid_proto demo: rigid_body_node ended with status {node_status}", file=sys.stderr)
         return 1
     return _report(session)
+
+
+def write_demo(mesh: str, folder: Path) -> tuple[Path, Path]:
+    """Write demo_scene.yaml and demo_pokes.yaml into ``folder``; returns both paths.
+
+    The body spins about its middle principal axis, a little off; pokes act at the COM and at the vertex farthest from
+    it. Raises InputError for a mesh that can't fly.
+    """
+    import numpy as np
+
+    from ..scene.scenario import make_scenario
+    from ..scene.yaml_text import dump_yaml
+
+    scenario = make_scenario({"mesh": str(Path(mesh).resolve()) if Path(mesh).exists() else mesh})
+    body, surface = scenario.setup.body, scenario.setup.surface
+    if surface is None:
+        raise InputError("--mesh", mesh, "a mesh")
+    points = surface.vertices - body.center_of_mass
+    farthest = int(np.argmax((points * points).sum(axis=1)))
+    diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    spin = SPIN * (body.principal_axes[:, 1] + 0.02 * body.principal_axes[:, 0] + 0.02 * body.principal_axes[:, 2])
+    push = body.mass * DRIFT * diagonal
+    # A torque that would turn the body by its own spin in a second, about its stiffest axis.
+    torque = 0.5 * SPIN * float(body.principal_moments[0])
+    scene = {
+        "rigid_body": {
+            "ros__parameters": {
+                "mesh": scenario.parameters.mesh,
+                "initial": {"angular_velocity": [float(w) for w in spin]},
+            }
+        }
+    }
+    script = [
+        {"t": 1.0, "at": "com", "impulse": [push, 0.0, 0.0]},
+        {"t": 2.5, "at": {"vertex": farthest}, "push": 0.5 * push, "duration": 0.3},
+        {"t": 4.0, "wrench": {"torque": [0.0, 0.0, torque], "axes": "body", "duration": 1.0}},
+        {"t": 6.5, "at": "com", "impulse": [-push, 0.0, 0.3 * push]},
+    ]
+    scene_path, script_path = folder / "demo_scene.yaml", folder / "demo_pokes.yaml"
+    scene_path.write_text(dump_yaml(scene), encoding="utf-8")
+    script_path.write_text(dump_yaml(script), encoding="utf-8")
+    return scene_path, script_path
 
 
 def _wait_for_flight(node: subprocess.Popen, client: subprocess.Popen) -> int:

@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", metavar="FILE.rrd", help="record mesh, COM, axes and boxes for the Rerun viewer")
     parser.add_argument("--frame", choices=FRAMES, default="mesh", help="origin of the exported link's frame")
     output = parser.add_mutually_exclusive_group()
-    output.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    output.add_argument("--json", action="store_true", help="print one JSON object")
     output.add_argument("--urdf", action="store_true", help="a URDF <inertial> on stdout")
     output.add_argument("--sdf", action="store_true", help="an SDF <inertial> on stdout")
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
@@ -133,25 +133,28 @@ def run(args: argparse.Namespace) -> int:
         from ..rerun_view.inspection import record_inspection
 
         record_inspection(args.record, inspection)
-    if args.json:
-        print(json.dumps(report))
-    elif args.urdf:
-        print(urdf_inertial(inspection.chosen, args.frame), end="")
-    elif args.sdf:
-        print(sdf_inertial(inspection.chosen, args.frame), end="")
-    elif args.mjcf:
-        print(mjcf_inertial(inspection.chosen, args.frame), end="")
-    else:
-        print_report(inspection, report)
-    if not args.json and (args.urdf or args.sdf or args.mjcf):
-        for finding in inspection.findings:
-            if finding.severity != "info":
-                print(f"{finding.severity}: {finding.message}", file=sys.stderr)
+    _print(inspection, report, args)
     return status
 
 
+def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> None:
+    exports = {"urdf": urdf_inertial, "sdf": sdf_inertial, "mjcf": mjcf_inertial}
+    export = next((export for name, export in exports.items() if getattr(args, name)), None)
+    if args.json:
+        print(json.dumps(report))
+    elif export is None:
+        print_report(inspection, report)
+    else:
+        print(export(inspection.chosen, args.frame), end="")
+        for finding in inspection.findings:
+            if finding.severity != "info":
+                print(f"{finding.severity}: {finding.message}", file=sys.stderr)
+
+
 def _verify(inspection: Inspection, report: dict, to_json: bool) -> int:
-    """Put the ``verification`` into the report, null (and, as JSON, printed) where it is refused; returns the exit status."""
+    """Put the ``verification`` into the report, null (and, as JSON, printed) where it is refused; returns
+    the exit status.
+    """
     report["verification"] = None
     body = inspection.body
     try:

@@ -54,8 +54,8 @@ def main(argv: list[str] | None = None) -> int:
             command.set_defaults(run=module.run)
     complete(parser)
     args = parser.parse_args(argv)
-    # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in the
-    # background had it ignored.
+    # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in
+    # the background had it ignored.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:

@@ -47,13 +47,15 @@ class Processes:
         self._handler = signal.signal(signal.SIGTERM, signal.default_int_handler)
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         for process in reversed(self._running):
             self.end(process)
         signal.signal(signal.SIGTERM, self._handler)
 
     def start(self, command: list[str]) -> subprocess.Popen:
-        """Start a process in a session of its own: a Ctrl-C at the terminal reaches this command alone, which ends them."""
+        """Start a process in a session of its own: a Ctrl-C at the terminal reaches this command alone,
+        which ends them.
+        """
         folder = str(Path(__file__).resolve().parents[2])
         paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}

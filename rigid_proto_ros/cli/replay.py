@@ -7,10 +7,19 @@ import argparse
 import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
 from ..base.output_file import output_file
 from ..base.progress import Progress
+from .options import add_session
+
+if TYPE_CHECKING:
+    from ..scene.scenario import Scenario
+    from ..session.recorded_session import RecordedSession
+
+REFUSALS_SHOWN = 10
+"""Of a run: a flood of commands can have been refused."""
 
 EXAMPLES = (
     ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
@@ -25,9 +34,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument(
-        "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
-    )
+    add_session(parser, node="the node to send commands to, or the body in a bag with several")
     parser.add_argument(
         "--verify", action="store_true", help="simulate it again and compare; exit 1 at the first difference"
     )
@@ -35,13 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--repair", metavar="FILE", help="write a readable file with all that is complete in a damaged session"
     )
-    parser.add_argument("--scene", metavar="FILE", help="the scene, for a bag without one")
     parser.add_argument("--at", type=float, metavar="T", help="simulated time [s], for --as-scene")
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="write the scene that begins at --at")
     parser.add_argument("--publish", choices=("states", "commands"), help="publish it over ROS")
-    parser.add_argument(
-        "--node", metavar="NAME", help="the node to send commands to, or the body in a bag with several"
-    )
     parser.add_argument("--speed", type=float, metavar="X", help="speed factor of --publish states (default 1)")
 
 
@@ -52,8 +55,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     if args.repair:
         repair(args.session, args.repair)
-    bag_node = "" if args.publish == "commands" else args.node or ""
-    runs = read_runs(args.session, bag_node)
+    runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
     for number, session in enumerate(runs, 1):
         _tell(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.repair:
@@ -85,7 +87,7 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("--record", args.record, "another file than the session")
 
 
-def _tell(name: str, session) -> None:
+def _tell(name: str, session: RecordedSession) -> None:
     times = session.times
     span = f"{times.min() / 1e9:.9g} s to {times.max() / 1e9:.9g} s" if len(times) else "no time"
     print(f"{name}: {len(times)} states, {span}; {len(session.events)} commands and services")
@@ -93,19 +95,21 @@ def _tell(name: str, session) -> None:
         print(f"  truncated: {session.readable_bytes} of {session.file_bytes} bytes are complete")
     if session.missing:
         print(f"  without {', '.join(session.missing)}")
-    for time_ns, line in session.refusals:
+    for time_ns, line in session.refusals[:REFUSALS_SHOWN]:
         print(f"  refused at {time_ns / 1e9:.9g} s: {line}")
+    if (more := len(session.refusals) - REFUSALS_SHOWN) > 0:
+        print(f"  {more} more were refused, the last at {session.refusals[-1][0] / 1e9:.9g} s")
 
 
 def _say_how_to_see_it(args: argparse.Namespace) -> None:
-    shown = args.record or (args.session if args.session.endswith(".rrd") else "")
-    if shown.endswith(".rrd"):
-        print(f"  show it with: rerun {shown}")
+    newest = args.record or args.repair or args.session
+    if newest.endswith(".rrd"):
+        print(f"  show it with: rerun {newest}")
     elif not args.record:
-        print("  to show it, convert it for Rerun: --record FILE.rrd")
+        print(f"  to show it, convert it for Rerun: rigid_proto replay {newest} --record FILE.rrd")
 
 
-def _verify(runs: list, args: argparse.Namespace) -> int:
+def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
     from ..session.check import BeganLaterError, verify
 
     verified = 0
@@ -128,7 +132,7 @@ def _verify(runs: list, args: argparse.Namespace) -> int:
     return 0
 
 
-def given_scene(path: str | None):
+def given_scene(path: str | None) -> Scenario | None:
     """The scene of this file, which was given for a session that lacks its own; None without one."""
     if not path:
         return None
@@ -137,7 +141,7 @@ def given_scene(path: str | None):
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
-def _branch(session, args: argparse.Namespace) -> None:
+def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
     from ..scene.scenario import nanoseconds
     from ..session.branch import branch_at, recorded_branch
 
@@ -158,7 +162,7 @@ def _branch(session, args: argparse.Namespace) -> None:
         print(f"  {note}")
 
 
-def _publish(session, args: argparse.Namespace) -> int:
+def _publish(session: RecordedSession, args: argparse.Namespace) -> int:
     try:
         from ..ros import replay_publisher
     except ImportError as error:

@@ -10,15 +10,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.bundled import scene_names
 from ..base.command_line import completes
 from ..base.errors import InputError
 from ..base.output_file import output_file
+from .options import add_json, add_scene
 from .terminal import line, table
 
 if TYPE_CHECKING:
     from ..scene.parameters import Parameters
-    from ..simulation.observer import Observers
+    from ..simulation.observer import Observer, Observers
 
 EXAMPLES = (
     ("rigid_proto simulate t_handle", "the bundled T-handle, 10 s"),
@@ -35,10 +35,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    scene = parser.add_argument(
-        "scene", metavar="SCENE.yaml", help="a ROS parameter file, or the name of a bundled scene"
-    )
-    completes(scene, scene_names)
+    add_scene(parser, "a ROS parameter file, or the name of a bundled scene")
     parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="simulated seconds (default 10)")
     setting = parser.add_argument(
@@ -47,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     completes(setting, _settings)
     parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
     parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_json(parser)
 
 
 def _settings() -> list[str]:
@@ -118,9 +115,10 @@ def _recorder(files: list[str], parameters: Parameters) -> Observers | None:
     if not files:
         return None
     from ..rerun_view.recorder import make_recorder
+    from ..scene.ghost import GhostRefusals
     from ..simulation.observer import Observers
 
-    opened: list = []
+    opened: list[Observer] = []
     try:
         for file in files:
             opened.append(make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True))
@@ -128,7 +126,8 @@ def _recorder(files: list[str], parameters: Parameters) -> Observers | None:
         for recorder in opened:
             recorder.close()
         raise
-    return Observers(*opened)
+    # Only who records has a ghost.
+    return Observers(*opened, GhostRefusals(_warn))
 
 
 def _warn(message: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.progress import Progress
+from .options import add_session
 
 EXAMPLES = (
     ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
@@ -18,10 +19,11 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = "Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a Vulkan driver; mesa-vulkan-drivers will do."
-    parser.add_argument(
-        "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
+    parser.description = (
+        "Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a Vulkan "
+        "driver; mesa-vulkan-drivers will do."
     )
+    add_session(parser, node="the body, in a bag with several")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
     parser.add_argument("-o", "--output", metavar="X.png", required=True, help="the picture to write")
     parser.add_argument(
@@ -30,8 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Flight",
     )
-    parser.add_argument("--scene", metavar="FILE", help="the scene, for a bag without one")
-    parser.add_argument("--node", metavar="NAME", default="", help="the body, in a bag with several")
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
 
 

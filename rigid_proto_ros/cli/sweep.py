@@ -7,10 +7,15 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.bundled import study_names
 from ..base.command_line import completes
 from ..base.errors import InputError
+from .options import add_json
+
+if TYPE_CHECKING:
+    from ..sweep.study import Study
 
 EXAMPLES = (
     ("rigid_proto sweep box_tensor -o out/box_tensor.parquet", "a bundled study, on all cores"),
@@ -37,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--as-scene", metavar="FILE.yaml", help="with --row: write it as a scene, and its script beside"
     )
     parser.add_argument("--plot", metavar="x=..,y=..", help="plot the table: x, y, color, to=FILE.svg")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     return _whole(study, args)
 
 
-def _whole(study, args) -> int:
+def _whole(study: Study, args: argparse.Namespace) -> int:
     from ..base.compilation import told_when_compiling
     from ..sweep.chunk import run_chunk
     from ..sweep.plot import check_plot, plot_table, read_plot
@@ -92,7 +97,7 @@ def _whole(study, args) -> int:
     return 0
 
 
-def _row_number(text, study) -> int:
+def _row_number(text: str | int, study: Study) -> int:
     try:
         row = int(text)
     except ValueError:
@@ -102,7 +107,7 @@ def _row_number(text, study) -> int:
     return row
 
 
-def _one_row(study, args) -> int:
+def _one_row(study: Study, args: argparse.Namespace) -> int:
     from ..sweep.chunk import row_summary
     from ..sweep.variation import variation, write_scene
     from .sweep_recordings import record_row
@@ -122,7 +127,7 @@ def _one_row(study, args) -> int:
     return 1 if summary["failure"] else 0
 
 
-def _ghosts(study, args) -> int:
+def _ghosts(study: Study, args: argparse.Namespace) -> int:
     from .sweep_recordings import MAX_GHOSTS, record_ghosts
 
     rows = [_row_number(text, study) for text in args.ghosts.split(",")]

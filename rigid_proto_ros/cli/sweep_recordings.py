@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from ..scene.offline import OfflineRun
 from ..scene.scenario import publication_ns
 from ..sweep.study import Study
 from ..sweep.variation import Variation, variation
+
+if TYPE_CHECKING:
+    from ..rerun_view.ensemble import Flight
 
 MAX_GHOSTS = 12
 """Side by side: more can't be told apart."""
@@ -38,14 +42,15 @@ def record_ghosts(study: Study, rows: list[int], file: str) -> None:
     record_ensemble(file, [_flight(study, row) for row in rows], study.name)
 
 
-def _flight(study: Study, number: int):
+def _flight(study: Study, number: int) -> Flight:
     from ..rerun_view.ensemble import Flight
 
     row = variation(study, number)
     scenario = row.scenario
     simulation = OfflineRun(scenario, row.commands).simulation
     rate = min(scenario.parameters.publish_rate, MAX_STATES / (study.duration_ns * 1e-9))
-    times_ns, states = [], []
+    times_ns: list[int] = []
+    states: list[np.ndarray] = []
     while (time_ns := publication_ns(len(times_ns), rate)) <= study.duration_ns:
         state = simulation.advance(time_ns)
         if simulation.failure:

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Text = str | tuple[str, str]
 
 SEVERITY_STYLES = {"error": "bold red", "warning": "yellow", "info": "cyan"}
 
 
-def _rich_console():
+def _rich_console() -> Console | None:
     """rich's console, or None: the output is piped, or rich isn't installed."""
     if not sys.stdout.isatty():
         return None
@@ -37,7 +41,9 @@ def line(*parts: Text) -> None:
 
 
 def table(rows: Iterable[Sequence[Text]], head: Sequence[str] = (), right: Iterable[int] = ()) -> None:
-    """Columns aligned to their widest cell, those numbered in ``right`` on the right; labels and head are bold in colour."""
+    """Columns aligned to their widest cell, those numbered in ``right`` on the right; labels and head are
+    bold in colour.
+    """
     filled = [tuple(row) for row in rows]
     right = set(right)
     lines = ([tuple(head)] if head else []) + filled

@@ -7,8 +7,7 @@ import argparse
 import os
 import sys
 
-from ..base.bundled import scene_names
-from ..base.command_line import completes
+from .options import add_mesh, add_scene
 
 EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
@@ -19,11 +18,8 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    scene = parser.add_argument(
-        "scene", nargs="?", default="t_handle", metavar="SCENE.yaml", help="scene file or bundled name"
-    )
-    completes(scene, scene_names)
-    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
+    add_scene(parser, "scene file or bundled name", nargs="?", default="t_handle")
+    add_mesh(parser)
     parser.add_argument("--viewer", choices=("auto", "web", "native", "none"), default="auto")
 
 

@@ -9,8 +9,8 @@ import sys
 import time
 
 from ..base.bundled import scene_names
-from ..base.command_line import completes
 from ..base.errors import InputError
+from .options import add_mesh, add_scene
 
 RESTART_S = 3.0
 """[s] A page or node that is killed sooner after its start isn't started again."""
@@ -28,9 +28,8 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    scene = parser.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="scene file or bundled name (t_handle)")
-    completes(scene, scene_names)
-    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
+    add_scene(parser, "scene file or bundled name (t_handle)", nargs="?")
+    add_mesh(parser)
     parser.add_argument("--node", metavar="NAME", help="open the page for a running node of this name")
     parser.add_argument("--link", metavar="LINK", help="open this link, made by a button of the page")
     parser.add_argument(
@@ -61,14 +60,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _stay(args: argparse.Namespace) -> int:
     from ..rerun_view.ports import LOOPBACK
-    from ..scene.parameters import PARAMETERS
+    from ..scene.parameters import Parameters
     from ..workbench.listening import choose_page_port
     from .processes import Processes, own_executable
 
     scene = args.scene or "t_handle"
     node_arguments, asked = ([], None) if args.node else _node_arguments(scene, args.mesh)
     host = args.host or LOOPBACK
-    port = choose_page_port(host, asked if args.port is None else args.port, PARAMETERS["workbench_port"].default)
+    port = choose_page_port(host, asked if args.port is None else args.port, Parameters().workbench_port)
     page_arguments = ["--port", str(port), "--host", host, "--node", args.node or "/rigid_body"]
     page_arguments += ["--lesson", scene] if not args.mesh and not args.node and scene in scene_names() else []
     page_arguments += ["--link", args.link] if args.link else []
@@ -108,13 +107,14 @@ def _ended(name: str, status: int) -> int:
 
 
 def _node_arguments(scene: str, mesh: str | None) -> tuple[list[str], int | None]:
-    """How to start the node, and the page's port where the scene asks for one; what is wrong with it is said before anything
-    starts."""
+    """How to start the node, and the page's port where the scene asks for one; what is wrong with it is said before
+    anything starts.
+    """
     from ..scene.offline import read_scene
-    from ..scene.parameters import PARAMETERS
+    from ..scene.parameters import Parameters
     from ..scene.scene_file import scene_file
     from .processes import text_parameter
 
     port = read_scene(scene, {"mesh": mesh} if mesh else {}).parameters.workbench_port
     arguments = ["--ros-args", "--params-file", str(scene_file(scene)), *(text_parameter("mesh", mesh) if mesh else [])]
-    return arguments, None if port == PARAMETERS["workbench_port"].default else port
+    return arguments, None if port == Parameters().workbench_port else port

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import struct
+from collections.abc import Iterable, Sequence
 
 _HEADER = b"\x00\x01\x00\x00"
 _STAMP_AND_LENGTH = struct.Struct("<iII")
@@ -25,7 +26,7 @@ def _aligned(body: bytes, to: int) -> bytes:
     return body + b"\0" * (-len(body) % to)
 
 
-def stamped_doubles(stamp_ns: int, frame_id: str, doubles) -> bytes:
+def stamped_doubles(stamp_ns: int, frame_id: str, doubles: Sequence[float]) -> bytes:
     """PoseStamped (7: x y z, x y z w), TwistStamped (6) or WrenchStamped (6): a header and doubles."""
     frame = frame_id.encode()
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
@@ -39,13 +40,15 @@ def _stamped_layout(length: int, count: int) -> struct.Struct:
     return struct.Struct(f"<4siII{length}s{-(12 + length) % 8}x{count}d")
 
 
-def wrench_stamped(stamp_ns: int, frame_id: str, force, torque) -> bytes:
+def wrench_stamped(stamp_ns: int, frame_id: str, force: Iterable[float], torque: Iterable[float]) -> bytes:
     """A geometry_msgs/WrenchStamped."""
     return stamped_doubles(stamp_ns, frame_id, (*force, *torque))
 
 
 def read_stamped_doubles(data: bytes, count: int) -> tuple[int, int, str, tuple[float, ...]]:
-    """Seconds, nanoseconds, frame_id and doubles of a message as ``stamped_doubles`` packs it; raises ValueError for other bytes."""
+    """Seconds, nanoseconds, frame_id and doubles of a message as ``stamped_doubles`` packs it; raises ValueError for
+    other bytes.
+    """
     if data[:2] == _HEADER[:2] and len(data) >= 16:
         seconds, nanoseconds, length = _STAMP_AND_LENGTH.unpack_from(data, 4)
         end = 16 + length
@@ -69,7 +72,8 @@ def time(time_ns: int) -> bytes:
 class StampedTemplate:
     """One message kept as a buffer: only its stamp and its doubles are written anew.
 
-    count doubles follow the header (and, for nav_msgs/Odometry, a second frame id); zeros fill the gaps between ``parts``.
+    count doubles follow the header (and, for nav_msgs/Odometry, a second frame id); zeros fill the gaps between
+    ``parts``.
     """
 
     def __init__(self, frame_id: str, count: int, child_frame_id: str | None = None) -> None:
@@ -82,7 +86,7 @@ class StampedTemplate:
         self.buffer = bytearray(_HEADER + body + bytes(8 * count))
         self._stamp = struct.Struct("<iI")
 
-    def pack(self, stamp_ns: int, doubles, at: int = 0) -> bytearray:
+    def pack(self, stamp_ns: int, doubles: Sequence[float], at: int = 0) -> bytearray:
         """Write the stamp and doubles from number ``at`` on; returns the buffer, valid until the next call."""
         self._stamp.pack_into(self.buffer, len(_HEADER), *divmod(stamp_ns, 1_000_000_000))
         struct.pack_into(f"<{len(doubles)}d", self.buffer, self._doubles_at + 8 * at, *doubles)

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: MIT
 """The messages of a session: topics, types, definitions, and their bytes both ways. Knows neither ROS nor files.
 
-A body's states go over ``pose``, ``twist`` and ``odom``; each is a row of doubles behind a stamp. ``PROJECTIONS`` says which
-numbers of a state row a topic carries, computed as the node computes them, so that a recording compares to the bit.
+A body's states go over ``pose``, ``twist`` and ``odom``; each is a row of doubles behind a stamp. ``PROJECTIONS`` says
+which numbers of a state row a topic carries, computed as the node computes them, so that a recording compares to the
+bit.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,7 +103,9 @@ def odom_row(row: list[float]) -> list[float]:
 
 
 PROJECTIONS: dict[str, Callable[[list[float]], list[float]]] = {"pose": pose_row, "twist": twist_row, "odom": odom_row}
-"""What each state topic carries of a state row (13 floats), in the order of ``simulation/observer.py``'s ``STATE_FIELDS``."""
+"""What each state topic carries of a state row (13 floats), in the order of ``simulation/observer.py``'s
+``STATE_FIELDS``.
+"""
 
 _DOUBLES = {"pose": 7, "twist": 6, "odom": cdr.ODOMETRY_DOUBLES}
 
@@ -142,6 +145,6 @@ def _undecodable(topic: str, message_type: str) -> InputError:
     return InputError(topic, f"a message can't be decoded as {message_type} in little-endian CDR")
 
 
-def inertia_bytes(time_ns: int, frame_id: str, mass: float, com, tensor6) -> bytes:
+def inertia_bytes(time_ns: int, frame_id: str, mass: float, com: Iterable[float], tensor6: Iterable[float]) -> bytes:
     """A geometry_msgs/InertiaStamped; tensor6 ixx ixy ixz iyy iyz izz."""
     return cdr.stamped_doubles(time_ns, frame_id, (mass, *com, *tensor6))

@@ -64,9 +64,7 @@ def point_text(point: tuple) -> str:
     return "/".join([word, *(",".join(repr(float(x)) for x in triple) for triple in values)])
 
 
-def parse_frame(
-    text: str, contacts: frozenset[str] | set[str] = frozenset(), world: str = "world", body: str = "body"
-) -> Frame:
+def parse_frame(text: str, contacts: Collection[str] = (), world: str = "world", body: str = "body") -> Frame:
     """Read a ``frame_id``.
 
     contacts: the names of the body's contacts. world, body: names of this node's world and body frame, accepted beside

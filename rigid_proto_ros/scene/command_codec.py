@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Commands in their four forms, and the ways between them: what a script says, what a topic carries, what the simulation takes,
-and what the event log keeps.
+"""Commands in their four forms, and the ways between them: what a script says, what a topic carries, what the
+simulation takes, and what the event log keeps.
 
     entry of a script  <->  ScriptCommand  <->  message on a topic
                                  |  ^
                    core_command  v  |  of_event
                               core command  ->  content of an event line
 
-``ScriptCommand`` is the command as plain data. An entry can stand for several commands (scene/script.py expands it); each
-command is one entry again, but for what no entry can say (``entry_of``).
+``ScriptCommand`` is the command as plain data. An entry can stand for several commands (scene/script.py expands it);
+each command is one entry again, but for what no entry can say (``entry_of``).
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 
@@ -32,9 +33,13 @@ from ..simulation.commands import (
     TieString,
     WrenchCommand,
 )
-from .parameters import Parameters
+from ..simulation.setup import Setup
+from .parameters import ZERO, Parameters, Vector
 from .scenario import yaml_double, yaml_value
 from .scene_file import scalar
+
+Changing = Callable[[Mapping], Setup]
+"""Gives the setup that a change of parameters, or of the inertia, leads to, from the content of its event."""
 
 MESH_FRAME = "body/mesh"
 """Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
@@ -69,23 +74,23 @@ _WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
 
 @dataclass(frozen=True)
 class ScriptCommand:
-    """One command as plain data. t_ns: when it acts, from the script's start. entry: which entry of the script it comes from,
-    counted from 1.
+    """One command as plain data. t_ns: when it acts, from the script's start. entry: which entry of the script it comes
+    from, counted from 1.
 
-    kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and point
-    (3,), or the name of a contact to attach to. ``inertia``: frame_id, inertia (10,): mass, com, ixx ixy ixz iyy iyz izz.
-    ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
+    kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and
+    point (3,), or the name of a contact to attach to. ``inertia``: frame_id, inertia (10,): mass, com, ixx ixy ixz iyy
+    iyz izz. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
     """
 
     t_ns: int
     kind: str
     frame_id: str = ""
-    force: tuple = (0.0, 0.0, 0.0)
-    torque: tuple = (0.0, 0.0, 0.0)
-    changes: dict | None = None
-    point: tuple = (0.0, 0.0, 0.0)
+    force: Vector = ZERO
+    torque: Vector = ZERO
+    changes: Mapping[str, object] = field(default_factory=dict)
+    point: Vector = ZERO
     contact: str = ""
-    inertia: tuple = ()
+    inertia: tuple[float, ...] = ()
     entry: int = field(default=0, compare=False)
 
     @property
@@ -108,18 +113,18 @@ class ScriptCommand:
 
 
 def of_message(topic: str, data: bytes) -> ScriptCommand:
-    """The command of a message on a topic other than ``schedule``, its stamp as ``t_ns``; raises ValueError for bytes that are no
-    such message, CommandRefused for a stamp that is none.
+    """The command of a message on a topic other than ``schedule``, its stamp as ``t_ns``; raises ValueError for bytes
+    that are no such message, CommandRefused for a stamp that is none.
     """
     kind = next(kind for kind, its_topic in TOPICS.items() if its_topic == topic)
     count = {"wrench": 6, "poke": 6, "inertia": 10}.get(kind, 3)
     seconds, nanoseconds, frame_id, numbers = cdr.read_stamped_doubles(data, count)
     t_ns = whole_stamp(seconds, nanoseconds)
     if count == 6:
-        return ScriptCommand(t_ns, kind, frame_id, numbers[:3], numbers[3:])
+        return ScriptCommand(t_ns, kind, frame_id, _vector(numbers[:3]), _vector(numbers[3:]))
     if kind == "inertia":
         return ScriptCommand(t_ns, kind, frame_id, inertia=numbers)
-    return ScriptCommand(t_ns, kind, frame_id, point=numbers)
+    return ScriptCommand(t_ns, kind, frame_id, point=_vector(numbers))
 
 
 def whole_stamp(seconds: int, nanoseconds: int) -> int:
@@ -133,15 +138,15 @@ def whole_stamp(seconds: int, nanoseconds: int) -> int:
 
 
 def of_event(time_ns: int, kind: str, content: Mapping) -> ScriptCommand:
-    """The command of an event that acted at ``time_ns``, in the words of its sender; raises InputError for content that is none of
-    its kind. What a mark says moves nothing: it has no command.
+    """The command of an event that acted at ``time_ns``, in the words of its sender; raises InputError for content that
+    is none of its kind. What a mark says moves nothing: it has no command.
     """
     try:
         if kind in ("wrench", "poke"):
-            force, torque = _numbers(content["force"], 3), _numbers(content["torque"], 3)
+            force, torque = _vector(content["force"]), _vector(content["torque"])
             return ScriptCommand(time_ns, kind, _text(content["frame_id"]), force, torque)
         if kind in ("string_target", "string_attach"):
-            return ScriptCommand(time_ns, kind, _text(content["frame_id"]), point=_numbers(content["point"], 3))
+            return ScriptCommand(time_ns, kind, _text(content["frame_id"]), point=_vector(content["point"]))
         if kind == "inertia":
             numbers = _numbers((content["mass"], *_numbers(content["com"], 3), *_numbers(content["tensor"], 6)), 10)
             return ScriptCommand(time_ns, kind, _text(content["frame_id"]), inertia=numbers)
@@ -154,14 +159,19 @@ def of_event(time_ns: int, kind: str, content: Mapping) -> ScriptCommand:
     raise InputError("kind", kind, ", ".join(KINDS))
 
 
-def _numbers(values, count: int) -> tuple[float, ...]:
+def _numbers(values: Iterable, count: int) -> tuple[float, ...]:
     numbers = tuple(float(value) for value in values)
     if len(numbers) != count:
         raise ValueError
     return numbers
 
 
-def _text(value) -> str:
+def _vector(values: Iterable) -> Vector:
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
+def _text(value: object) -> str:
     if not isinstance(value, str):
         raise TypeError
     return value
@@ -178,16 +188,17 @@ def frame_names(parameters: Parameters, node_name: str) -> tuple[str, str]:
 def core_command(
     command: ScriptCommand,
     stamp_ns: int,
-    contacts,
-    change: Callable[[dict], object],
+    contacts: Collection[str],
+    change: Changing | None,
     frames: tuple[str, str] = _WORDS,
-    inertia: Callable[[dict], object] | None = None,
+    inertia: Changing | None = None,
     message: bytes | None = None,
 ) -> Command:
     """The simulation's command; raises CommandRefused.
 
-    change(changes) gives the Setup with parameters changed when a ``set`` acts, inertia(content) that of an inertia message.
-    frames: ``frame_names``. message: the bytes that it came in, where these aren't its own.
+    change(changes) gives the Setup with parameters changed when a ``set`` acts, inertia(content) that of an inertia
+    message; None where such a command can't come. frames: ``frame_names``. message: the bytes that it came in, where
+    these aren't its own.
     """
     kind, frame_id = command.kind, command.frame_id
     if kind == "string_target":
@@ -209,29 +220,36 @@ def core_command(
             "tensor": com_and_tensor[3:],
         }
         data = command.message(stamp_ns) if message is None else message
-        return Change(content, lambda: inertia(content), data, kind, Rank.INERTIA)
+        return Change(content, _applying(inertia, content), data, kind, Rank.INERTIA)
     if kind == "set":
-        return Change(command.changes, lambda: change(command.changes), message or b"")
+        changes = dict(command.changes)
+        return Change(changes, _applying(change, changes), message or b"")
     return ClearWrench(message or b"") if kind == "clear_wrench" else ReleaseString(message or b"")
 
 
+def _applying(change: Changing | None, content: dict) -> Callable[[], Setup]:
+    if change is None:
+        raise ValueError("a change of parameters where none can come")
+    return functools.partial(change, content)
+
+
 def string_target(
-    stamp_ns: int, frame_id: str, point, world: str = "world", message: bytes | None = None
+    stamp_ns: int, frame_id: str, point: Vector, world: str = "world", message: bytes | None = None
 ) -> MoveString:
     """The simulation's command for a message of the string's target topic; raises CommandRefused."""
     if frame_id not in ("", "world", world):
         raise CommandRefused("frame", "frame_id", frame_id[:80], f"{world}: the target is a point of the world")
     data = cdr.stamped_doubles(stamp_ns, frame_id, point) if message is None else message
-    return MoveString(tuple(point), stamp_ns, frame_id, data)
+    return MoveString(point, stamp_ns, frame_id, data)
 
 
 def string_attach(
-    stamp_ns: int, frame_id: str, point, world: str = "world", body: str = "body", message: bytes | None = None
+    stamp_ns: int, frame_id: str, point: Vector, world: str = "world", body: str = "body", message: bytes | None = None
 ) -> TieString:
     """The simulation's command for a message of the string's attach topic; raises CommandRefused."""
     axes = _knot_axes(frame_id, (world, body))
     data = cdr.stamped_doubles(stamp_ns, frame_id, point) if message is None else message
-    return TieString(axes, tuple(point), stamp_ns, frame_id, data)
+    return TieString(axes, point, stamp_ns, frame_id, data)
 
 
 def _knot_axes(frame_id: str, frames: tuple[str, str]) -> str:
@@ -255,15 +273,15 @@ def _mass_axes(frame_id: str, frames: tuple[str, str]) -> str:
 def command_of_event(
     kind: str,
     content: Mapping,
-    contacts,
+    contacts: Collection[str],
     frames: tuple[str, str],
-    change: Callable[[dict], object] | None = None,
-    inertia: Callable[[dict], object] | None = None,
+    change: Changing | None = None,
+    inertia: Changing | None = None,
 ) -> Command | None:
     """The simulation's command that an event of the log tells of, as the node with these ``frame_names`` read it.
 
-    None for what moves nothing (MARKS), and for changes where ``change`` is None: whoever asks then hears of those otherwise.
-    Raises InputError for content that is none of its kind, CommandRefused for what such a node would refuse.
+    None for what moves nothing (MARKS), and for changes where ``change`` is None: whoever asks then hears of those
+    otherwise. Raises InputError for content that is none of its kind, CommandRefused for what such a node would refuse.
     """
     if kind in MARKS or (change is None and kind in ("set", "inertia")):
         return None
@@ -274,8 +292,10 @@ def command_of_event(
     return core_command(command, stamp_ns, contacts, change, frames, inertia, message=b"")
 
 
-def in_words(command: ScriptCommand, contacts, frames: tuple[str, str]) -> ScriptCommand:
-    """The command with ``world`` and ``body`` for the names of this node's frames, so that a node of any name reads it."""
+def in_words(command: ScriptCommand, contacts: Collection[str], frames: tuple[str, str]) -> ScriptCommand:
+    """The command with ``world`` and ``body`` for the names of this node's frames, so that a node of any
+    name reads it.
+    """
     if command.kind in ("wrench", "poke"):
         return replace(command, frame_id=parse_frame(command.frame_id, contacts, *frames).text)
     if command.kind == "string_target":
@@ -294,8 +314,8 @@ def in_words(command: ScriptCommand, contacts, frames: tuple[str, str]) -> Scrip
 def entry_of(command: ScriptCommand, frames: tuple[str, str] = _WORDS) -> dict:
     """The command as an entry of a script, without its time.
 
-    Raises InputError for what no entry can say: an impulse along a normal, an inertia message, a knot in other than mesh
-    coordinates.
+    Raises InputError for what no entry can say: an impulse along a normal, an inertia message, a knot in other than
+    mesh coordinates.
     """
     kind = command.kind
     if kind == "set":
@@ -318,7 +338,8 @@ def entry_of(command: ScriptCommand, frames: tuple[str, str] = _WORDS) -> dict:
 def _load_entry(command: ScriptCommand, frames: tuple[str, str]) -> dict:
     # What can be the name of a contact is one: the node that has it judges it.
     place = command.frame_id.partition(";")[0].rpartition("@")[2]
-    contacts = {place} - {*RESERVED_WORDS, *frames} if CONTACT_NAME.match(place) else frozenset()
+    known = {*RESERVED_WORDS, *frames}
+    contacts = [place] if CONTACT_NAME.match(place) and place not in known else []
     frame = parse_frame(command.frame_id, contacts, *frames)
     entry: dict = {"at": _at(frame.point)}
     force, torque = [float(f) for f in command.force], [float(x) for x in command.torque]
@@ -356,7 +377,9 @@ def _timed(time_ns: int, entry: dict) -> dict:
 
 
 def flow(value: object, quoted: bool = False) -> str:
-    """Plain data as YAML on one line; doubles keep all their digits. quoted: as JSON, which is YAML too and is read faster."""
+    """Plain data as YAML on one line; doubles keep all their digits. quoted: as JSON, which is YAML too
+    and is read faster.
+    """
     if isinstance(value, Mapping):
         pairs = ((json.dumps(key) if quoted else key, flow(item, quoted)) for key, item in value.items())
         return "{" + ", ".join(f"{key}: {item}" for key, item in pairs) + "}"

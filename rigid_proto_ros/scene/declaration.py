@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is declared of a parameter, and the fields of a dataclass that declare one: ``mass: float = number(0.0, "Mass.", "kg")``."""
+"""What is declared of a parameter, and the fields of a dataclass that declare one: ``mass: float =
+number(0.0, "Mass.", "kg")``.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,9 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
 @dataclass(frozen=True)
 class Parameter:
-    """type: ``double``, ``doubles``, ``integer``, ``bool`` or ``string``. lower and upper are inclusive unless ``above``:
-    then values must lie above lower. lengths: accepted lengths of ``doubles``. changes: LIVE, AT_RESET or READ_ONLY.
-    default: None where the name is the user's choice.
+    """type: ``double``, ``doubles``, ``integer``, ``bool`` or ``string``. lower and upper are inclusive unless
+    ``above``: then values must lie above lower. lengths: accepted lengths of ``doubles``. changes: LIVE, AT_RESET or
+    READ_ONLY. default: None where the name is the user's choice.
     """
 
     name: str
@@ -200,7 +202,9 @@ def _field(default: object, declaration: Parameter) -> Any:
 
 
 def declared(group: Any, prefix: str = "") -> dict[str, Parameter]:
-    """The parameters that a dataclass instance declares, by dotted name: those of an inner dataclass below its field's name."""
+    """The parameters that a dataclass instance declares, by dotted name: those of an inner dataclass
+    below its field's name.
+    """
     found: dict[str, Parameter] = {}
     for field in dataclasses.fields(group):
         name = f"{prefix}{field.name}"

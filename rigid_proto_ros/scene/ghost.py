@@ -2,7 +2,7 @@
 """The ghost: a second body that gets the same commands under another tensor or integrator, to be seen beside the first.
 
 True against box, exact against rk4: where the two part is the lesson. It never acts back, and a run without a viewer
-doesn't support it.
+has none.
 """
 
 from __future__ import annotations
@@ -12,8 +12,12 @@ from collections.abc import Callable
 from ..base.errors import InputError
 from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import Observer
+from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .scenario import Scenario
+
+GHOST = "ghost"
+"""The reason of a refusal that is the ghost's alone."""
 
 
 class Refusals(Observer):
@@ -22,18 +26,30 @@ class Refusals(Observer):
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
         self._on_refusal = on_refusal
 
-    def refused(self, time_ns: int, reason: str, message: str) -> None:
+    def refused(self, _time_ns: int, _reason: str, message: str) -> None:
         """A command was refused."""
         self._on_refusal(message)
 
 
+class GhostRefusals(Observer):
+    """Says what a ghost goes without, to whoever flies it."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+
+    def refused(self, time_ns: int, reason: str, message: str) -> None:
+        """A command was refused, by the ghost alone where the reason says so."""
+        if reason == GHOST:
+            self._say(f"at {time_ns / 1e9:.9g} s {message}")
+
+
 class Ghost:
-    """The simulation of ``scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told of what the
-    ghost doesn't support, once until the next reset.
+    """The simulation of ``Scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told
+    of what the ghost doesn't support, once until the next reset.
     """
 
-    def __init__(self, scenario: Scenario, observer: Observer) -> None:
-        self.simulation = Simulation(scenario.ghost, Refusals(self._goes_without))
+    def __init__(self, setup: Setup, observer: Observer) -> None:
+        self.simulation = Simulation(setup, Refusals(self._goes_without))
         self._observer = observer
         self._shown = True
         self._refused = False
@@ -48,7 +64,9 @@ class Ghost:
         self.announce()
 
     def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
-        """Take a command of the followed simulation; what the ghost doesn't support passes it by, and the observer is told."""
+        """Take a command of the followed simulation; what the ghost doesn't support it goes without, and the observer
+        is told.
+        """
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
         # A change before it in its list may allow what the present setup doesn't: then it is judged when it acts.
@@ -61,11 +79,11 @@ class Ghost:
     def _goes_without(self, reason: str) -> None:
         if self._shown and not self._refused:
             self._refused = True
-            self._observer.refused(self.simulation.time_ns, "ghost", f"the ghost goes on without a command: {reason}")
+            self._observer.refused(self.simulation.time_ns, GHOST, f"the ghost goes on without a command: {reason}")
 
     def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
-        """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one out of
-        sight.
+        """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one
+        out of sight.
         """
         setup = scenario.ghost
         self._shown = setup is not None
@@ -80,7 +98,7 @@ class Ghost:
         self.announce()
 
     def advance(self, until_ns: int) -> None:
-        """Carry the ghost along and tell the observer where it is."""
+        """Advance the ghost and tell the observer where it is."""
         state = self.simulation.advance(until_ns)
         if self._shown and not self.simulation.failure:
             self._observer.ghost_state(until_ns, state.row)
@@ -90,7 +108,7 @@ def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | No
     """The ghost that a scenario asks for, following the simulation; None when nobody would see it."""
     if scenario.ghost is None or observer is None:
         return None
-    ghost = Ghost(scenario, observer)
+    ghost = Ghost(scenario.ghost, observer)
     simulation.follower = ghost
     ghost.announce()
     return ghost

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Lessons: the bundled scenes, each with a title, three sentences of what to try and what to see, and why.
 
-All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the three sentences,
-the reason, and how to fly it. Pages and documents take it from there.
+All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the three
+sentences, the reason, and how to fly it. Pages and documents take it from there.
 """
 
 from __future__ import annotations

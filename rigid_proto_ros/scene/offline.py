@@ -10,6 +10,7 @@ from pathlib import Path
 from ..base.errors import CommandRefused, InputError
 from ..base.progress import Progress
 from ..simulation.observer import Observer
+from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation, judge
 from .command_codec import ScriptCommand, core_command
 from .ghost import ghost_of
@@ -24,8 +25,8 @@ def read_scene(
 ) -> Scenario:
     """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
 
-    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the settings
-    sets the scene's mass, which would win, to 0, as it does in flight.
+    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the
+    settings sets the scene's mass, which would win, to 0, as it does in flight.
     """
     return make_scenario({**scene_values(scene_file(name), warn), **with_mass_of_density(settings or {})})
 
@@ -68,9 +69,11 @@ def tell_start(observer: Observer, scenario: Scenario) -> None:
 
 
 class OfflineRun:
-    """A simulation with its script submitted; ``advance`` carries it from publication to publication."""
+    """A simulation with its script submitted; ``advance`` takes it from publication to publication."""
 
-    def __init__(self, scenario: Scenario, script: list[ScriptCommand] | None = None, observer: Observer | None = None):
+    def __init__(
+        self, scenario: Scenario, script: list[ScriptCommand] | None = None, observer: Observer | None = None
+    ) -> None:
         self.scenario = scenario
         self.observer = observer
         self.simulation = Simulation(scenario.setup, observer)
@@ -94,7 +97,7 @@ class OfflineRun:
                     f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
                 ) from None
 
-    def _apply_changes(self, changes: dict):
+    def _apply_changes(self, changes: Mapping) -> Setup:
         self.scenario = self.scenario.with_changes(changes)
         if self.observer is not None:
             self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
@@ -103,7 +106,7 @@ class OfflineRun:
         return self.scenario.setup
 
     def advance(self, until_ns: int) -> bool:
-        """Carry the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
+        """Advance the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
         if self.observer is not None:
             rate = self.scenario.parameters.publish_rate
             while (next_ns := publication_ns(self._next_publication, rate)) <= until_ns:

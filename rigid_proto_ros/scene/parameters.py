@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Every parameter, declared once: its type, ROS descriptors, the command line's help and the table in the docs come from here."""
+"""Every parameter, declared once: its type, ROS descriptors, the command line's help and the table in the
+docs come from here.
+"""
 
 from __future__ import annotations
 
@@ -101,8 +103,8 @@ class GhostParameters:
 
     inertia_model: str = text(
         "",
-        "Show a ghost beside the body, from time 0 or the next reset on, that gets the same commands under this inertia "
-        "model.",
+        "Show a ghost beside the body, from time 0 or the next reset on, that gets the same commands under this "
+        "inertia model.",
         choices=("", *INERTIA_MODELS),
     )
     integrator: str = text(
@@ -114,10 +116,11 @@ class GhostParameters:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """A value for every parameter. ``string.stiffness`` of files, ROS and command line is ``parameters.string.stiffness`` here.
+    """A value for every parameter. ``string.stiffness`` of files, ROS and command line is
+    ``parameters.string.stiffness`` here.
 
-    ``replaced`` makes one from values by name, with all checks; ``named`` gives those back. contacts: named points of the
-    body. ballast: point masses by name; both in mesh coordinates.
+    ``replaced`` makes one from values by name, with all checks; ``named`` gives those back. contacts: named points of
+    the body. ballast: point masses by name; both in mesh coordinates.
     """
 
     mesh: str = text(

@@ -32,8 +32,8 @@ from .parameters import Parameters, convert_all, parameter_named
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """A mesh with what is computed from it once: its moments, and its surface wound outward. made_of: what of the parameters it
-    was loaded for (``_made_of``).
+    """A mesh with what is computed from it once: its moments, and its surface wound outward. made_of: what of the
+    parameters it was loaded for (``_made_of``).
     """
 
     mesh: Mesh
@@ -60,8 +60,8 @@ class Scenario:
     ) -> Scenario:
         """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is.
 
-        mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a loaded one, used where it is
-        the one that the parameters ask for.
+        mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a loaded one, used
+        where it is the one that the parameters ask for.
         """
         for name, value in convert_all(changes).items():
             if parameter_named(name).changes == READ_ONLY:
@@ -79,8 +79,8 @@ class Scenario:
     def with_inertia(self, mass: float, com: Sequence[float], tensor6: Sequence[float], relative: bool) -> Scenario:
         """The scenario with an explicit inertia, as a message gives it; raises InputError.
 
-        com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. tensor6: ixx ixy ixz iyy iyz
-        izz about it. It stands for the whole body, so every ballast mass becomes 0.
+        com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. tensor6: ixx ixy ixz iyy
+        iyz izz about it. It stands for the whole body, so every ballast mass becomes 0.
         """
         scale = self.setup.body.scale
         center = np.asarray(com, dtype=float) + (self.setup.body.center_of_mass if relative else 0.0)
@@ -166,9 +166,10 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
     scale = scale_vector(list(parameters.scale))
     properties = _mass_properties(parameters, body_mesh, scale)
     check_tensor(properties.inertia)
-    # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by message.
+    # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by
+    # message.
     center_of_mass = [_divided(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]
-    body = make_body(properties.mass, center_of_mass, properties.inertia, scale)
+    body = make_body(properties.mass, center_of_mass, properties.inertia, scale.tolist())
     initial, string = parameters.initial, parameters.string
     quaternion = unit_quaternion(initial.orientation_xyzw, "initial.orientation_xyzw")
     R = matrix_from_quaternion(quaternion)
@@ -203,7 +204,7 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
             timeout_ns=nanoseconds(string.timeout),
         ),
         accuracy=parameters.accuracy,
-        initial=state_row(initial.position, quaternion, initial.linear_velocity, omega_body),
+        initial=state_row(initial.position, quaternion.tolist(), initial.linear_velocity, omega_body),
         initial_string_mass=initial.string_mass,
     )
     return setup, tuple(properties.warnings)

@@ -61,7 +61,7 @@ class SceneFile:
         return f"{path}: no section is for /{node_name.lstrip('/')} (it has {names}); /** is for every node"
 
 
-def scalar(text: str):
+def scalar(text: str) -> bool | int | float | str:
     """A plain YAML scalar as rcl types it."""
     if text in _TRUE:
         return True
@@ -147,7 +147,7 @@ def _section_form(name: str) -> re.Pattern[str]:
     return re.compile("".join(parts.get(part, f"/{re.escape(part)}") for part in name.split("/")[1:]) + r"\Z")
 
 
-def typed_value(text: str, name: str):
+def typed_value(text: str, name: str) -> object:
     """A value as rcl types it on a command line; raises InputError for what rcl refuses."""
     node = compose_yaml(text, name)
     if isinstance(node, yaml.SequenceNode):
@@ -157,7 +157,7 @@ def typed_value(text: str, name: str):
     return _typed(node)
 
 
-def _collect(path, node, prefix, values) -> None:
+def _collect(path: str, node: yaml.Node, prefix: str, values: dict[str, object]) -> None:
     if not isinstance(node, yaml.MappingNode):
         raise _refused(path, node, "name: value lines under ros__parameters")
     for key, value in node.value:
@@ -172,18 +172,18 @@ def _collect(path, node, prefix, values) -> None:
             values[name] = _typed(value)
 
 
-def _name(path, key: yaml.Node) -> str:
+def _name(path: str, key: yaml.Node) -> str:
     if not isinstance(key, yaml.ScalarNode):
         raise _refused(path, key, "a name")
     return key.value
 
 
-def _typed(node: yaml.ScalarNode):
+def _typed(node: yaml.ScalarNode) -> bool | int | float | str:
     return scalar(node.value) if node.style is None else node.value
 
 
-def _sequence(path, node) -> list:
-    items = []
+def _sequence(path: str, node: yaml.SequenceNode) -> list:
+    items: list[object] = []
     for item in node.value:
         if isinstance(item, yaml.MappingNode):
             raise _refused(path, item, "a list of plain values")
@@ -194,7 +194,7 @@ def _sequence(path, node) -> list:
     return items
 
 
-def _refused(path, node, accepted) -> InputError:
+def _refused(path: str, node: yaml.Node, accepted: str) -> InputError:
     received = node.value if isinstance(node, yaml.ScalarNode) else node.tag.rsplit(":", 1)[-1]
     if isinstance(node, yaml.SequenceNode):
         received = "[" + ", ".join(str(item.value) for item in node.value) + "]"

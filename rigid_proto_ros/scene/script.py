@@ -11,10 +11,12 @@ import random
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, NoReturn
 
 from ..base.errors import InputError, did_you_mean
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
 from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
+from .parameters import ZERO, Vector
 from .scenario import nanoseconds
 from .yaml_text import load_plain_yaml, read_text
 
@@ -27,12 +29,23 @@ MAX_SCHEDULE_LENGTH = 1_000_000
 
 MAX_YAML_LENGTH = 10_000
 MAX_BRACKETS = 100
-"""Of a message that isn't JSON as well: the YAML reader takes seconds over thousands of brackets, and the body would wait."""
+"""Of a message that isn't JSON as well: the YAML reader takes seconds over thousands of brackets, and the
+body would wait.
+"""
 
 _FORCES = ("force", "push", "impulse")
 _POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
 _TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}
 _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
+_STRING_KEYS = {"attach", "target"}
+ENTRY_KEYS: Mapping[str, set[str]] = {
+    "timing": _TIMING_KEYS,
+    "poke": _POKE_KEYS,
+    "wrench": _WRENCH_KEYS,
+    "string": _STRING_KEYS | {"release"},
+    "other": {"wrench", "string", "set", "service", "script"},
+}
+"""The keys that a script may hold, by the kind of entry."""
 
 
 def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCommand]:
@@ -48,9 +61,9 @@ def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -
     return expand_script(load_plain_yaml(text, name), name, wrench_timeout)
 
 
-def read_schedule(text: str):
-    """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and is read
-    faster. Raises InputError.
+def read_schedule(text: str) -> dict | list:
+    """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and
+    is read faster. Raises InputError.
     """
     if len(text) > MAX_SCHEDULE_LENGTH:
         raise InputError("schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
@@ -69,11 +82,11 @@ def read_schedule(text: str):
     return entries
 
 
-def _no_number(text: str):
+def _no_number(text: str) -> NoReturn:
     raise ValueError(text)
 
 
-def expand_schedule(entries, wrench_timeout: float) -> list[ScriptCommand]:
+def expand_schedule(entries: dict | list, wrench_timeout: float) -> list[ScriptCommand]:
     """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
     listed = entries if isinstance(entries, list) else [entries]
     if any(isinstance(entry, dict) and "script" in entry for entry in listed):
@@ -84,7 +97,7 @@ def expand_schedule(entries, wrench_timeout: float) -> list[ScriptCommand]:
 
 
 def expand_script(
-    entries, name: str = "script", wrench_timeout: float = 1.5, max_commands: int = MAX_ENTRIES
+    entries: Any, name: str = "script", wrench_timeout: float = 1.5, max_commands: int = MAX_ENTRIES
 ) -> list[ScriptCommand]:
     """As ``parse_script``, from what its YAML says: a list of entries, or a mapping that holds one as ``script``."""
     whole: dict = {}
@@ -110,8 +123,10 @@ def expand_script(
     return sorted(commands, key=lambda command: command.t_ns)
 
 
-def _times_ns(entry, where: str, seed: str, max_commands: int) -> list[int]:
-    """When an entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up to ±``jitter``."""
+def _times_ns(entry: Any, where: str, seed: str, max_commands: int) -> list[int]:
+    """When an entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up to
+    ±``jitter``.
+    """
     if not isinstance(entry, dict):
         raise InputError(where, entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
     if "t" not in entry:
@@ -181,7 +196,7 @@ def _poke(entry: dict, t_ns: int, where: str) -> ScriptCommand:
     return ScriptCommand(t_ns, "poke", _checked_frame(frame + option, where), force, torque)
 
 
-def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float, max_commands: int) -> list[ScriptCommand]:
+def _expand_wrench(entry: Any, t_ns: int, where: str, wrench_timeout: float, max_commands: int) -> list[ScriptCommand]:
     if not isinstance(entry, dict):
         raise InputError(where, entry, "{at, force or push, torque, axes, duration}")
     _check_keys(entry, _WRENCH_KEYS, where)
@@ -201,11 +216,11 @@ def _expand_wrench(entry, t_ns: int, where: str, wrench_timeout: float, max_comm
     return [*repeats, ScriptCommand(t_ns + duration_ns, "wrench", "world@com")]
 
 
-def _expand_string(entry, t_ns: int, where: str) -> list[ScriptCommand]:
+def _expand_string(entry: Any, t_ns: int, where: str) -> list[ScriptCommand]:
     if entry == "release":
         return [ScriptCommand(t_ns, "string_release")]
     accepted = "release, or {attach: contact or [x, y, z] in mesh coordinates, target: [x, y, z] in the world}"
-    if not isinstance(entry, dict) or not entry or not set(entry) <= {"attach", "target"}:
+    if not isinstance(entry, dict) or not entry or not set(entry) <= _STRING_KEYS:
         raise InputError(where, entry, accepted)
     commands = []
     if "attach" in entry:
@@ -223,7 +238,7 @@ def _expand_string(entry, t_ns: int, where: str) -> list[ScriptCommand]:
     return commands
 
 
-def with_contacts(script: list[ScriptCommand], contacts: Mapping[str, tuple]) -> list[ScriptCommand]:
+def with_contacts(script: list[ScriptCommand], contacts: Mapping[str, Vector]) -> list[ScriptCommand]:
     """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
     settled = []
     for command in script:
@@ -231,12 +246,12 @@ def with_contacts(script: list[ScriptCommand], contacts: Mapping[str, tuple]) ->
             if command.contact not in contacts:
                 known = ", ".join(sorted(contacts)) or "none"
                 raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
-            command = replace(command, point=tuple(float(x) for x in contacts[command.contact]), contact="")
+            command = replace(command, point=contacts[command.contact], contact="")
         settled.append(command)
     return settled
 
 
-def _wrench_fields(entry: dict, where: str) -> tuple[str, tuple, tuple]:
+def _wrench_fields(entry: dict, where: str) -> tuple[str, Vector, Vector]:
     given = [key for key in _FORCES if key in entry]
     if len(given) > 1:
         raise InputError(where, given, "one of force, push, impulse")
@@ -245,10 +260,9 @@ def _wrench_fields(entry: dict, where: str) -> tuple[str, tuple, tuple]:
     axes = entry.get("axes", "world")
     if axes not in ("world", "body"):
         raise InputError(f"{where}, axes", axes, "world, body")
-    zero = (0.0, 0.0, 0.0)
     torque_key = "angular_impulse" if "angular_impulse" in entry else "torque"
-    torque = _vector(entry[torque_key], f"{where}, {torque_key}") if torque_key in entry else zero
-    force = zero
+    torque = _vector(entry[torque_key], f"{where}, {torque_key}") if torque_key in entry else ZERO
+    force: Vector = ZERO
     if "push" in entry:
         if "axes" in entry or torque_key in entry:
             raise InputError(where, sorted(entry), "push without axes and torque: it acts along the inward normal")
@@ -258,7 +272,7 @@ def _wrench_fields(entry: dict, where: str) -> tuple[str, tuple, tuple]:
     return f"{axes}@{_at(entry.get('at', 'com'), where)}", force, torque
 
 
-def _at(at, where: str) -> str:
+def _at(at: object, where: str) -> str:
     field = f"{where}, at"
     accepted = "com, origin, a contact's name, {vertex: i}, {point: [x, y, z]} or {ray: {origin, direction}}"
     if isinstance(at, str) and (at in FIXED_POINTS or CONTACT_NAME.match(at)):
@@ -293,7 +307,7 @@ def _check_keys(entry: dict, known: set, where: str) -> None:
         raise InputError(where, f"there is no key {', '.join(unknown)}; {' '.join(filter(None, [hint, keys]))}")
 
 
-def _number(value, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
+def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
     if isinstance(value, str):
         # YAML reads 1e-3 without a point as text.
         try:
@@ -305,7 +319,8 @@ def _number(value, field: str, lower: float = -1e100, upper: float = 1e100) -> f
     return float(value)
 
 
-def _vector(value, field: str) -> tuple[float, float, float]:
+def _vector(value: Any, field: str) -> Vector:
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         raise InputError(field, value, "three numbers [x, y, z]")
-    return tuple(_number(v, field) for v in value)
+    x, y, z = (_number(v, field) for v in value)
+    return x, y, z

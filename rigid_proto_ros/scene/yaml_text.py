@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""YAML as people write it: read from files of bounded size, without aliases, of which a few grow to gigabytes or never end."""
+"""YAML as people write it: read from files of bounded size, without aliases, of which a few grow to
+gigabytes or never end.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,18 @@ MAX_BYTES = 16 << 20
 """Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
 
 
+def _marked(problem: str, event: yaml.NodeEvent) -> yaml.MarkedYAMLError:
+    mark: Any = event.start_mark
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
+
+
 class _Loader(yaml.SafeLoader):
     """Without aliases, which rcl doesn't read either."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         event = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
-            raise yaml.MarkedYAMLError(problem=f"the alias *{event.anchor}", problem_mark=event.start_mark)
+            raise _marked(f"the alias *{event.anchor}", event)
         self.check_node_event(event)
         return super().compose_node(parent, index)
 
@@ -34,10 +41,10 @@ class _PlainLoader(_Loader):
 
     def check_node_event(self, event: yaml.NodeEvent) -> None:
         if event.anchor is not None:
-            raise yaml.MarkedYAMLError(problem=f"the anchor &{event.anchor}", problem_mark=event.start_mark)
+            raise _marked(f"the anchor &{event.anchor}", event)
         tag = getattr(event, "tag", None)
         if tag is not None:
-            raise yaml.MarkedYAMLError(problem=f"the tag {tag}", problem_mark=event.start_mark)
+            raise _marked(f"the tag {tag}", event)
 
 
 def read_text(path: Path, kind: str) -> str:
@@ -58,7 +65,9 @@ def compose_yaml(text: str, name: str) -> yaml.Node | None:
 
 
 def load_plain_yaml(text: str, name: str) -> Any:
-    """What a text says as values, lists and mappings; raises InputError with ``name`` and the line for anything else."""
+    """What a text says as values, lists and mappings; raises InputError with ``name`` and the line for
+    anything else.
+    """
     try:
         return yaml.load(text, Loader=_PlainLoader)  # noqa: S506 (it is a SafeLoader)
     except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..scene.yaml_text import load_plain_yaml, read_text
-from .mcap_file import (
+from .mcap_reading import (
     ZSTD_MAGIC,
     McapContent,
     decompressed,

@@ -42,12 +42,12 @@ class ActingLoads(Observer):
         frame_id = load.frame_id + command.frame.options
         self._latest = _Acting(time_ns, frame_id, command.kind, [float(f) for f in force], list(load.torque))
 
-    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
+    def load_began(self, _time_ns: int, load_id: int, load: ShownLoad) -> None:
         """The command applied last begins to act; an impulse has acted."""
         if self._latest is not None and load.kind != "impulse":
             self.acting[load_id] = self._latest
 
-    def load_ended(self, time_ns: int, load_id: int) -> None:
+    def load_ended(self, _time_ns: int, load_id: int) -> None:
         """It acts no longer."""
         self.acting.pop(load_id, None)
 

@@ -37,11 +37,11 @@ class _Lines(Observer):
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def event(self, time_ns: int, line: str) -> None:
+    def event(self, _time_ns: int, line: str) -> None:
         self.lines.append(line)
 
 
-def verify(session: RecordedSession, progress: Callable[[float], None] = lambda done: None) -> Difference | None:
+def verify(session: RecordedSession, progress: Callable[[float], None] = lambda _: None) -> Difference | None:
     """Compare the chain of events, then every event and every state with a new computation, bit for bit.
 
     Returns the first difference, or None. Raises InputError for a session that can't be decoded, or lacks what a check

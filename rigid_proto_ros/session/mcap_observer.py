@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,7 +29,10 @@ from ..scene.scene_file import read_scene_text
 from ..simulation.commands import WrenchCommand
 from ..simulation.mailbox import Block, Mailbox, Mark
 from ..simulation.observer import BodySnapshot, Observer
-from .mesh import file_sha256, scene_sha256
+from .recorded_session import file_sha256, scene_sha256
+
+if TYPE_CHECKING:
+    from .mcap_writing import McapFile
 
 FLUSH_PERIOD_S = 0.4
 """What a kill -9 loses at most."""
@@ -45,9 +49,9 @@ _logger = logging.getLogger(__name__)
 class McapObserver(Observer):
     """Records to ``path``; topics are named after the node, frames as its messages name them.
 
-    Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run behind
-    the one before. on_error gets one line when recording has stopped because the file can't be written, from another thread; ``error``
-    keeps it. Raises InputError where the file can't be opened.
+    Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run
+    behind the one before. on_error gets one line when recording has stopped because the file can't be written, from
+    another thread; ``error`` keeps it. Raises InputError where the file can't be opened.
     """
 
     def __init__(
@@ -58,7 +62,7 @@ class McapObserver(Observer):
         on_error: Callable[[str], None] | None = None,
         simulated_log: bool = False,
     ) -> None:
-        from .mcap_file import McapFile
+        from .mcap_writing import McapFile  # mcap is needed by who records
 
         self.error = ""
         self._path = path
@@ -101,7 +105,9 @@ class McapObserver(Observer):
 
     # The Observer's interface: called from the stepping thread
 
-    def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
+    def started(
+        self, scene: str, _vertices: np.ndarray | None, _triangles: np.ndarray | None, _mesh_sha256: str
+    ) -> None:
         """Write the scene, and the mesh's file once."""
         self._mailbox.mark(0, "scene", scene)
         self._mailbox.hurry()
@@ -177,42 +183,43 @@ class McapObserver(Observer):
             if block is None:
                 break
             more = block.handed_over
-            if self._file is not None:
-                self._write(block)
-                self._file.flush()
+            file = self._file
+            if file is not None:
+                self._write(file, block)
+                file.flush()
             self._mailbox.give_back(block)
         if self._file is not None:
             self._file.flush()
 
-    def _write(self, block: Block) -> None:
+    def _write(self, file: McapFile, block: Block) -> None:
         sent = 0
         for mark in block.marks:
-            self._write_rows(block, sent, mark.after_rows)
+            self._write_rows(file, block, sent, mark.after_rows)
             sent = mark.after_rows
-            self._write_mark(mark)
-        self._write_rows(block, sent, block.count)
+            self._write_mark(file, mark)
+        self._write_rows(file, block, sent, block.count)
 
     def _log_time(self, simulated_ns: int, wall_ns: int) -> int:
         log_time = self._run_begins_ns + simulated_ns if self._simulated_log else wall_ns
         self._latest_log_ns = max(self._latest_log_ns, log_time)
         return log_time
 
-    def _write_mark(self, mark: Mark) -> None:
+    def _write_mark(self, file: McapFile, mark: Mark) -> None:
         if mark.kind == "reset":
             self._run_begins_ns = self._latest_log_ns + 1
             return
         log_time = self._log_time(mark.time_ns, mark.wall_ns)
         if mark.kind == "message":
             name, data = mark.content
-            self._file.add_message(self._channels[name], log_time, data)
+            file.add_message(self._channels[name], log_time, data)
             return
         (scene,) = mark.content
         if scene != self._scene:
             self._scene = scene
-            self._attach_mesh(scene, log_time)
-            self._file.add_message(self._channels["scene"], log_time, cdr.string(scene))
+            self._attach_mesh(file, scene, log_time)
+            file.add_message(self._channels["scene"], log_time, cdr.string(scene))
 
-    def _attach_mesh(self, scene: str, log_time: int) -> None:
+    def _attach_mesh(self, file: McapFile, scene: str, log_time: int) -> None:
         sha256 = scene_sha256(scene)
         if not sha256 or sha256 in self._attached:
             return
@@ -224,27 +231,27 @@ class McapObserver(Observer):
             return
         # A file that was changed since it was loaded isn't the one that flies.
         if file_sha256(data) == sha256:
-            self._file.flush()
-            self._file.add_attachment(path.name, "application/octet-stream", data, log_time)
+            file.flush()
+            file.add_attachment(path.name, "application/octet-stream", data, log_time)
 
-    def _write_rows(self, block: Block, begin: int, end: int) -> None:
+    def _write_rows(self, file: McapFile, block: Block, begin: int, end: int) -> None:
         if begin == end:
             return
         chunk_of_row = block.times[begin:end] // CHUNK_NS
         cuts = (begin + 1 + np.flatnonzero(np.diff(chunk_of_row))).tolist()
         for first, last in zip([begin, *cuts], [*cuts, end], strict=True):
             if first > begin:
-                self._file.flush()
-            self._add_rows(block.times[first:last], block.walls[first:last], block.rows[first:last])
+                file.flush()
+            self._add_rows(file, block.times[first:last], block.walls[first:last], block.rows[first:last])
 
-    def _add_rows(self, times: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
+    def _add_rows(self, file: McapFile, times: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
         log_times = self._run_begins_ns + times if self._simulated_log else walls.copy()
         self._latest_log_ns = max(self._latest_log_ns, int(log_times.max()))
         listed = rows.tolist()
         for name in ("pose", "twist"):
             project = session_messages.PROJECTIONS[name]
             doubles = rows[:, :7] if name == "pose" else np.array([project(row) for row in listed])
-            self._file.add_rows(self._channels[name], log_times, _stamped(self._templates[name], times, doubles))
+            file.add_rows(self._channels[name], log_times, _stamped(self._templates[name], times, doubles))
 
     def _lost(self, reason: str) -> None:
         file, self._file = self._file, None

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -22,9 +22,10 @@ def play(
     session: RecordedSession,
     observer: Observer,
     given: Scenario | None = None,
-    progress: Callable[[float, float], None] = lambda done, total: None,
+    progress: Callable[[float, float], None] = lambda _done, _total: None,
 ) -> None:
-    """Tell ``observer`` the session from its start to its last state; ``progress`` is called with (states told, all states).
+    """Tell ``observer`` the session from its start to its last state; ``progress`` is called with (states told, all
+    states).
 
     given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
     decoded, and for a session without a scene.
@@ -49,7 +50,7 @@ def play(
             again.ghost.advance(time_ns)
 
 
-def sorted_states(session: RecordedSession):
+def sorted_states(session: RecordedSession) -> Iterator[tuple[int, np.ndarray]]:
     """(time_ns, row) of every state in the order of time."""
     for k in np.argsort(session.times, kind="stable").tolist():
         yield int(session.times[k]), session.rows[k]
@@ -78,7 +79,7 @@ def _snapshot(scenario: Scenario) -> BodySnapshot:
     told: list[BodySnapshot] = []
 
     class _Asked(Observer):
-        def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
+        def body_changed(self, _time_ns: int, body: BodySnapshot) -> None:
             told.append(body)
 
     Simulation(scenario.setup, _Asked()).announce()

@@ -1,14 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""A recorded flight as plain arrays and text, whatever file it was read from."""
+"""A recorded flight as plain arrays and text, whatever file it was read from, and the mesh that it flew,
+found by its hash.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import re
+import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from ..base.errors import InputError, MeshError
+from ..mesh.locate import bundled_names
+from ..mesh.reading import Mesh, load_mesh
 from ..messages.session_messages import StampedRows
+
+_HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 
 
 @dataclass
@@ -16,14 +27,15 @@ class RecordedSession:
     """One run, as its recording holds it.
 
     scene: the parameters at the run's start as a params file. events: (time_ns, JSON line) in order, lines as logged.
-    refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states in
-    ``simulation/observer.py``'s ``STATE_FIELDS`` order. vertices (p, 3) float64 and triangles (m, 3) int64 as loaded, None without a
-    mesh; mesh_sha256 of the mesh file; mesh_chunks counts how often the drawn mesh was logged.
+    refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states
+    in ``simulation/observer.py``'s ``STATE_FIELDS`` order. vertices (p, 3) float64 and triangles (m, 3) int64 as
+    loaded, None without a mesh; mesh_sha256 of the mesh file; mesh_chunks counts how often the drawn mesh was logged.
     complete: the file was finished properly. readable_bytes of file_bytes hold whole pieces.
 
     A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
-    those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics' names.
-    missing: topics that a check would need. attachments: (name, bytes) of files inside; folder: where the session lies.
+    those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics'
+    names. missing: topics that a check would need. attachments: (name, bytes) of files inside; folder: where the
+    session lies.
     """
 
     scene: str = ""
@@ -61,3 +73,46 @@ class RecordedSession:
         if not self.complete:
             text += f"; not finished properly, {self.readable_bytes} of {self.file_bytes} bytes are complete"
         return text
+
+
+def scene_sha256(scene: str) -> str:
+    """The hash of the mesh's file that a scene's text names in a comment, or ""."""
+    found = _HASH.search(scene)
+    return found.group(1) if found else ""
+
+
+def file_sha256(data: bytes) -> str:
+    """SHA-256 of a file's bytes, in hex."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def find_mesh(
+    name: str, sha256: str, attachments: Iterable[tuple[str, bytes]] = (), folder: Path | None = None
+) -> Mesh:
+    """The mesh whose file has this hash: by its name, from the session's attachments, beside the session, or among the
+    bundled bodies. Raises MeshError naming it.
+    """
+    places = [name]
+    if folder is not None:
+        places.append(str(folder / Path(name).name))
+    for place in (*places, *bundled_names()):
+        try:
+            mesh = load_mesh(place)
+        except InputError:
+            continue
+        if mesh.sha256 == sha256:
+            return mesh
+    for file_name, data in attachments:
+        if file_sha256(data) == sha256:
+            return _from_bytes(file_name, data)
+    raise MeshError(
+        "mesh", name, f"the file with SHA-256 {sha256}, there or beside the session; the recording doesn't hold it"
+    )
+
+
+def _from_bytes(file_name: str, data: bytes) -> Mesh:
+    # Loaded through a file: what a mesh is depends on its ending, too.
+    with tempfile.TemporaryDirectory(prefix="rigid_proto_") as folder:
+        path = Path(folder) / Path(file_name).name
+        path.write_bytes(data)
+        return load_mesh(str(path))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from ..scene.scenario import Scenario, check_inertia, make_scenario
 from ..scene.scene_file import read_scene_text
 from ..simulation.commands import Change, Command
 from ..simulation.observer import Observer
+from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
-from .mesh import find_mesh, scene_sha256
-from .recorded_session import RecordedSession
+from .recorded_session import RecordedSession, find_mesh, scene_sha256
 from .runs import decode_event
 
 
@@ -37,7 +37,7 @@ def session_scenario(session: RecordedSession) -> Scenario:
     if not session.mesh_sha256:
         return make_scenario(values)
     name = str(values.get("mesh", ""))
-    if session.vertices is None:
+    if session.vertices is None or session.triangles is None:
         return make_scenario(values, find_mesh(name, session.mesh_sha256, session.attachments, session.folder))
     try:
         mesh = load_mesh(name)
@@ -64,7 +64,8 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
 class Resimulation:
     """A session's simulation; its commands are submitted when their time has come, as they were then.
 
-    ``scenario`` is the one in force; ``ghost`` is told of its changes. mesh_of(name) gives the mesh that a change names, or None to load it.
+    ``scenario`` is the one in force; ``ghost`` is told of its changes. mesh_of(name) gives the mesh that a change
+    names, or None to load it.
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class Resimulation:
         scenario: Scenario,
         event_lines: Sequence[str],
         observer: Observer | None = None,
-        mesh_of: Callable[[str], Mesh | None] = lambda name: None,
+        mesh_of: Callable[[str], Mesh | None] = lambda _: None,
         node_name: str = "rigid_body",
     ) -> None:
         self.scenario = scenario
@@ -90,7 +91,7 @@ class Resimulation:
         self._waiting = deque(sorted(waiting, key=lambda event: event[0]))
 
     def advance(self, until_ns: int) -> np.ndarray:
-        """Carry the body to ``until_ns``; returns its state row, before what acts at that very time.
+        """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
@@ -125,14 +126,14 @@ class Resimulation:
         except InputError as error:
             raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
 
-    def _change_inertia(self, content: dict):
+    def _change_inertia(self, content: Mapping) -> Setup:
         return self._take_on(check_inertia(self.scenario, content))
 
-    def _change(self, changes: dict):
+    def _change(self, changes: Mapping) -> Setup:
         mesh = self._mesh_of(changes["mesh"]) if changes.get("mesh") else None
         return self._take_on(self.scenario.with_changes(changes, mesh))
 
-    def _take_on(self, scenario: Scenario):
+    def _take_on(self, scenario: Scenario) -> Setup:
         self.simulation.check_change(scenario.setup)
         self.scenario = scenario
         self._observer.scene_changed(self.simulation.time_ns, scenario.text)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
 from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_text
-from .mcap_file import McapContent
-from .mesh import scene_sha256
-from .recorded_session import RecordedSession
+from .mcap_reading import McapContent
+from .recorded_session import RecordedSession, scene_sha256
 
 RESET_WINDOW_NS = 1_000_000_000
 """Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
@@ -161,5 +161,5 @@ def _shown_rows(published: dict[str, StampedRows]) -> tuple[np.ndarray, np.ndarr
     return np.array(times, dtype=np.int64), np.array([merged[t] for t in times]).reshape(-1, 13)
 
 
-def _listed(rows: StampedRows | None):
+def _listed(rows: StampedRows | None) -> Iterable[tuple[int, list[float]]]:
     return () if rows is None else zip(rows.times.tolist(), rows.rows.tolist(), strict=True)

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..scene.command_codec import MARKS
-from ..session.mesh import scene_sha256
-from ..session.recorded_session import RecordedSession
+from ..session.recorded_session import RecordedSession, scene_sha256
 from ..session.runs import decode_event
 from .rewind import Rewind, core_row, make_rewind
 from .save_as_script import SavedScript, save_as_script

@@ -109,3 +109,13 @@ def test_a_density_that_is_set_wins_over_the_mass_of_the_scene(tmp_path, capsys)
 
 def test_every_scene_begins_with_the_same_defaults():
     assert {name: PARAMETERS[name].default for name in DEFAULTS} == DEFAULTS
+
+
+def test_what_a_ghost_goes_without_is_said(tmp_path, capsys):
+    pytest.importorskip("mcap")
+    script = tmp_path / "pokes.yaml"
+    script.write_text("- {t: 0.25, torque: [0, 0, 1]}\n- {t: 0.3, torque: [0, 0, 1]}\n")
+    words = ["t_handle", "--set", "ghost.integrator=free_body", "--script", str(script), "--duration", "0.5"]
+    assert main(["simulate", *words, "--bag", str(tmp_path / "x.mcap")]) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "ghost" in line]
+    assert len(lines) == 1 and "the ghost goes on without a command" in lines[0] and "free_body" in lines[0]

@@ -122,7 +122,7 @@ def test_the_second_run_begins_with_the_scene_in_force_at_its_reset(flown, tmp_p
 
 
 def test_a_mesh_that_is_nowhere_is_named_with_its_hash(flown, tmp_path, monkeypatch):
-    monkeypatch.setattr("rigid_proto_ros.session.mesh.bundled_names", tuple)
+    monkeypatch.setattr("rigid_proto_ros.session.recorded_session.bundled_names", tuple)
     LAYOUTS["bare"](tmp_path / "bag", flown)
     (run, _) = read_runs(tmp_path / "bag.mcap")
     with pytest.raises(InputError, match=f"bracket.obj.*{run.mesh_sha256}"):

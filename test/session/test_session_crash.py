@@ -22,8 +22,8 @@ from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
-from rigid_proto_ros.session.mcap_file import RECORD_HEAD
 from rigid_proto_ros.session.mcap_observer import McapObserver
+from rigid_proto_ros.session.mcap_writing import RECORD_HEAD
 
 SECOND = 10**9
 MAGIC_BYTES = 8

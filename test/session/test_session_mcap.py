@@ -252,7 +252,7 @@ def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_read
             self._stream.write(data[: len(data) // 2])
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        monkeypatch.setattr("rigid_proto_ros.session.mcap_file.McapFile._write", write)
+        monkeypatch.setattr("rigid_proto_ros.session.mcap_writing.McapFile._write", write)
 
     _fly_with_trouble(observer, fill_up)
     assert said == [f"recording stopped: {path}: No space left on device"]

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""What `replay` says of a session."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigid_proto_ros.cli import replay
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.session.recorded_session import RecordedSession
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_after_a_repair_it_says_how_to_see_the_new_file(ending, tmp_path, capsys):
+    pytest.importorskip("mcap" if ending == ".mcap" else "rerun")
+    old, new = tmp_path / f"old{ending}", tmp_path / f"new{ending}"
+    record = "--bag" if ending == ".mcap" else "--record"
+    assert main(["simulate", "t_handle", "--duration", "0.2", record, str(old)]) == 0
+    capsys.readouterr()
+    assert main(["replay", str(old), "--repair", str(new)]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert "show it" in last and str(new) in last and str(old) not in last
+
+
+def test_however_many_commands_were_refused_few_are_listed(capsys):
+    refusals = [(k * 1_000_000, f"command {k}") for k in range(5000)]
+    replay._tell("s.rrd", RecordedSession(refusals=refusals))
+    lines = capsys.readouterr().out.splitlines()
+    assert sum("refused at" in line for line in lines) == replay.REFUSALS_SHOWN
+    assert f"{5000 - replay.REFUSALS_SHOWN} more were refused, the last at 4.999 s" in lines[-1]
