@@ -182,6 +182,22 @@ class Client:
         _until(future.done, f"an answer of {service}", timeout)
         return plain(future.result())
 
+    def lockstep_by_wrench(self, node, count, forces):
+        """``count`` times: publish a wrench and wait for a twist of a later time. Returns the stamps of the twists [ns] and
+        the seconds that it took.
+        """
+        publisher, _ = self.publishers[f"{node}/wrench"]
+        message = WrenchStamped()
+        twists = self.received[f"{node}/twist"]
+        stamps, began = [stamp_ns(twists[-1])], time.monotonic()
+        for k in range(count):
+            message.wrench.force.x = forces[k % len(forces)]
+            publisher.publish(message)
+            # While paused the present state comes again ten times a second.
+            _until(lambda: stamp_ns(twists[-1]) > stamps[-1], "a later twist", pause=0.0)
+            stamps.append(stamp_ns(twists[-1]))
+        return {"stamps": stamps, "seconds": time.monotonic() - began}
+
     def lockstep(self, node, count, push):
         """``count`` times: publish an impulse that means now, call step, and wait for the twist of its end, after which the
         next goes out. Returns the stamps of the twists [ns] and the answers.
@@ -193,14 +209,14 @@ class Client:
         service = self.node.create_client(Trigger, f"{node}/step")
         _until(service.service_is_ready, f"the service {node}/step")
         twists = self.received[f"{node}/twist"]
-        stamps, answers = [], []
+        stamps, answers = [stamp_ns(twists[-1])], []
         for _ in range(count):
-            twists.clear()
             publisher.publish(message)
             future = service.call_async(Trigger.Request())
             _until(future.done, "an answer of step")
             answers.append(future.result().message)
-            _until(lambda: twists, "a twist")
+            # While paused the present state comes again ten times a second.
+            _until(lambda: stamp_ns(twists[-1]) > stamps[-1], "a later twist", pause=0.0)
             stamps.append(stamp_ns(twists[-1]))
         return {"stamps": stamps, "answers": answers}
 
@@ -243,12 +259,12 @@ class Client:
         return found
 
 
-def _until(condition, what, timeout=WAIT_S):
+def _until(condition, what, timeout=WAIT_S, pause=0.002):
     deadline = time.monotonic() + timeout
     while not condition():
         if time.monotonic() > deadline:
             raise TimeoutError(f"no {what} within {timeout} s")
-        time.sleep(0.002)
+        time.sleep(pause)
 
 
 def main() -> None:

@@ -140,6 +140,8 @@ class CommandIntake:
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
         command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
         simulation.submit(command, self._when(stamp_ns))
+        if held:
+            self._loop.request_step()
         return 1
 
     def _string_target(self, data: bytes) -> int:

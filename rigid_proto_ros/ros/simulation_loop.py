@@ -25,6 +25,9 @@ LEAD = 0.2
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
 
+LOCKSTEP_NS = 100_000
+"""In lockstep commands are looked for this often [ns of wall time], for some seconds after the last one."""
+
 FOLLOW_NS = 1_000_000
 """A followed clock is read this often [ns of wall time]."""
 
@@ -65,6 +68,7 @@ class SimulationLoop:
         self._publications = Publications(scenario.parameters.publish_rate)
         self._pace = Pace(scenario.parameters.real_time_factor, followed_clock)
         self._steps_left = 0
+        self._steps_requested = 0
         self._commands_come = False
         self._present_ns = 0
         self._last_drain_ns = 0
@@ -119,7 +123,7 @@ class SimulationLoop:
             if not paused:
                 self._take_commands(time.monotonic_ns(), True)
             self.timekeeping.paused = paused
-            self._steps_left = 0
+            self._end_steps()
             self.simulation.log("pause", {"data": paused})
             self.simulation.tell_status(paused)
             self._anchor()
@@ -136,7 +140,10 @@ class SimulationLoop:
         """While paused, take all commands that have arrived and begin to advance over so many publications; whether
         they are made already, else ``stepping`` says.
         """
+        requested = self._steps_requested
         self._take_commands(time.monotonic_ns(), True)
+        # This very step follows what was taken now.
+        self._steps_requested = requested
         self.simulation.log("step", {"periods": periods} if periods > 1 else {})
         # Who has subscribed since the last publication waits for these.
         self._check_listeners()
@@ -145,6 +152,14 @@ class SimulationLoop:
         self._budget.begin_tick()
         self._step_on()
         return not self.stepping
+
+    def _end_steps(self) -> None:
+        self._steps_left = self._steps_requested = 0
+
+    def request_step(self) -> None:
+        """A wrench was taken: paused and in lockstep it is followed by a step."""
+        if self.timekeeping.paused and self.scenario.parameters.lockstep:
+            self._steps_requested += 1
 
     @property
     def stepping(self) -> bool:
@@ -160,7 +175,7 @@ class SimulationLoop:
         elif self._is_viewed():
             self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
         self._publications.restart()
-        self._steps_left = 0
+        self._end_steps()
         self._anchor()
 
     # In the thread's loop
@@ -228,14 +243,17 @@ class SimulationLoop:
         while self._steps_left and self._publish_next():
             self._steps_left -= 1
         if self.simulation.failure:
-            self._steps_left = 0
+            self._end_steps()
 
     def _tick_paused(self) -> None:
         if self.stepping:
             self._step_on()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
-        self._take_commands(now_ns, False)
+        self._commands_come = self._take_commands(now_ns, False)
+        if self._steps_requested and not self.stepping:
+            self._steps_requested -= 1
+            self.step(self.scenario.parameters.step_periods)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._check_listeners()
@@ -264,7 +282,7 @@ class SimulationLoop:
         self.simulation.failure = (
             f"simulated time beyond {LAST_STAMP_NS // 1_000_000_000} s, the largest that a stamp can hold"
         )
-        self._steps_left = 0
+        self._end_steps()
         self._check_failure()
 
     def _check_failure(self) -> bool:
@@ -300,12 +318,13 @@ class SimulationLoop:
         # On a grid that all loops of the process share, so that one wake-up serves them all.
         latest_ns = (self._last_drain_ns // TICK_NS + 1) * TICK_NS
         factor = self._pace.factor
-        if self.stepping or not self._caught_up:
+        if self.stepping or self._steps_requested or not self._caught_up:
             return 0
         if self._pace.followed:
             return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
         if self.timekeeping.paused:
-            return latest_ns
+            waits = self._commands_come and self.scenario.parameters.lockstep
+            return self._last_drain_ns + LOCKSTEP_NS if waits else latest_ns
         if factor == 0.0:
             return 0
         if not self._has_subscribers:

@@ -191,6 +191,10 @@ class Parameters:
         1.0, "Simulated seconds per second of the wall clock; 0 runs as fast as possible.", lower=0.0, upper=1e6
     )
     step_periods: int = whole(1, "Publication periods that ~/step advances by.", lower=1, upper=1_000_000)
+    lockstep: bool = switch(
+        False,
+        "While paused, each message taken from ~/wrench steps the simulation, as ~/step does; without its round trip.",
+    )
     start_paused: bool = switch(False, "Start paused.", changes=READ_ONLY)
     wrench_timeout: float = number(
         1.5,

@@ -188,10 +188,11 @@ def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_sinc
 def test_in_lockstep_every_command_acts_at_the_time_that_it_was_sent_for(rig, count):
     rig.set(publish_rate=1000.0)
     rig.start_over(paused=True)
+    rig.until(lambda: rig.heard("twist", last=1), "a twist of time 0")
     lockstep = rig.do("lockstep", node=rig.node, count=count, push=1e-6)
     rig.sent += count
     # The states of a step's end are there with its answer, and the answer says what was taken before.
-    assert lockstep["stamps"] == [k * MS for k in range(1, count + 1)]
+    assert lockstep["stamps"] == [k * MS for k in range(count + 1)]
     received = [int(answer.split("; ")[1].split()[0]) for answer in lockstep["answers"]]
     assert received == list(range(rig.sent - count + 1, rig.sent + 1))
     pokes = rig.until(lambda: len(p := [e for e in rig.events() if e["kind"] == "poke"]) == count and p, "the events")
@@ -200,6 +201,18 @@ def test_in_lockstep_every_command_acts_at_the_time_that_it_was_sent_for(rig, co
     rig.trigger("step")
     rig.until(lambda: rig.heard("twist", stamp=(count + 25) * MS), "the last of 25 periods")
     assert rig.heard_count("twist") >= 25
+
+
+@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.stress)])
+def test_in_lockstep_by_wrench_each_wrench_is_followed_by_one_step(rig, count):
+    rig.set(publish_rate=1000.0, lockstep=True)
+    rig.start_over(paused=True)
+    rig.until(lambda: rig.heard("twist", last=1), "a twist of time 0")
+    lockstep = rig.do("lockstep_by_wrench", node=rig.node, count=count, forces=[1e-3, 0.0, -2e-3])
+    rig.sent += count
+    assert lockstep["stamps"] == [k * MS for k in range(count + 1)]
+    wrenches = rig.until(lambda: len(w := [e for e in rig.events() if e["kind"] == "wrench"]) == count and w, "events")
+    assert [event["time_ns"] for event in wrenches] == [k * MS for k in range(count)]
 
 
 def test_a_refused_command_leaves_no_event(rig):
