@@ -2,7 +2,7 @@
 """`auto` against heyoka.py at equal error of the final attitude: the shortest of many runs taken in turn, in one process.
 
 For each problem both are flown over a range of accuracies and tolerances, and the times at an error are read off the two
-curves (log-log). `kernel` is the compiled loop over steps, called from Python as heyoka's propagate_until is; `simulation` is
+curves (log-log). `kernel` is the compiled loop over steps, one call from Python as heyoka's propagate_until is; `simulation` is
 Simulation.advance with its commands and segments; `sweep` is a row of a sweep's compiled block, its body and end state
 included, on one core. What heyoka compiles, one system and tolerance at a time, isn't counted.
 
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import heyoka
 import numpy as np
+from numba import int64
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
@@ -26,17 +27,17 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
-from rigid_proto_ros.base.addresses import ADAPTIVE_STEPS, entry_of
+from rigid_proto_ros.base.addresses import entry_of
+from rigid_proto_ros.base.compilation import njit
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.integrators import control as ctl
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
-from rigid_proto_ros.motion.variables import new_variables, to_row
 from rigid_proto_ros.simulation import batch_body as bb
 from rigid_proto_ros.simulation import flight as fl
 from rigid_proto_ros.simulation.batch import Variants, fly_variants
+from rigid_proto_ros.simulation.flight_arrays import _arrays
 from rigid_proto_ros.simulation.flight_measures import MEASURE
 from work_precision_ours import prepare_simulation, simulation_of
 from work_precision_ratios import time_at_error
@@ -49,37 +50,32 @@ SHARES = {"heyoka batch": FLIGHTS, "sweep": ROWS}
 COLUMNS = ("problem", "what", "error_rad", "us", "heyoka_us", "ratio")
 
 
+@njit(error_model="numpy")
+def carry_from_start(at, until_ns):
+    """One segment of the flight whose arrays are at this address: its steps, and the look at the end."""
+    f, n, _, _, _, methods = _arrays(at)
+    return fl.carry(f, n, methods, until_ns)
+
+
 def kernel_runs(problem: Problem, accuracy: float):
     """(run, row, restart) of the adaptive kernel on a problem of one segment; None where there are more."""
     if not all(w.end is None and w.begin == 0.0 and not w.impulse for w in problem.wrenches):
         return None
     simulation = simulation_of(problem, "auto", 1e-3, accuracy)
+    # The first nanosecond begins the segment and compiles its kernel.
     simulation.advance(1)
-    arrays, p = simulation._arrays, simulation._segment.problem
-    method = arrays.method
-    if method.way != ADAPTIVE:
+    arrays = simulation._arrays
+    if arrays.method.way != ADAPTIVE:
         return None
-    degree = int(arrays.f[fl.DEGREE])
-    start, fresh = new_variables(simulation._segment.start.row, p), ctl.new_control(accuracy, degree)
-    y, following, control = start.copy(), start.copy(), fresh.copy()
-    workspace = method.workspace(degree)
-    kernel = entry_of(method.kernel, ADAPTIVE_STEPS.signature)
-    end_ns = round(problem.duration * 1e9)
+    kernel, end_ns = entry_of(carry_from_start, int64(int64, int64)), round(problem.duration * 1e9)
+    f, n = arrays.f, arrays.n
+    start = f[fl.START : fl.START + 13].copy()
 
     def restart():
-        y[:], control[:] = start, fresh
+        f[fl.ROW : fl.ROW + 13] = start
+        fl.begin_variables(f, n, arrays.methods)
 
-    def run():
-        came = kernel(y, p, control, following, workspace, end_ns, False)
-        if came < end_ns:
-            kernel(y, p, control, following, workspace, end_ns - came, True)
-
-    def row():
-        out = np.zeros(13)
-        to_row(y, p, problem.duration, out)
-        return out
-
-    return run, row, restart
+    return lambda: kernel(arrays._at, end_ns), lambda: f[fl.ROW : fl.ROW + 13].copy(), restart
 
 
 def whole(prepare):

@@ -132,6 +132,18 @@ def arranged(_typing_context: Any, vector: Any, order: Any) -> tuple:
 
 
 @intrinsic(prefer_literal=True)
+def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> tuple:
+    """Components of two vectors of four: 0 to 3 of the first, 4 to 7 of the second."""
+    each = a.count // 4
+    chosen = [part.literal_value * each + k for part in order for k in range(each)]
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return _shuffled(builder, arguments[0], arguments[1], chosen)
+
+    return a(a, b, order), code
+
+
+@intrinsic(prefer_literal=True)
 def component(_typing_context: Any, vector: Any, number: Any) -> tuple:
     """One component of a vector of four."""
     each = vector.count // 4

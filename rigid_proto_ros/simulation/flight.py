@@ -18,8 +18,8 @@ from ..motion.integrators import control as ctl
 from ..motion.integrators.auto import kind_of_segment
 from ..motion.integrators.equations import accelerations, stretch, tension_margin
 from ..motion.integrators.integrator import ADAPTIVE, MAX_SPEED
+from ..motion.integrators.stepping import COLUMNS, ROWS, SLEEPS, WAY, commit, is_provided, reach
 from ..motion.integrators.stepping import EVALUATIONS as COST
-from ..motion.integrators.stepping import SLEEPS, WAY, commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, apply_impulse, is_zero, share_of
 from ..motion.variables import HAND_WORK, HEAT, STORED, to_good_row, to_variables
 
@@ -117,7 +117,7 @@ def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
         n[METHOD] = 1 if p[pr.HAS_STRING] != 0.0 and methods.shape[0] > 1 else 0
     if n[METHOD] != before and methods[n[METHOD], WAY] == ADAPTIVE:
         # Kernels may count on zeros where they never write, and another method's were here.
-        f[ROOM:] = 0.0
+        f[ROOM : ROOM + methods[n[METHOD], ROWS] * methods[n[METHOD], COLUMNS]] = 0.0
     control = f[CONTROL : CONTROL + ctl.SIZE]
     control[:] = 0.0
     control[ctl.ACCURACY], control[ctl.DEGREE] = f[ACCURACY], f[DEGREE]

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The motion keeps its bits: states and event chains of a fixed set of flights, as they were when last looked at.
 
-Where numerics change on purpose, ``python test/simulation/test_golden_hashes.py`` writes the file anew; what changed is then said in the
+Where numerics change on purpose, ``PYTHONPATH=test python
+test/simulation/test_golden_hashes.py`` writes the file anew; what changed is then said in the
 changelog. Hashes hold for one type of processor and one set of versions, so a machine of another type skips.
 """
 

@@ -61,6 +61,7 @@ from .integrator import (
     Method,
 )
 from .runge_kutta import is_good
+from .series_steps import degree_of_motion
 from .stiff_steps import damping_is_stiff
 from .taylor_adaptive import degree_for
 
@@ -146,8 +147,13 @@ def _constant(choice: str) -> Callable[..., str]:
     return lambda _p, _step_s, _accuracy: choice
 
 
-def _series(why: str) -> Callable[..., str]:
-    return lambda p, _step_s, accuracy: f"auto: taylor of degree {degree_for(accuracy)}, {why.format(fastest_swing(p))}"
+def _series(why: str, degree: Callable[[int], int] = int) -> Callable[..., str]:
+    """degree: that of the method's series, from the one that the accuracy asks for."""
+
+    def choice(p: np.ndarray, _step_s: float, accuracy: float) -> str:
+        return f"auto: taylor of degree {degree(degree_for(accuracy))}, {why.format(fastest_swing(p))}"
+
+    return choice
 
 
 def _stiff(p: np.ndarray, _step_s: float, _accuracy: float) -> str:
@@ -167,7 +173,9 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
         TURNING_LOADS: Method(
             ADAPTIVE, taylor_adaptive.steps, _series("the loads turn with the body"), 0, taylor_adaptive.workspace
         ),
-        ANY_LOADS: Method(ADAPTIVE, series[0], _series("loads that depend on the attitude"), 0, series[1]),
+        ANY_LOADS: Method(
+            ADAPTIVE, series[0], _series("loads that depend on the attitude", degree_of_motion), 0, series[1]
+        ),
         WEAK_LOADS: Method(
             ADAPTIVE,
             splitting_steps.steps,
@@ -181,7 +189,14 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
             sleeps=True,
             on_string=True,
         ),
-        ON_STRING: Method(ADAPTIVE, series[0], _series("a string of up to {:.3g} rad/s"), 0, series[1], on_string=True),
+        ON_STRING: Method(
+            ADAPTIVE,
+            series[0],
+            _series("a string of up to {:.3g} rad/s", degree_of_motion),
+            0,
+            series[1],
+            on_string=True,
+        ),
         STIFF: Method(
             ADAPTIVE,
             stiff_steps.steps,

@@ -28,6 +28,10 @@ def _difference(a: float, a_low: float, b: float, c: float, c_low: float, d: flo
     return s, g + (e - f) + (a_low * b - c_low * d)
 
 
+Knot = tuple[float, float, float, float, float]
+"""From the free end to the knot (3,) [m, world], its length l, and l − rest length [m]."""
+
+
 @njit(cache=True, error_model="numpy")
 def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
     """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m

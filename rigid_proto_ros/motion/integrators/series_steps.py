@@ -16,8 +16,9 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.simd import aligned
 from ..problem import HAS_STRING, STIFFNESS
-from ..variables import HEAT, STORED
+from ..variables import ATTITUDE, DISPLACEMENT, HEAT, SPIN, STORED, VELOCITY
 from . import control as ctl
 from .error_measure import (
     FLOOR,
@@ -25,13 +26,12 @@ from .error_measure import (
     heavier,
     jump_of_displacement,
     scales,
-    size,
 )
 from .first_root import NONE
 from .motion_series import COLUMNS, motion_at, motion_series, stretch_at
 from .runge_kutta import is_good
-from .string_law import PULLS, SHORTENS, is_one_sided, law_of, next_law
-from .taylor_adaptive import PART, step_length
+from .string_law import PULLS, SHORTENS, is_one_sided, knot_at, law_of, next_law
+from .taylor_adaptive import MAX_DEGREE, PART, length_for, log2_growth
 
 PART_ON_A_STRING = 0.1
 """The same as taylor_adaptive.PART for a string, whose coefficients fall less evenly: the nearer the knot to its free
@@ -44,29 +44,30 @@ step is taken with one law.
 """
 
 
+_HIGHER = 3
+"""By so much the degree is higher than that of a series of the spin: what a step costs beside its series is more here."""
+
+
 @njit(cache=True, error_model="numpy")
-def rows(degree: int) -> int:
-    """Of a workspace: coefficients from the step's start, those of its last series, and the variables
-    that one starts from.
-    """
-    return 2 * (degree + 2) + 1
+def degree_of_motion(degree: int) -> int:
+    """The degree of a series of the whole motion, where that of the spin alone would be ``degree``."""
+    return min(degree + _HIGHER, MAX_DEGREE)
 
 
 def workspace(degree: int) -> np.ndarray:
-    """Room for the series, which stay there until the step is committed: every sample before takes them once more."""
-    return np.zeros((rows(degree), COLUMNS))
+    """Room for the coefficients from the step's start, those of its last series, and the variables that one starts
+    from. They stay there until the step is committed: every sample before takes them once more.
+    """
+    return aligned((2 * (degree_of_motion(degree) + 2) + 1, COLUMNS))
 
 
 @njit(cache=True, error_model="numpy")
-def growth_of(c: np.ndarray, degree: int, weights: tuple[float, float, float, float]) -> float:
-    """σ from the last three coefficients: the largest k-th root of their measure."""
-    attitude, spin, place, speed = weights
-    growth = 0.0
-    for k in range(degree - 2, degree + 1):
-        a = size(c[k], attitude, spin, place, speed)
-        if a > 0.0:
-            growth = max(growth, math.exp(math.log(a) / k))
-    return growth
+def allowed_length(
+    c: np.ndarray, degree: int, weights: tuple[float, float, float, float], accuracy: float, part: float
+) -> float:
+    """h [s] after which a series of the motion errs by this part of the accuracy times h."""
+    growth = log2_growth(c, degree, weights, ATTITUDE, SPIN, DISPLACEMENT, VELOCITY)
+    return length_for(growth, accuracy, degree, part)
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,25 +77,26 @@ def _lay_out(
     """Series of one step from y into c and control; returns its length [ns], 0 when there is none.
     weights: of errors.
     """
-    degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
+    degree, accuracy = degree_of_motion(int(control[ctl.DEGREE])), control[ctl.ACCURACY]
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
     part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
     series, last = c, c[2 * (degree + 2)]
     start = y
-    law = law_of(y, p)
+    knot = knot_at(y, p)
+    law = law_of(y, p, knot)
     control[ctl.LAW], control[ctl.SWITCH] = law, math.inf
     gone = 0.0
     parts = 0
     while True:
         if control[ctl.SERIES] == 0.0 or parts > 0:
-            motion_series(start, p, degree, law == PULLS, series)
+            motion_series(start, p, knot, degree, law == PULLS, series)
             control[ctl.PENDING] += 1.0
         control[ctl.SERIES] = 1.0
         parts += 1
         # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much
         # better.
         allowance = part if law == PULLS else part / (1.0 + jerk_of_place)
-        h = step_length(growth_of(series, degree, weights), accuracy, degree, allowance)
+        h = allowed_length(series, degree, weights, accuracy, allowance)
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
             return 0
         if not is_one_sided(p) or parts >= _MAX_PARTS:
@@ -111,6 +113,7 @@ def _lay_out(
             control[ctl.SWITCH] = switch
         _move(series, p, degree, switch, law, last)
         start, series = last, c[degree + 2 : 2 * (degree + 2)]
+        knot = knot_at(start, p)
         gone, law = gone + switch, after
         control[ctl.LAST_START], control[ctl.LAST_LAW] = gone, law
     length_ns = int(math.floor((gone + h) * 1e9))
@@ -119,11 +122,10 @@ def _lay_out(
 
 
 @njit(cache=True, error_model="numpy")
-def _reach(y: np.ndarray, p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
-    """The variables ``time_ns`` into the step that is laid out from y."""
-    degree, t = int(control[ctl.DEGREE]), time_ns * 1e-9
+def _reach(p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
+    """Take the variables at the beginning of the step that is laid out ``time_ns`` into it."""
+    degree, t = degree_of_motion(int(control[ctl.DEGREE])), time_ns * 1e-9
     if t <= control[ctl.SWITCH]:
-        out[:] = y
         _move(c, p, degree, t, control[ctl.LAW], out)
     else:
         out[:] = c[2 * (degree + 2)][:STORED]
@@ -149,7 +151,8 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
         length = _lay_out(y, p, control, weights, c)
         if length < 1:
             return False
-        _reach(y, p, control, c, length, following)
+        following[:] = y
+        _reach(p, control, c, length, following)
         good = is_good(following)
         # The errors of velocities are measured by those at the end: where they fall within the step, that counts.
         weights, more = heavier(scales(following, p, (elapsed + length) * 1e-9), weights)
@@ -182,9 +185,7 @@ def steps(
             control[ctl.FAILED] = 1.0
             return advanced
         if sampling:
-            out = np.empty(STORED)
-            _reach(y, p, control, c, span_ns, out)
-            y[:] = out
+            _reach(p, control, c, span_ns, y)
             return span_ns if is_good(y) else 0
         length = int(control[ctl.ACCEPTED_NS])
         if advanced + length > span_ns:

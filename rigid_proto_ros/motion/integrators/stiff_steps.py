@@ -39,10 +39,9 @@ from .first_root import NONE
 from .motion_series import COLUMNS, motion_at, motion_series
 from .radau import HALVES, STAGES, radau_step, stage_rates, within
 from .runge_kutta import is_good
-from .series_steps import PART_ON_A_STRING, growth_of
+from .series_steps import PART_ON_A_STRING, allowed_length
 from .slack import first_spell, knot_of
-from .string_law import PULLS, SHORTENS, is_one_sided, law_of, next_law
-from .taylor_adaptive import step_length
+from .string_law import PULLS, SHORTENS, is_one_sided, knot_at, law_of, next_law
 
 SAFETY = 0.8
 """Part of the step length that the error estimate would allow."""
@@ -317,9 +316,9 @@ def _explicit(
     """
     degree = int(control[ctl.DEGREE])
     weights = scales(y, p, elapsed)
-    motion_series(y, p, degree, False, c)
+    motion_series(y, p, knot_at(y, p), degree, False, c)
     control[ctl.PENDING] += 1.0
-    longest = step_length(growth_of(c, degree, weights), control[ctl.ACCURACY], degree, PART_ON_A_STRING)
+    longest = allowed_length(c, degree, weights, control[ctl.ACCURACY], PART_ON_A_STRING)
     switch, after, known = next_law(c, p, degree, min(h, longest), law, control[ctl.ACCURACY])
     return known, switch, after
 
@@ -330,7 +329,7 @@ def _through_nanosecond(
 ) -> bool:
     """From y ``span`` seconds on into out, in as many parts as it takes; whether that was possible."""
     one_sided, degree = is_one_sided(p), int(control[ctl.DEGREE])
-    law = law_of(y, p)
+    law = law_of(y, p, knot_at(y, p))
     here = y.copy()
     gone, trial = 0.0, min(max(control[ctl.NEXT], 1e-6 * span), span)
     for _ in range(_MOST_PARTS):
@@ -365,7 +364,7 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray,
     """One step from y into out; its length [ns], 0 when there is none."""
     elapsed = control[ctl.ELAPSED_NS] * 1e-9
     control[ctl.PENDING_EXCESS] = 0.0
-    law = law_of(y, p)
+    law = law_of(y, p, knot_at(y, p))
     control[ctl.LAW] = law
     control[ctl.SERIES] = 0.0
     if law != PULLS and not damping_is_stiff(p, y, False):

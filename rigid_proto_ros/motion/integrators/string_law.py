@@ -22,9 +22,9 @@ from ..problem import (
     STIFFNESS,
     STRING_DAMPING,
 )
-from .equations import knot
+from .equations import knot as moving_knot
 from .first_root import NONE, first_rise
-from .knot import knot_and_stretch
+from .knot import Knot, knot_and_stretch
 from .motion_series import (
     A_KNOT,
     DISTANCE,
@@ -55,14 +55,22 @@ def is_one_sided(p: np.ndarray) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def law_of(y: np.ndarray, p: np.ndarray) -> float:
-    """The law at variables y."""
+def knot_at(y: np.ndarray, p: np.ndarray) -> Knot:
+    """The knot of a string at variables y; zeros where none is tied."""
+    return knot_and_stretch(y, p) if p[HAS_STRING] != 0.0 else (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def law_of(y: np.ndarray, p: np.ndarray, knot: Knot) -> float:
+    """The law at variables y with the knot there."""
     if not is_one_sided(p):
         return PULLS
-    ax, ay, az, length, x = knot_and_stretch(y, p)
+    ax, ay, az, length, x = knot
     if x <= 0.0:
         return SLACK
-    _, _, _, vx, vy, vz = knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
+    _, _, _, vx, vy, vz = moving_knot(
+        y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p
+    )
     rate = (ax * vx + ay * vy + az * vz) / length
     return PULLS if p[STIFFNESS] * x + p[STRING_DAMPING] * rate > 0.0 else SHORTENS
 

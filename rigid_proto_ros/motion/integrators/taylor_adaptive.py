@@ -40,17 +40,21 @@ def degree_for(accuracy: float) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _log2_growth(c: np.ndarray, degree: int, weights: tuple[float, float, float, float]) -> float:
-    """log₂ σ from the last three coefficients: of the largest k-th root of their measure. −∞ where all are zero."""
+def log2_growth(
+    c: np.ndarray, degree: int, weights: tuple[float, float, float, float], q: int, w: int, d: int, u: int
+) -> float:
+    """log₂ σ from the last three coefficients: of the largest k-th root of their measure. −∞ where all are zero.
+    q, w, d, u: where in a row of c attitude, spin, displacement and velocity begin.
+    """
     attitude, spin, place, speed = weights
     growth = -math.inf
     for k in range(degree - 2, degree + 1):
         # Sums of absolute values bound the lengths, and no square of a large coefficient overflows.
-        a = attitude * (abs(c[k, _Q]) + abs(c[k, _Q + 1]) + abs(c[k, _Q + 2]) + abs(c[k, _Q + 3]))
-        a = max(a, spin * (abs(c[k, _W]) + abs(c[k, _W + 1]) + abs(c[k, _W + 2])))
+        a = attitude * (abs(c[k, q]) + abs(c[k, q + 1]) + abs(c[k, q + 2]) + abs(c[k, q + 3]))
+        a = max(a, spin * (abs(c[k, w]) + abs(c[k, w + 1]) + abs(c[k, w + 2])))
         if place != 0.0:
-            a = max(a, place * (abs(c[k, _D]) + abs(c[k, _D + 1]) + abs(c[k, _D + 2])))
-            a = max(a, speed * (abs(c[k, _U]) + abs(c[k, _U + 1]) + abs(c[k, _U + 2])))
+            a = max(a, place * (abs(c[k, d]) + abs(c[k, d + 1]) + abs(c[k, d + 2])))
+            a = max(a, speed * (abs(c[k, u]) + abs(c[k, u + 1]) + abs(c[k, u + 2])))
         if a > 0.0:
             growth = max(growth, rough_log2(a) / k)
     return growth
@@ -65,12 +69,6 @@ def length_for(log2_growth: float, accuracy: float, degree: int, part: float) ->
     x = (max(share + _LOG2_START, least) + _LOG2_REST) * inverse
     x = (max(share + x, least) + rough_log2(max(1.0 - rough_exp2(x), 0.1))) * inverse
     return min(rough_exp2(min(x, _LOG2_MOST) - log2_growth), ctl.LONGEST)
-
-
-@njit(cache=True, error_model="numpy")
-def step_length(growth: float, accuracy: float, degree: int, part: float) -> float:
-    """``length_for`` of σ itself, 0 where nothing grows."""
-    return ctl.LONGEST if growth == 0.0 else length_for(rough_log2(growth), accuracy, degree, part)
 
 
 def workspace(degree: int) -> np.ndarray:
@@ -111,7 +109,7 @@ def steps(
             # A step begins with the scales with which the one before it has ended.
             weights = ending if follows else scales(y, p, control[ctl.ELAPSED_NS] * 1e-9)
             for _ in range(WEIGHINGS):
-                growth = _log2_growth(c, degree, weights)
+                growth = log2_growth(c, degree, weights, _Q, _W, _D, _U)
                 length_ns = math.floor(length_for(growth, control[ctl.ACCURACY], degree, PART) * 1e9)
                 good = length_ns >= 1.0
                 if not good:
