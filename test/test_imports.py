@@ -34,7 +34,7 @@ ALLOWED = {
     "rich": ("cli", "base.progress"),
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.reading",),
-    "manifold3d": ("bodies.surfaces",),
+    "manifold3d": ("mesh.union", "bodies.surfaces"),
     "rerun": ("rerun_view",),
     "rerun_bindings": ("rerun_view",),
     "pyarrow": ("rerun_view", "sweep.table"),  # comes with rerun, as PIL does

@@ -15,7 +15,7 @@ from ..base.command_line import completes
 from ..base.errors import InputError
 from ..base.progress import Progress
 from ..mass.export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
-from ..mass.from_mesh import FALLBACKS, mesh_body
+from ..mass.from_mesh import FALLBACKS, UNION, mesh_body
 from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify
 from ..mass.properties import scale_vector
 from ..mesh.locate import resolve_mesh
@@ -58,7 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a point mass in kg at mesh coordinates; may be repeated",
     )  # fmt: skip
     parser.add_argument(
-        "--repair", action="store_true", help="weld edges, remove duplicate faces, orient faces, cap holes"
+        "--repair",
+        nargs="?",
+        const=True,
+        default=False,
+        metavar="union",
+        help="weld edges, remove duplicate faces, orient faces, cap holes; union: and make overlapping parts one solid",
     )
     parser.add_argument(
         "--fallback", choices=FALLBACKS[1:], default="", help="fallback shape for a mesh that encloses no volume"
@@ -93,6 +98,15 @@ def _scale_and_mesh(args: argparse.Namespace) -> tuple[list[float], str | None]:
     return scale, mesh
 
 
+def _repair_and_mesh(args: argparse.Namespace, mesh: str | None) -> tuple[bool | str, str | None]:
+    """``--repair cow.obj`` leaves the mesh as the repair's kind: give it back."""
+    if args.repair not in (True, False, UNION) and mesh is None:
+        return True, args.repair
+    if args.repair not in (True, False, UNION):
+        raise InputError("--repair", args.repair, f"--repair alone, or --repair {UNION}")
+    return args.repair, mesh
+
+
 def _as_number(word: str) -> float | None:
     try:
         return float(word)
@@ -103,6 +117,7 @@ def _as_number(word: str) -> float | None:
 def run(args: argparse.Namespace) -> int:
     """Inspect, print, and return the exit status; raises InputError for what is refused."""
     scale, mesh_name = _scale_and_mesh(args)
+    args.repair, mesh_name = _repair_and_mesh(args, mesh_name)
     density = DENSITY if args.density is None else args.density
     for name, value in (("mass", args.mass), ("density", density)):
         if value is not None and not 0.0 < value < float("inf"):

@@ -81,7 +81,7 @@ class Options:
 
     mass: float = 0.0
     density: float = 0.0
-    repair: bool = False
+    repair: bool | str = False
     fallback: str = ""
     max_triangles: int = MAX_TRIANGLES
     folders: tuple[Path, ...] = ()

@@ -14,11 +14,14 @@ from ..base.errors import InputError
 from ..mesh import cache as mesh_cache
 from ..mesh.hull import box_surface, convex_hull
 from ..mesh.reading import Mesh, load_mesh
+from ..mesh.union import can_unite
 from .moments import Moments, referenced_vertices
 from .properties import MeshMoments
-from .repair import CRACK, repair_surface, weld_cracks
-from .verdict import INFO, UNREFERENCED, WARNING, Finding, Verdict, judge_surface
+from .repair import CRACK, repair_surface, unite_components, weld_cracks
+from .verdict import INFO, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, judge_surface
 
+UNION = "union"
+"""The repair that makes one solid of components that overlap or lie inside others."""
 FALLBACKS = ("", "hull", "box")
 """What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""
 
@@ -44,13 +47,16 @@ class MeshBody:
         return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles
 
 
-def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> MeshBody:
+def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "") -> MeshBody:
     """The moments of a mesh (or of the one that a path, URI or bundled name stands for) with its verdict.
 
     A surface that bounds no solid is not refused here: asking its moments for the solid, or for a mass from a density,
     raises MeshError with the reason and the flags that help. ``repair`` welds, drops duplicates, orients (cavities stay
-    cavities) and caps holes first; ``fallback`` "hull" or "box" lets that shape stand in for what is still open.
+    cavities) and caps holes first; "union" then makes one solid of components that overlap or lie inside others;
+    ``fallback`` "hull" or "box" lets that shape stand in for what is still open.
     """
+    if repair not in (False, True, UNION):
+        raise InputError("mesh_repair", repair, f"true, false, or {UNION}")
     if fallback not in FALLBACKS:
         raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
     if isinstance(mesh, str):
@@ -62,7 +68,13 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> 
         vertices = np.where(np.isfinite(vertices).all(axis=1)[:, None], vertices, vertices[triangles[0, 0]])
     remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, judged)
     if repair and verdict.usable and _wants_repair(verdict):
-        triangles, polygon_starts, done = repair_surface(vertices, triangles, polygon_starts)
+        done: tuple[str, ...] = ()
+        if repair != UNION or not verdict.closed:
+            cavities = repair != UNION
+            triangles, polygon_starts, done = repair_surface(vertices, triangles, polygon_starts, cavities=cavities)
+        if repair == UNION:
+            vertices, triangles, polygon_starts, joined = unite_components(vertices, triangles, polygon_starts)
+            done = (*done, joined) if joined else done
         known, remember = {}, None
         if done:
             verdict, _ = judge_surface(vertices, triangles, polygon_starts)
@@ -89,7 +101,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "") -> 
 
 
 def _wants_repair(verdict: Verdict) -> bool:
-    return not verdict.closed or any(finding.code == "nested_components" for finding in verdict.findings)
+    return not verdict.closed or any(finding.code in ("nested_components", OVERLAPPING) for finding in verdict.findings)
 
 
 def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tuple[np.ndarray, np.ndarray]:
@@ -100,7 +112,8 @@ def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tup
 
 
 def _key(mesh: Mesh) -> str:
-    return f"{mesh.sha256}-{mesh.path.rpartition('.')[2].lower()}-body"
+    measured = "united" if can_unite() else "body"  # whether overlaps could be measured
+    return f"{mesh.sha256}-{mesh.path.rpartition('.')[2].lower()}-{measured}"
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.errors import MeshError
 from ..mesh.nesting import component_nesting
 from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent
+from ..mesh.union import counted_once, united
 from .verdict import MAX_NESTED_COMPONENTS
 
 CRACK = 1e-12
@@ -61,17 +63,16 @@ class RepairedSurface:
 
 
 def repair_surface(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
+    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None, *, cavities: bool = True
 ) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
-    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was."""
+    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was.
+
+    cavities: components that lie inside another become cavities of it; otherwise they stay as they are wound.
+    """
     surface = RepairedSurface(vertices, triangles, polygon_starts)
-    done = [
-        *_drop_copies(surface),
-        *_weld_rims(surface),
-        *_orient(surface),
-        *_cap_holes(surface),
-        *_turn_outward(surface),
-    ]
+    done = [*_drop_copies(surface), *_weld_rims(surface), *_orient(surface), *_cap_holes(surface)]
+    if cavities:
+        done += _turn_outward(surface)
     return surface.triangles, surface.polygon_starts, tuple(done)
 
 
@@ -147,6 +148,36 @@ def _weld_rims(surface: RepairedSurface, part: float = WELD) -> list[str]:
     flat = np.where(moves, surface.triangles, topology.corners)
     surface.drop((flat[:, 0] == flat[:, 1]) | (flat[:, 1] == flat[:, 2]) | (flat[:, 2] == flat[:, 0]))
     return [f"welded {moved} rim vertices, the farthest by {far:.2g}"]
+
+
+def unite_components(
+    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, str]:
+    """Vertices, triangles and polygon starts of the closed components as one solid, and what was done or "".
+
+    The file's vertices keep their numbers; those of an intersection follow them.
+    """
+    surface = RepairedSurface(vertices, triangles, polygon_starts)
+    topology = surface.topology()
+    nothing = vertices, triangles, polygon_starts, ""
+    if topology.unbalanced or not 1 < topology.components <= MAX_NESTED_COMPONENTS:
+        return nothing
+    extent = referenced_extent(vertices, triangles)
+    sums = component_sums(vertices, triangles, topology, 0.5 * extent.lower + 0.5 * extent.upper)
+    nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
+    if not nesting.complete:
+        raise MeshError("mesh_repair", "union: too many faces to say how the components lie to each other")
+    if nesting.crossing:
+        solid = united(vertices, topology.corners, topology.component, sums.volume, nesting.depth)
+        joined = np.concatenate([vertices, solid[0]])
+        done = f"united {topology.components} components, {len(nesting.crossing)} pairs of which overlapped"
+        return joined, solid[1] + len(vertices), None, done
+    spare = counted_once(sums.volume, nesting.inside) == 0.0
+    if not spare.any():
+        return nothing
+    surface.drop(spare[topology.component])
+    done = f"removed {int(np.count_nonzero(spare))} components inside others"
+    return vertices, surface.triangles, surface.polygon_starts, done
 
 
 @njit(cache=True, nogil=True)

@@ -10,11 +10,15 @@ import numpy as np
 from ..base.errors import MeshError
 from ..mesh.nesting import Nesting, component_nesting
 from ..mesh.planarity import polygon_planarity
+from ..mesh.self_crossing import self_crossings
 from ..mesh.topology import Components, Topology, component_sums, joined_sets, mesh_topology, referenced_extent
+from ..mesh.union import can_unite, counted_once, united_volume
 from .moments import solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
-UNREFERENCED = "unreferenced_vertices"
+UNREFERENCED, OVERLAPPING = "unreferenced_vertices", "overlapping_components"
+NO_OVERLAP = 1e-6
+"""Part of the volume below which an overlap is a remark, no warning."""
 MAX_NESTED_COMPONENTS = 2000
 """Above this many components their mutual position isn't examined: the tables grow with the square."""
 THIN = 1e-6
@@ -179,6 +183,11 @@ def _judge_components(
     else:
         nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
         _judge_nesting(verdict, nesting, volume)
+        if nesting.crossing:
+            closed = verdict.closed and not verdict.inward
+            lie = topology.corners, topology.component, volume, nesting.depth
+            whole = united_volume(vertices, *lie) if closed else None
+            _judge_overlap(verdict, len(nesting.crossing), float(np.sum(volume)), whole)
     if verdict.inward:
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 
@@ -201,17 +210,43 @@ def _judge_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
             message = f"inconsistent winding: {subtract}"
             verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
         if nested:
-            message = (
-                f"{_count(nested, 'component')} inside another and wound outward, so that their volume counts twice"
-            )
-            verdict.add("nested_components", WARNING, message, "--repair (mesh_repair) makes cavities of them")
+            message = f"{_count(nested, 'component')} inside another and wound outward: their volume counts twice"
+            if not nesting.crossing:
+                hollow = float(np.sum(expected * np.abs(volume)))
+                once = float(np.sum(counted_once(volume, nesting.inside) * np.abs(volume)))
+                message += (
+                    f"; the volume is {np.sum(volume):.4g} so, {hollow:.4g} with cavities, {once:.4g} as one solid"
+                )
+            remedy = "--repair (mesh_repair) makes cavities of them, --repair union one solid"
+            verdict.add("nested_components", WARNING, message, remedy)
     if cavities:
         verdict.add("cavities", INFO, f"{_count(cavities, 'closed inner surface')} wound inward, taken as cavities")
-    if nesting.crossing:
-        pairs = f"{_count(len(nesting.crossing), 'pair')} of components overlap"
-        verdict.add("overlapping_components", WARNING, f"{pairs}; the volume that they share counts twice")
     if not nesting.complete:
         verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
+
+
+def _judge_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | None) -> None:
+    """Components that cross: by how much their volumes' sum exceeds that of the union, ``whole``, where it is known."""
+    overlap = f"{_count(pairs, 'pair')} of components overlap"
+    if whole is None or not whole > 0.0:
+        measure = "" if can_unite() else " (the extra [meshes] measures by how much)"
+        verdict.add(OVERLAPPING, WARNING, f"{overlap}; the volume that they share counts twice{measure}")
+        return
+    over = abs(volume) / whole - 1.0
+    if over < NO_OVERLAP:
+        verdict.add(OVERLAPPING, INFO, f"{overlap}, by less than {NO_OVERLAP:g} of the volume")
+        return
+    counts = f"the volume that they share counts twice: it overcounts {100.0 * over:.3g} %"
+    verdict.add(OVERLAPPING, WARNING, f"{overlap}; {counts}", "--repair union makes one solid of them")
+
+
+def _judge_polygons(verdict: Verdict, planarity: tuple[float, float], diagonal: float) -> None:
+    deviation, spread = planarity
+    if deviation > NONPLANAR * diagonal:
+        off = f"corners lie up to {deviation:.2g} off the plane"
+        other = f"other triangulations would change the volume by up to {spread:.2g}"
+        message = f"non-planar polygons, triangulated from their first corner: {off}; {other}"
+        verdict.add("nonplanar_polygons", INFO, message)
 
 
 def judge_surface(
@@ -259,13 +294,12 @@ def judge_surface(
             verdict.add("zero_volume", ERROR, "the surface encloses no volume: it is flat, or folded onto itself")
         elif not empty and abs(volume) < THIN * diagonal**3:
             verdict.add("thin", INFO, f"thin body: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
+        crossings = self_crossings(vertices, topology.corners, topology.component)
+        if crossings:
+            message = f"the surface passes through itself ({_count(crossings, 'pair')} of triangles)"
+            verdict.add("self_crossing", WARNING, f"{message}; what it encloses twice counts twice")
     if polygon_starts is not None:
-        deviation, spread = polygon_planarity(vertices, triangles, polygon_starts, middle)
-        if deviation > NONPLANAR * diagonal:
-            off = f"corners lie up to {deviation:.2g} off the plane"
-            other = f"other triangulations would change the volume by up to {spread:.2g}"
-            message = f"non-planar polygons, triangulated from their first corner: {off}; {other}"
-            verdict.add("nonplanar_polygons", INFO, message)
+        _judge_polygons(verdict, polygon_planarity(vertices, triangles, polygon_starts, middle), diagonal)
     return verdict, topology
 
 

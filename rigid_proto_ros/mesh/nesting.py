@@ -224,7 +224,8 @@ def _segment_crosses(p: np.ndarray, q: np.ndarray, a: np.ndarray, b: np.ndarray,
 
 
 @njit(cache=True, nogil=True)
-def _triangles_cross(vertices: np.ndarray, s: np.ndarray, t: np.ndarray) -> bool:
+def triangles_cross(vertices: np.ndarray, s: np.ndarray, t: np.ndarray) -> bool:
+    """Whether two triangles (3,) pass properly through each other; touching and coplanar ones don't."""
     for k in range(3):
         if _segment_crosses(vertices[s[k]], vertices[s[(k + 1) % 3]], vertices[t[0]], vertices[t[1]], vertices[t[2]]):
             return True
@@ -273,7 +274,7 @@ def _crossing_pairs(
             first = (node - leaves + 1) * LEAF
             for j in range(max(first, i + 1), min(first + LEAF, len(order))):
                 other = component[order[j]]
-                if near[own, other] and not found[own, other] and _triangles_cross(vertices, s, triangles[order[j]]):
+                if near[own, other] and not found[own, other] and triangles_cross(vertices, s, triangles[order[j]]):
                     found[own, other] = found[other, own] = True
     return True
 

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""Parts that overlap, lie in each other, or a surface that passes through itself: by how much, and as one solid."""
+
+import json
+
+import numpy as np
+import pytest
+from mass_solids import box, inward, moved, sphere, together
+from mesh_files import obj
+
+from rigid_proto_ros.base.errors import InputError, MeshError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mesh import union
+from rigid_proto_ros.mesh.reading import Mesh
+from rigid_proto_ros.mesh.union import counted_once
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+
+
+def body(surface, **options):
+    vertices, triangles = surface
+    name = str(hash((vertices.tobytes(), triangles.tobytes())))
+    return mesh_body(Mesh("made", "/made.obj", vertices, triangles, None, name), **options)
+
+
+def volume(made) -> float:
+    return made.moments.moments("solid").measure
+
+
+def message(made, code: str) -> str:
+    return next(finding.message for finding in made.verdict.findings if finding.code == code)
+
+
+@pytest.mark.parametrize(
+    ("shift", "over"), [((0.5, 0.0, 0.0), "33.3 %"), ((0.5, 0.5, 0.0), "14.3 %"), ((0.9, 0.03, 0.02), "4.99 %")]
+)
+def test_an_overlap_is_measured_and_the_union_is_its_remedy(shift, over):
+    pytest.importorskip("manifold3d")
+    two = together(box(), moved(box(), shift))
+    made = body(two)
+    assert volume(made) == pytest.approx(2.0, rel=1e-14)
+    assert f"overcounts {over}" in message(made, "overlapping_components")
+    whole = body(two, repair="union")
+    assert volume(whole) == pytest.approx(2.0 - np.prod(1.0 - np.array(shift)), rel=1e-12)
+    assert {finding.code for finding in whole.verdict.findings} <= {"repaired", "unreferenced_vertices"}
+    # The vertices of the file keep their numbers.
+    assert np.array_equal(whole.vertices[: len(two[0])], two[0])
+
+
+def test_an_overlap_of_roundings_size_is_no_warning():
+    pytest.importorskip("manifold3d")
+    made = body(together(box(cells=2), moved(box(cells=2), (1.0 - 1e-8, 0.013, 0.0271))))
+    severities = {finding.code: finding.severity for finding in made.verdict.findings}
+    assert severities.get("overlapping_components", "info") == "info"
+
+
+def test_a_solid_in_a_solid_says_what_each_reading_gives():
+    # An edge of 2 around one of 1.
+    nested = together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))
+    made = body(nested)
+    assert "9 so, 7 with cavities, 8 as one solid" in message(made, "nested_components")
+    assert [volume(body(nested, repair=kind)) for kind in (False, True, "union")] == pytest.approx([9.0, 7.0, 8.0])
+
+
+def test_the_union_keeps_a_cavity_and_what_lies_in_it():
+    shells = together(
+        box((4.0, 4.0, 4.0)), inward(moved(box((2.0, 2.0, 2.0)), (0.5, 0.5, 0.5))), moved(box(), (0.9, 0.9, 0.9))
+    )
+    assert volume(body(shells, repair="union")) == pytest.approx(64.0 - 8.0 + 1.0)
+    crossing = together(shells, moved(box(), (2.0, 1.0, 1.0)))
+    pytest.importorskip("manifold3d")
+    assert volume(body(crossing, repair="union")) == pytest.approx(64.0 - 8.0 + 1.0 + 0.5, rel=1e-12)
+
+
+def test_what_several_enclose_counts_once():
+    inside = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], dtype=bool)  # three in a row, the innermost last
+    assert counted_once(np.array([3.0, 2.0, 1.0]), inside).tolist() == [1.0, 0.0, 0.0]
+    assert counted_once(np.array([3.0, -2.0, 1.0]), inside).tolist() == [1.0, -1.0, 1.0]
+
+
+def test_without_manifold3d_the_overlap_is_told_and_the_union_says_what_is_missing(monkeypatch):
+    monkeypatch.setattr(union, "can_unite", lambda: False)
+    monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)
+    two = together(box(), moved(box(), (0.5, 0.1, 0.2)))
+    assert "[meshes]" in message(body(two), "overlapping_components")
+    with pytest.raises(MeshError, match="manifold3d"):
+        body(two, repair="union")
+
+
+def tube(pitch: float) -> tuple[np.ndarray, np.ndarray]:
+    """A closed ring of 64 x 16 faces around a figure of eight whose arms lie 2·pitch apart where they cross."""
+    n, m = 64, 16
+    t = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
+    center = np.stack([np.sin(t), np.sin(2.0 * t), pitch * np.cos(t)], axis=1)
+    along = np.stack([np.cos(t), 2.0 * np.cos(2.0 * t), -pitch * np.sin(t)], axis=1)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    side = np.cross(along, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    up = np.cross(side, along)
+    a = np.linspace(0.0, 2.0 * np.pi, m, endpoint=False)
+    ring = 0.1 * (np.cos(a)[None, :, None] * side[:, None] + np.sin(a)[None, :, None] * up[:, None])
+    vertices = (center[:, None] + ring).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
+    p, q, r, s = (((i + di) % n * m + (j + dj) % m).ravel() for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    return vertices, np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
+
+
+def test_a_surface_that_passes_through_itself_is_told():
+    assert [finding.code for finding in body(tube(0.05)).verdict.findings if finding.severity == "warning"].count(
+        "self_crossing"
+    ) == 1
+    assert "self_crossing" not in {finding.code for finding in body(tube(0.5)).verdict.findings}
+    assert not body(sphere(20)).verdict.findings
+
+
+def test_the_command_takes_the_union_and_gives_the_mesh_back(tmp_path, capsys):
+    (tmp_path / "two.obj").write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
+    for arguments, expected in ((["--repair", "union", "M"], 8.0), (["M", "--repair", "union"], 8.0), (["--repair", "M"], 7.0), (["M", "--repair"], 7.0)):  # fmt: skip
+        words = [str(tmp_path / "two.obj") if word == "M" else word for word in arguments]
+        assert main(["inspect", *words, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["volume"] == pytest.approx(expected)
+    assert main(["inspect", "hammer", "--repair", "onion"]) == 2
+    assert "union" in capsys.readouterr().err
+    with pytest.raises(InputError, match="union"):
+        body(box(), repair="onion")
