@@ -131,6 +131,16 @@ def test_t_handle_started_closer_to_its_axis_flips_later_by_the_logarithm() -> N
     assert near - fly("t_handle", 3.0).flips(2)[0] == pytest.approx(math.log(100.0) / 4.93, abs=0.03)
 
 
+@pytest.mark.parametrize(("step", "energy", "momentum"), [(0.016666667, 2.13, 1.46), (0.001, 1.04, 1.02)])
+def test_t_handle_gains_energy_and_momentum_by_the_method_of_game_engines(
+    step: float, energy: float, momentum: float
+) -> None:
+    flight = fly("t_handle", 10.0, integrator="semi_implicit_euler", step=step)
+    size = np.linalg.norm(flight.momentum, axis=1)
+    assert flight.energy[-1] / flight.energy[0] == pytest.approx(energy, abs=0.005)
+    assert size[-1] / size[0] == pytest.approx(momentum, abs=0.005)
+
+
 def test_l_bracket_has_its_momentum_15_degrees_off_z_and_no_principal_axis_along_its_drawing() -> None:
     flight = fly("l_bracket", 0.01)
     assert degrees_between(flight.momentum, Z)[0] == pytest.approx(15.0, abs=0.1)
