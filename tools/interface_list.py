@@ -44,7 +44,7 @@ def commands() -> Iterator[str]:
     """Commands with their arguments and options, as --help shows them."""
     helps = {f"rigid_proto {name}": printed(cli.main, name, "--help") for name in cli.COMMANDS}
     helps["poke_client"] = printed(poke_client.main, "--help")
-    helps["rigid_body_node"] = printed(own_arguments, "--help")
+    helps["rigid_body_node"] = printed(own_arguments, "rigid_body_node", "--help")
     for command, text in helps.items():
         yield f"command {command}"
         for found in POSITIONAL.findall(text):
@@ -103,7 +103,7 @@ def bundled_files() -> Iterator[str]:
             yield f"{kind} {name}"
 
 
-class _Link:
+class _SceneOnly:
     """In the place of the page's link to ROS: a node that says its scene and takes nothing."""
 
     def __init__(self, target: str, deliver: Callable, on_scene: Callable, _on_diagnostics: Callable) -> None:
@@ -153,7 +153,7 @@ def page_controls() -> Iterator[str]:
             undo.append((owner, name, method))
             if name not in ("add_panel", "add_tab_group", "add_uplot"):
                 setattr(owner, name, recording(method, name.removeprefix("add_")))
-    link, page_module.RosLink = page_module.RosLink, _Link
+    link, page_module.RosLink = page_module.RosLink, _SceneOnly
     server = make_server(LOOPBACK, any_free_port(), lambda link: None)
     try:
 
@@ -164,7 +164,7 @@ def page_controls() -> Iterator[str]:
         page = asyncio.run_coroutine_threadsafe(made(), loop).result(PATIENCE_S)
         page.link.listen()
         deadline = time.monotonic() + PATIENCE_S
-        while page.scenario is None and time.monotonic() < deadline:
+        while page.scenes.scenario is None and time.monotonic() < deadline:
             time.sleep(0.02)
     finally:
         page_module.RosLink = link
