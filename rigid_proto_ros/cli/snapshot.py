@@ -13,7 +13,7 @@ from .options import add_session
 
 EXAMPLES = (
     ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
-    ("rigid_proto snapshot out/flight.rrd --at 4 -o out/view.png --view Flight --size 800x600", "one view of it"),
+    ("rigid_proto snapshot out/flight.rrd --at 4 -o out/view.png --view Motion --size 800x600", "one view of it"),
 )
 
 
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--view",
         metavar="NAME",
         default="",
-        help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Flight",
+        help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Motion",
     )
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
 

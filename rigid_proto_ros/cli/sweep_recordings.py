@@ -16,7 +16,7 @@ from ..sweep.study import Study
 from ..sweep.variation import Variation, variation
 
 if TYPE_CHECKING:
-    from ..rerun_view.ensemble import Flight
+    from ..rerun_view.ensemble import EnsembleMember
 
 MAX_GHOSTS = 12
 """Side by side: more can't be told apart."""
@@ -42,8 +42,8 @@ def record_ghosts(study: Study, rows: list[int], file: str) -> None:
     record_ensemble(file, [_flight(study, row) for row in rows], study.name)
 
 
-def _flight(study: Study, number: int) -> Flight:
-    from ..rerun_view.ensemble import Flight
+def _flight(study: Study, number: int) -> EnsembleMember:
+    from ..rerun_view.ensemble import EnsembleMember
 
     row = variation(study, number)
     scenario = row.scenario
@@ -58,7 +58,7 @@ def _flight(study: Study, number: int) -> Flight:
         times_ns.append(time_ns)
         states.append(state.row)
     body, surface = scenario.setup.body, scenario.setup.surface
-    return Flight(
+    return EnsembleMember(
         label=f"row_{number}",
         vertices=surface.vertices if surface else None,
         triangles=surface.triangles if surface else None,

@@ -12,7 +12,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Flight:
+class EnsembleMember:
     """label: what the viewer calls it. vertices (n, 3) and triangles (m, 3) in mesh coordinates, or None. scale (3,),
     center_of_mass (3,) [m, mesh axes after scale]. times_ns (k,), states (k, 13).
     """
@@ -26,7 +26,7 @@ class Flight:
     states: np.ndarray
 
 
-def record_ensemble(path: str, flights: list[Flight], name: str) -> None:
+def record_ensemble(path: str, flights: list[EnsembleMember], name: str) -> None:
     """Write the flights to an .rrd file; raises InputError where that can't be."""
     import rerun as rr
 

@@ -60,7 +60,7 @@ class Layout:
     """A blueprint; those of its views whose camera stands as far away as the body is large; and its plots by entity."""
 
     blueprint: Any
-    flights: tuple[Any, ...]
+    body_views: tuple[Any, ...]
     plots: dict[str, list[Any]]
 
 
@@ -105,15 +105,15 @@ def layout(size: float, initial_view: str, subject: Subject) -> Layout:
     """For a body of this size [m]: three tabs, ``initial_view`` in front."""
     plots = PlotViews()
     lesson_hides = tuple(entity for entity in LESSON if not (subject.boxed and entity == e.BOUNDING_BOX))
-    flights = (
-        flight_view(size, "Flight", lesson_hides, subject),
-        flight_view(size, "All shapes", DEBUGGING, subject),
-        flight_view(size, "Plain", PLAIN, subject),
+    body_views = (
+        body_view(size, "Motion", lesson_hides, subject),
+        body_view(size, "All shapes", DEBUGGING, subject),
+        body_view(size, "Plain", PLAIN, subject),
     )
     tabs = {
-        "lesson": lesson(flights[0], subject, plots),
-        "debugging": debugging(flights[1], plots),
-        "plain": flights[2],
+        "lesson": lesson(body_views[0], subject, plots),
+        "debugging": debugging(body_views[1], plots),
+        "plain": body_views[2],
     }
     blueprint = rrb.Blueprint(
         rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
@@ -122,7 +122,7 @@ def layout(size: float, initial_view: str, subject: Subject) -> Layout:
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
     )
-    return Layout(blueprint, flights, plots.made)
+    return Layout(blueprint, body_views, plots.made)
 
 
 def camera(size: float, subject: Subject) -> Any:
@@ -185,7 +185,7 @@ DEBUGGING: tuple[str, ...] = ()
 PLAIN = (*LESSON, e.BODY_AXES, e.ANGULAR_VELOCITY, e.MOMENTUM, e.TRAIL, e.COM_TRAIL, e.STRING_LINE)
 
 
-def flight_view(size: float, name: str, hidden: tuple[str, ...], subject: Subject) -> Any:
+def body_view(size: float, name: str, hidden: tuple[str, ...], subject: Subject) -> Any:
     """The body in the world, followed by the camera, with its trail."""
     return rrb.Spatial3DView(
         origin="/" + e.CENTRE,

@@ -38,7 +38,7 @@ class SentLayout:
             self._subject = subject
         else:
             made, stream = self._sent
-            for view in made.flights:
+            for view in made.body_views:
                 stream.log(f"{view.blueprint_path()}/EyeControls3D", camera(size, self._subject))
         self._size = size
         self._sent[1].send(recording)

@@ -37,6 +37,9 @@ MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wg
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
 
+FORMER_NAMES = {"flight": "motion"}
+"""Of views, for those who still ask for them."""
+
 STAGES = 4
 """Of a picture: read, viewer started, recording loaded, drawn."""
 
@@ -198,7 +201,9 @@ def bring_to_front(client: Any, name: str) -> str | None:
     blueprint = client.get_blueprint(of="recording").blueprint
     views = {f"view/{view.view_id}": view.name for view in client.get_state().views}
     found = _walk(blueprint, f"container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}", views, ())
-    path = next((path for path, called in found if called.lower() == name.strip().lower()), None)
+    wanted = name.strip().lower()
+    wanted = FORMER_NAMES.get(wanted, wanted)
+    path = next((path for path, called in found if called.lower() == wanted), None)
     if path is None:
         raise InputError("--view", name, "one of " + ", ".join(sorted({called for _, called in found})))
     for parent, child in zip(path[:-1], path[1:], strict=True):

@@ -44,7 +44,7 @@ def test_the_box_is_shown_around_a_body_whose_principal_axes_are_not_those_of_it
     for straight in ("book", "t_handle", "hollow_box", "spinning_top"):
         assert not skewed(np.asarray(read_scene(straight, {}).setup.body.inertia)), straight
     hidden = f"- /{e.BOUNDING_BOX}/**"
-    shown = {k: str(layout(1.0, "lesson", Subject(skewed=k)).flights[0].contents) for k in (False, True)}
+    shown = {k: str(layout(1.0, "lesson", Subject(skewed=k)).body_views[0].contents) for k in (False, True)}
     assert hidden in shown[False] and hidden not in shown[True]
 
 

@@ -230,5 +230,5 @@ def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, i
         viewer.set_time(e.SIM_TIME, duration=at_s, play_state="paused")
         viewer.take_screenshot()
         assert complaints(viewer) == []
-    expected = {"lesson": "Flight", "debugging": "All shapes", "plain": "Plain"}[initial_view]
+    expected = {"lesson": "Motion", "debugging": "All shapes", "plain": "Plain"}[initial_view]
     assert expected in {view.name for view in viewer.get_state().views if view.visible}

@@ -82,7 +82,7 @@ def test_tabs_and_views_behind_the_front_one_can_be_drawn_by_name(recording, tmp
     with Image.open(tmp_path / "State.png") as part, Image.open(tmp_path / "debugging.png") as whole:
         assert part.width < whole.width == 1000
     args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"), "--view", "nothing")
-    with pytest.raises(InputError, match="Debugging.*Flight.*Lesson"):
+    with pytest.raises(InputError, match="Debugging.*Lesson.*Motion"):
         args.run(args)
 
 
