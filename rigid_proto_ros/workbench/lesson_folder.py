@@ -11,7 +11,9 @@ import viser
 
 from ..base.bundled import example_path
 from ..scene.lessons import Lesson, lessons
+from ..scene.scenario import Scenario
 from ..scene.scene_file import read_scene_text
+from .lesson_progress import LessonProgress
 from .scene_loader import SceneLoader
 from .situation import SituationControl, situation_of
 from .status import Announcements
@@ -47,6 +49,7 @@ class LessonFolder:
         self._show = show
         self._label_contacts = label_contacts
         self._lessons: dict[str, Lesson] = {lesson.title: lesson for lesson in lessons()}
+        self._progress = LessonProgress()
         self._shown_for_lesson: tuple[str, ...] = ()
         self._speed_before_lesson: float | None = None
         with play_tab, gui.add_folder("Lesson", order=-1.0):
@@ -83,11 +86,46 @@ class LessonFolder:
             values = read_scene_text(lesson.path.read_text("utf-8")).values
         contacts = {n.removeprefix("contacts."): v for n, v in values.items() if n.startswith("contacts.")}
         self._label_contacts(contacts, str(values.get("mesh", "")))
+        self._progress.begin("" if lesson is None else lesson.name)
+        self._show_text()
+
+    def _show_text(self) -> None:
+        lesson = self._lesson
         if lesson is None:
             self._text.content = ""
-        else:
-            steps = "\n".join(f"{k}. {sentence}" for k, sentence in enumerate(lesson.sentences, 1))
-            self._text.content = f"{steps}\n\n{lesson.reason}"
+            return
+        marks = ["✓ " if k < self._progress.done else "" for k in range(len(lesson.sentences))]
+        steps = (
+            f"{k}. {mark}{sentence}" for k, (mark, sentence) in enumerate(zip(marks, lesson.sentences, strict=True), 1)
+        )
+        self._text.content = "\n".join(steps) + f"\n\n{lesson.reason}"
+
+    @property
+    def steps_done(self) -> int:
+        """How many steps of the lesson are marked as carried out."""
+        return self._progress.done
+
+    def did(self, what: str) -> None:
+        """Something that a step may ask for, as lesson_progress.STEPS names it, was done on the page."""
+        if self._progress.did(what):
+            self._show_text()
+
+    def acted(self, kind: str) -> None:
+        """An event of this kind acted on the body."""
+        self.did("drag" if kind == "string_target" else kind)
+
+    def changed(self, old: Scenario, new: Scenario) -> None:
+        """Parameters were set."""
+        before = old.parameters.named()
+        for name, value in new.parameters.named().items():
+            if before.get(name) != value:
+                self.did(f"set {name}")
+
+    def watched(self, times_ns: Sequence[int]) -> None:
+        """The body was seen at these simulated times."""
+        for time_ns in times_ns:
+            if self._progress.watched(time_ns):
+                self._show_text()
 
     def show_lesson_named(self, name: str) -> None:
         """The page was started with the scene of a lesson."""
@@ -113,6 +151,8 @@ class LessonFolder:
         changes = {**situation.changes, **self._speed(present.real_time_factor)}
         await self._situations.take_to(replace(situation, changes=changes))
         self._situations.another_body = True
+        self._progress.begin("" if self._lesson is None else self._lesson.name)
+        self._show_text()
 
     def _speed(self, present: float) -> dict[str, object]:
         """What the lesson needs for a speed, and after it what was before."""

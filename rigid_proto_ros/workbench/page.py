@@ -115,7 +115,7 @@ class Page:
             announcements,
             lambda scene, script: self.lessons.fly(scene, script),
         )
-        show_tab = ShowTab(gui, tabs, self.view, announcements)
+        show_tab = ShowTab(gui, tabs, self.view, announcements, lambda name: self.lessons.did(f"show {name}"))
         self.lessons = LessonFolder(
             gui,
             self._panel.play_tab,
@@ -219,6 +219,7 @@ class Page:
             self.pointer.attach_com(self._com)
         if old is not None:
             self.follower.changed(old, scenario)
+            self.lessons.changed(old, scenario)
         self.body_tab.changed(scenario, another)
         self._upload.flies(str(scenario.parameters.mesh))
         self._controls.update(scenario.parameters.named())
@@ -253,6 +254,7 @@ class Page:
             self._set_paused(bool(content.get("data")))
         elif kind == "string_attach":
             self.pointer.knot_moved()
+        self.lessons.acted(kind)
 
     def _on_begin(self) -> None:
         self.side_by_side.restart()
@@ -271,6 +273,7 @@ class Page:
         if self.scenes.scenario is not None:
             self.follower.follow(self.scenes.scenario, now_s)
             if self.follower.state is not None:
+                self.lessons.watched([time_ns for time_ns, _ in heard.states])
                 self._draw(now_s, self.scenes.scenario, self.follower.state)
         self.pointer.hold()
         if now_s >= self._slow_due_s:

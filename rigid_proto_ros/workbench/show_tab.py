@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,16 @@ from .status import Announcements
 
 
 class ShowTab:
-    """One switch for each of SWITCHES. ``show`` does what a click on them does, for lessons and keys."""
+    """One switch for each of SWITCHES. ``show`` does what a click on them does, for lessons and keys. on_shown(name) is
+    told of what is switched on."""
 
     def __init__(
-        self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, view: SceneView, announcements: Announcements
+        self,
+        gui: viser.GuiApi,
+        tabs: viser.GuiTabGroupHandle,
+        view: SceneView,
+        announcements: Announcements,
+        on_shown: Callable[[str], None],
     ) -> None:
         self._switches: dict[str, Any] = {}
         with tabs.add_tab("Show"):
@@ -28,6 +34,8 @@ class ShowTab:
                 @switch.on_update
                 async def _(_: viser.GuiEvent[Any], name: str = name, switch: Any = switch) -> None:
                     view.switch(name, switch.value)
+                    if switch.value:
+                        on_shown(name)
 
             point = gui.add_text(
                 "Point of the path", "", hint="x y z in mesh coordinates; empty: the vertex farthest from the COM"

@@ -20,7 +20,7 @@ from lesson_flights import degrees_between  # noqa: E402
 from rigid_proto_ros.base.bundled import scene_names  # noqa: E402
 from rigid_proto_ros.base.rotation import matrix_from_quaternion  # noqa: E402
 from rigid_proto_ros.scene.lessons import SENTENCES, lesson  # noqa: E402
-from rigid_proto_ros.workbench import controls, lesson_folder  # noqa: E402
+from rigid_proto_ros.workbench import controls, lesson_folder, lesson_progress  # noqa: E402
 from rigid_proto_ros.workbench import page as page_module  # noqa: E402
 from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL  # noqa: E402
 
@@ -33,6 +33,10 @@ class User(FlownPage):
     """Remembers what was seen."""
 
     remembered: object = None
+
+    def widget_text(self) -> str:
+        """What the lesson says."""
+        return self.page.lessons._text.content
 
     @property
     def body(self):
@@ -543,7 +547,8 @@ def user() -> Iterator[User]:
 
 
 def test_every_sentence_of_every_lesson_has_a_step() -> None:
-    assert sorted(STEPS) == scene_names()
+    assert sorted(STEPS) == scene_names() == sorted(lesson_progress.STEPS)
+    assert {len(steps) for steps in lesson_progress.STEPS.values()} == {SENTENCES}
     assert {len(steps) for steps in STEPS.values()} == {SENTENCES}
 
 
@@ -553,6 +558,11 @@ def test_every_step_of_the_lesson_can_be_done_on_the_page_and_shows_what_it_says
     user.said.clear()
     user.link.refused.clear()
     user.pick(lesson(name).title)
-    for step in STEPS[name]:
+    assert user.page.lessons.steps_done == 0
+    for number, step in enumerate(STEPS[name]):
         step(user)
+        assert user.page.lessons.steps_done >= number, "a step before isn't marked as carried out"
+    user.fly(1.0)
+    user.until(lambda: user.page.lessons.steps_done == SENTENCES, "mark at the last step")
+    assert user.widget_text().count("✓") == SENTENCES
     assert not user.said and not user.link.refused and not user.link.simulation.refused
