@@ -242,7 +242,9 @@ class Flusher:
         self._add_indices()
 
     def _add_indices(self) -> None:
-        """What a file of unknown length lacks, once it is whole; a process that is killed meanwhile leaves it as it was."""
+        """What a file of unknown length lacks, once it is whole; a process that is killed meanwhile
+        leaves it as it was.
+        """
         end = time.monotonic() + INDEX_S
         while self._open_ended and self._without_index:
             path = self._without_index.pop(0)

@@ -81,7 +81,9 @@ def repair(path: Path, repaired: Path) -> None:
 
 
 def add_index(path: Path, timeout_s: float) -> str:
-    """Give a recording that was ended without one its index, in place and at once or not at all; returns the reason for not."""
+    """Give a recording that was ended without one its index, in place and at once or not at all; returns
+    the reason for not.
+    """
     if path.stat().st_size > INDEXED_BYTES:
         return f"larger than {INDEXED_BYTES / 1e6:.0f} MB"
     indexed = path.with_name(f".{path.stem}.indexed.rrd")
