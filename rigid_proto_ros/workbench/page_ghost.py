@@ -55,7 +55,7 @@ class PageGhost:
         self._ghost = None
         if setup is not None:
             initial = setup.initial if state.time_ns == 0 else _beside(scenario, setup, state)
-            self._ghost = Ghost(replace(scenario, ghost=replace(setup, initial=initial)), self._observer)
+            self._ghost = Ghost(replace(setup, initial=initial), self._observer)
 
     def changed(self, scenario: Scenario, state: State) -> None:
         """Parameters changed at ``state``."""

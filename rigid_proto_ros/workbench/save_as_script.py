@@ -127,11 +127,12 @@ class _Writer(Observer):
     def _add(self, time_ns: int, entry: dict) -> None:
         self.entries.append({"t": time_ns / 1e9, **entry})
 
-    def _attach(self, content: dict) -> tuple[float, ...]:
+    def _attach(self, content: dict) -> tuple[float, float, float]:
         """The point in mesh coordinates, not yet taken onto the surface: that happens again."""
         simulation = self._again.simulation
         command = TieString(content["axes"], tuple(content["point"]))
-        return tuple(mesh_point(command, simulation.setup.body, simulation.state).tolist())
+        x, y, z = mesh_point(command, simulation.setup.body, simulation.state).tolist()
+        return x, y, z
 
     def _change(self, time_ns: int, content: dict) -> None:
         before, after = self._last, self._again.scenario
