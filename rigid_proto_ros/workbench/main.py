@@ -17,8 +17,8 @@ from ..ros.shutdown import Shutdown
 PATIENCE_S = 10.0
 """[s] For a node that is said to be running: discovery takes less than one of them."""
 
-LAST_WORD_S = 0.2
-"""[s] For the last word to reach the browsers."""
+LAST_MESSAGE_S = 0.2
+"""[s] For the last message to reach the browsers."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -75,7 +75,7 @@ def serve(args: argparse.Namespace, shutdown: Shutdown) -> int:
     finally:
         running.cancel()
         page.deliver(page.show_ended)
-        time.sleep(LAST_WORD_S)
+        time.sleep(LAST_MESSAGE_S)
         stop_server(server)
         page.close()
     return 0

@@ -44,7 +44,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 _TRIGGERS = ("reset", "step", "clear_wrench", "string/release")
 
-LAST_WORD_S = 1.0
+LAST_ANSWER_S = 1.0
 """[s] That a node may take to answer the last call before the link closes; a running one takes milliseconds."""
 
 
@@ -118,7 +118,7 @@ class RosLink:
 
     def close(self) -> None:
         """Leave ROS, once the last call is answered: a request that nobody waits for may never leave."""
-        deadline = time.monotonic() + LAST_WORD_S
+        deadline = time.monotonic() + LAST_ANSWER_S
         while self._last_call is not None and not self._last_call.done() and time.monotonic() < deadline:
             time.sleep(0.01)
         self._executor.shutdown(timeout_sec=0.5)

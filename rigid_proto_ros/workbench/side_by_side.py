@@ -25,7 +25,7 @@ START = "True tensor against its box's"
 
 
 class SideBySide:
-    """The button that releases a body and its ghost alike, and what is said of the two. start() brings that about."""
+    """The button that releases a body and its ghost alike, and what is said of the two. start() does it."""
 
     def __init__(self, gui: viser.GuiApi, start: Callable[[], Awaitable[None]]) -> None:
         button = gui.add_button(
