@@ -45,8 +45,8 @@ TEST = [
 
 
 def environments_python() -> str:
-    """What the executables that colcon installs start with: the system's Python has no numba, so that where it builds, the
-    active virtual environment's is taken, else that of `make setup`, else its own.
+    """What the executables that colcon installs start with: the system's Python has no numba, so that where it builds,
+    the active virtual environment's is taken, else that of `make setup`, else its own.
     """
     places = [Path(os.environ["VIRTUAL_ENV"])] if os.environ.get("VIRTUAL_ENV") else []
     places.append(Path(__file__).resolve().parent / ".venv")

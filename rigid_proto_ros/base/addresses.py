@@ -3,9 +3,9 @@
 
 A kernel's address stands in an array of integers, so that one loop can call whichever kernel a segment needs without
 compiling the others in; what is called there is the machine code that numba made of the kernel for one fixed signature.
-Compiling or loading it waits until somebody asks for the address. Arrays are found by their addresses because a compiled
-function that is handed arrays inspects each of them first, at more cost than a short flight has: whoever gives an
-address away keeps the array.
+Compiling or loading it waits until somebody asks for the address. Arrays are found by their addresses because a
+compiled function that is handed arrays inspects each of them first, at more cost than a short flight has: whoever gives
+an address away keeps the array.
 """
 
 from __future__ import annotations

@@ -27,8 +27,8 @@ def cpu() -> str:
 
 @cache
 def versions(*others: str) -> dict[str, str]:
-    """Versions of this package, of Python, of what it computes with and of ``others``, by name; what isn't installed is left
-    out.
+    """Versions of this package, of Python, of what it computes with and of ``others``, by name; what isn't installed is
+    left out.
     """
     found = {"rigid_proto_ros": __version__, "python": platform.python_version()}
     for name in (*PACKAGES, *others):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the installed executables start: where a package is missing that each of them needs, one line says what to install.
+"""What the installed executables start: where a package is missing that each of them needs, one line says what to
+install.
 
 Nothing of ours but this is imported before that is known.
 """
@@ -43,8 +44,8 @@ def _remedy(needs_ros: bool) -> str:
     missing = [name for module, name in NUMERICS.items() if importlib.util.find_spec(module) is None]
     if missing:
         return (
-            f"{' and '.join(missing)} not found by {sys.executable}; run `make setup` in the repository and `colcon build` again, "
-            f"or install into an active virtual environment: pip install {' '.join(missing)}"
+            f"{' and '.join(missing)} not found by {sys.executable}; run `make setup` in the repository and "
+            f"`colcon build` again, or install into an active virtual environment: pip install {' '.join(missing)}"
         )
     if needs_ros and importlib.util.find_spec("rclpy") is None:
         return (

@@ -100,7 +100,9 @@ def _row(values: Iterable[float]) -> str:
 
 
 def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
-    """What ``--compare`` prints: a paragraph for each link, one line for those that merely have no inertial, and a count."""
+    """What ``--compare`` prints: a paragraph for each link, one line for those that merely have no
+    inertial, and a count.
+    """
     styles = {"ok": "green", "off": "bold red"}
     for d in diagnoses:
         if d.status == "missing":

@@ -42,13 +42,14 @@ EXAMPLES = (
 
 
 def own_arguments(argv: list[str]) -> argparse.Namespace:
-    """``bodies``: the files behind ``--bodies``; ``until``: seconds, or None. Everything else outside ``--ros-args ... [--]`` ends the process:
-    --help with 0, what isn't known with 2 and the nearest option. Options inside that rcl wouldn't know are refused,
-    too.
+    """``bodies``: the files behind ``--bodies``; ``until``: seconds, or None. Everything else outside ``--ros-args ...
+    [--]`` ends the process: --help with 0, what isn't known with 2 and the nearest option. Options inside that rcl
+    wouldn't know are refused, too.
     """
     parser = Parser(
         prog="rigid_body_node",
-        usage="rigid_body_node [--bodies SCENE ...] [--until S] [--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
+        usage="rigid_body_node [--bodies SCENE ...] [--until S] "
+        "[--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
         description="Simulate a rigid body as a ROS 2 node until Ctrl-C. A scene is a ROS parameter file.",
         examples=EXAMPLES,
     )

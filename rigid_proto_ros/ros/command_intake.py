@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
@@ -55,8 +55,8 @@ class CommandIntake:
         node: Node,
         loop: SimulationLoop,
         frames: tuple[str, str],
-        apply_changes: Callable[[dict, BodyMesh | None], Setup],
-        apply_inertia: Callable[[dict], Setup],
+        apply_changes: Callable[[Mapping, BodyMesh | None], Setup],
+        apply_inertia: Callable[[Mapping], Setup],
     ) -> None:
         self.received: Counter[str] = Counter()
         self.late = 0
@@ -163,7 +163,7 @@ class CommandIntake:
         self._loop.simulation.submit(command, self._when(sent.t_ns))
         return 1
 
-    def _no_change(self, changes: dict) -> Setup:
+    def _no_change(self, changes: Mapping) -> Setup:
         raise TypeError(f"no set comes on this topic: {changes}")
 
     def _schedule(self, data: bytes) -> int:

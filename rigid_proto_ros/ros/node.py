@@ -117,11 +117,11 @@ class RigidBodyNode(Node):
         mesh = self.loop.scenario.body_mesh
         return mesh.mesh.path if mesh else ""
 
-    def _apply_scheduled(self, changes: dict, at_hand: BodyMesh | None) -> Setup:
+    def _apply_scheduled(self, changes: Mapping, at_hand: BodyMesh | None) -> Setup:
         """A scheduled ``set`` takes effect: the ROS parameters follow on the executor's thread."""
         return self._take_on(self.loop.scenario.with_changes(changes, at_hand=at_hand))
 
-    def _apply_inertia(self, content: dict) -> Setup:
+    def _apply_inertia(self, content: Mapping) -> Setup:
         """An inertia message takes effect."""
         return self._take_on(check_inertia(self.loop.scenario, content))
 

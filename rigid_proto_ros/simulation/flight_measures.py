@@ -61,7 +61,7 @@ def _extreme(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reach
 
 
 @njit(cache=True, error_model="numpy")
-def measure_flight(
+def measure_flight(  # noqa: C901 - one pass over the states for all kinds of measures
     measures: np.ndarray,
     states: np.ndarray,
     others: np.ndarray,
@@ -73,8 +73,8 @@ def measure_flight(
 ) -> None:
     """Fill out (k,) with the measures (k, MEASURE) of a flight that reached so many of its samples.
 
-    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. watched (m,): which looks count for
-    extremes and firsts. NaN where there is nothing to say: an event that didn't happen, a sample after the end.
+    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. watched (m,): which looks count
+    for extremes and firsts. NaN where there is nothing to say: an event that didn't happen, a sample after the end.
     """
     last = states[reached - 1]
     for j in range(measures.shape[0]):

@@ -50,8 +50,8 @@ def is_structural(vary: Vary) -> bool:
 
 
 class Group:
-    """Rows that share all but numbers. Making one raises InputError or NotBatchable: then the simulation flies its rows,
-    and says what is wrong.
+    """Rows that share all but numbers. Making one raises InputError or NotBatchable: then the simulation flies its
+    rows, and says what is wrong.
     """
 
     def __init__(self, study: Study, structural: Mapping[str, Value], reference: Mapping[str, Value] | None) -> None:

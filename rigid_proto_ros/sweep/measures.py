@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a study measures and when it samples the flight: names in the file become rows of numbers for the compiled measure."""
+"""What a study measures and when it samples the flight: names in the file become rows of numbers for the
+compiled measure.
+"""
 
 from __future__ import annotations
 

@@ -44,9 +44,9 @@ the variables stay.
 class Method:
     """A way to step, and the kernel that does it.
 
-    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
-    samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations: of
-    the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
+    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps,
+    or samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations:
+    of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
     sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
     with a string alone.
     """

@@ -33,7 +33,7 @@ Knot = tuple[float, float, float, float, float]
 
 
 @njit(cache=True, error_model="numpy")
-def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
+def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float, float, float, float]:
     """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m
     and not of 1e-16 m.
     """

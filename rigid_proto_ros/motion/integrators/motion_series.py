@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Power series of the motion under any loads the simulation knows, a string included.
 
-All of the equations of motion are made of products, quotients and one square root, so every coefficient follows from those
-before it by Cauchy products: q' = ½ q ⊗ ω, R from the products of q, the knot's a = d + R r, its distance l from l² = a·a, its
-direction n from n l = a, the tension T = k(l − rest) + c l', the force −T n and its torque r × RᵀF. Source: Jorba and Zou,
-Experimental Mathematics 14 (2005) 99, section 2; Moore, Methods and Applications of Interval Analysis (1979), chapter 3.
+All of the equations of motion are made of products, quotients and one square root, so every coefficient follows from
+those before it by Cauchy products: q' = ½ q ⊗ ω, R from the products of q, the knot's a = d + R r, its distance l from
+l² = a·a, its direction n from n l = a, the tension T = k(l − rest) + c l', the force −T n and its torque r × RᵀF.
+Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 2; Moore, Methods and Applications of Interval
+Analysis (1979), chapter 3.
 """
 
 from __future__ import annotations
@@ -41,8 +42,9 @@ from .knot import Knot, moved_pair, unit_attitude
 
 # Columns of the coefficient array c (degree + 2, COLUMNS); the first 15 are the variables of motion/variables.py.
 _Q, _W, _D, _U, _WORK, _HEAT = 0, 4, 7, 10, 13, 14
-# What products take, sixteen numbers at once, in fours: ω and q as in taylor.py; q's numbers each four times, and (a, l); q
-# three times, and (a, l); R's columns, and n; each component of ω × r, and l, four times; the force F three times, and T four times.
+# What products take, sixteen numbers at once, in fours: ω and q as in taylor.py; q's numbers each four times, and (a,
+# l); q three times, and (a, l); R's columns, and n; each component of ω × r, and l, four times; the force F three
+# times, and T four times.
 _LEFT, _RIGHT, _SPREAD, _REPEATED, _COLUMNS, _SWING, _FORCE = 16, 32, 48, 64, 80, 96, 112
 A_KNOT, DISTANCE = _SPREAD + 12, _SPREAD + 15
 _ALONG, _LENGTHS, TENSION = _COLUMNS + 12, _SWING + 12, _FORCE + 12
@@ -89,7 +91,9 @@ def _each_four_times(v: Packed) -> tuple[Packed, Packed, Packed]:
 
 @njit(cache=True, error_model="numpy")
 def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Packed, Packed]:
-    """Columns of R, or of a coefficient of it, from the products x q, y q and z q; one: 1 for R itself, 0 for its derivatives."""
+    """Columns of R, or of a coefficient of it, from the products x q, y q and z q; one: 1 for R itself, 0
+    for its derivatives.
+    """
     x = mixed(ys, xs, (1, 5, 6, 3)) * _vector(-2.0, 2.0, 2.0, 0.0) + mixed(zs, ys, (2, 3, 7, 3)) * _vector(
         -2.0, 2.0, -2.0, 0.0
     )
@@ -180,7 +184,9 @@ def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
 
 
 @njit(cache=True, error_model="numpy")
-def motion_series(y: np.ndarray, p: np.ndarray, knot: Knot, degree: int, taut: bool, c: np.ndarray) -> None:
+def motion_series(  # noqa: C901 - the recurrences of one order, in their order; a call in between costs more than they do
+    y: np.ndarray, p: np.ndarray, knot: Knot, degree: int, taut: bool, c: np.ndarray
+) -> None:
     """Fill c with the coefficients of the motion from variables y up to ``degree``; knot: where a string is tied,
     its knot; taut: its law.
     """

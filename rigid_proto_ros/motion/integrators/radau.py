@@ -326,7 +326,9 @@ def _solve(M: np.ndarray, x: np.ndarray, size: int) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def radau_step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.ndarray, out: np.ndarray) -> int:
+def radau_step(  # noqa: C901 - loops over stages and unknowns that share their workspace
+    y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.ndarray, out: np.ndarray
+) -> int:
     """One step of h seconds from y into out (STORED,). V (5, 6): velocities at the stages, a guess, then the solution.
 
     Returns how often the equations of motion were evaluated, 0 when no solution was found: the step is too long then.

@@ -5,8 +5,8 @@ series.
 The length of a step is read off the coefficients (integrators/taylor_adaptive.py), so none is rejected. Where a
 pull-only string turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law,
 begun. A step is laid out at its full length first: a series from its start, and where the law changes within it a last
-one from that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and sampling
-within it evaluate those same series.
+one from that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and
+sampling within it evaluate those same series.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ step is taken with one law.
 
 
 _HIGHER = 3
-"""By so much the degree is higher than that of a series of the spin: what a step costs beside its series is more here."""
+"""By so much the degree is higher than that of a series of the spin: what a step costs beside its series
+is more here.
+"""
 
 
 @njit(cache=True, error_model="numpy")

@@ -57,7 +57,9 @@ def is_one_sided(p: np.ndarray) -> bool:
 @njit(cache=True, error_model="numpy")
 def knot_at(y: np.ndarray, p: np.ndarray) -> Knot:
     """The knot of a string at variables y; zeros where none is tied."""
-    return knot_and_stretch(y, p) if p[HAS_STRING] != 0.0 else (0.0, 0.0, 0.0, 0.0, 0.0)
+    if p[HAS_STRING] == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    return knot_and_stretch(y, p)
 
 
 @njit(cache=True, error_model="numpy")
