@@ -54,7 +54,7 @@ COLUMNS = ("problem", "what", "error_rad", "us", "heyoka_us", "ratio")
 def carry_from_start(at, until_ns):
     """One segment of the flight whose arrays are at this address: its steps, and the look at the end."""
     f, n, _, _, _, methods = _arrays(at)
-    return fl.carry(f, n, methods, until_ns)
+    return fl.advance_segment(f, n, methods, until_ns)
 
 
 def kernel_runs(problem: Problem, accuracy: float):
