@@ -56,7 +56,9 @@ def draw_comparison(page: Page, picture: Path) -> None:
     actions = ["rigid_proto workbench", "open the page"]
     page.button(START)
     actions.append(f"click {START!r}")
+    before_s = page.readout[0]
     found = page.until(lambda: re.search(r"(\d+)° apart", page.text), "the angle between body and ghost")
+    page.until(lambda: page.readout[0] < before_s, "a new beginning")
     print(
         f"{len(actions)} actions ({', '.join(actions)}), seen {time.monotonic() - began:.1f} s after the click: {found[0]}"
     )
