@@ -108,11 +108,10 @@ def _judge_edges(
         message = f"{_count(copies, 'duplicate face')}, which would count twice"
         verdict.add("duplicate_faces", ERROR, message, "--repair (mesh_repair) removes the copies")
     if topology.unbalanced and not topology.watertight:
-        uses = topology.edges[:, 2] + topology.edges[:, 3]
-        odd = int(np.count_nonzero(uses % 2))
-        edges = _count(len(topology.boundary), "boundary edge")
-        if odd > len(topology.boundary):
-            edges += f" and {_count(odd - len(topology.boundary), 'edge')} of 3 or more faces"
+        rim = len(topology.boundary)
+        edges = _count(rim, "boundary edge")
+        if topology.odd > rim:
+            edges += f" and {_count(topology.odd - rim, 'edge')} of 3 or more faces"
         known = _known_volume(sums, half, "how holes are closed")
         capped = _capped_volume(topology, sums, vertices)
         if capped is not None:

@@ -9,8 +9,8 @@ from ..base.compilation import njit
 from .nesting import triangles_cross
 from .tree import LEAF, triangle_tree
 
-MAX_TRIANGLES = 50_000
-"""Above this many triangles the surface isn't examined: a search takes about two microseconds a triangle."""
+MAX_TRIANGLES = 20_000
+"""Above this many triangles the surface isn't examined: a search takes some microseconds a triangle."""
 WORK_LIMIT = 30_000_000
 """Boxes visited after which the search ends, some tenths of a second."""
 
@@ -54,9 +54,19 @@ def _crossings(
             first = (node - leaves + 1) * LEAF
             for j in range(max(first, i + 1), min(first + LEAF, len(order))):
                 t = corners[order[j]]
-                if component[order[i]] == component[order[j]] and not _touch(s, t):
+                if component[order[i]] == component[order[j]] and not _touch(s, t) and _near(vertices, t, lower, upper):
                     found += triangles_cross(vertices, s, t)
     return found
+
+
+@njit(cache=True, nogil=True)
+def _near(vertices: np.ndarray, t: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Whether the box of triangle t (3,) meets the one from lower to upper (3,)."""
+    near = True
+    for k in range(3):
+        x, y, z = vertices[t[0], k], vertices[t[1], k], vertices[t[2], k]
+        near = near and min(x, y, z) <= upper[k] and max(x, y, z) >= lower[k]
+    return near
 
 
 @njit(cache=True, nogil=True)

@@ -120,6 +120,22 @@ def _sort(keys: np.ndarray, first: int, last: int) -> None:
 
 
 @njit(cache=True, nogil=True)
+def _counts(table: np.ndarray) -> tuple[int, int, int, int]:
+    """Numbers of edges of an odd number of uses, of unequal uses in both directions, of both but even, of
+    more than two.
+    """
+    odd = unbalanced = flipped = many = 0
+    for e in range(table.shape[0]):
+        uses = table[e, 2] + table[e, 3]
+        unequal = table[e, 2] != table[e, 3]
+        odd += uses & 1
+        unbalanced += unequal
+        flipped += unequal and not uses & 1
+        many += uses > 2
+    return odd, unbalanced, flipped, many
+
+
+@njit(cache=True, nogil=True)
 def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray, int, bool]:
     """Match the sides of ``corners`` (m, 3) edge by edge, and join triangles that share one.
 
@@ -175,6 +191,10 @@ class Topology:
     high→low, first triangle, second triangle or −1. component (m,): number of each triangle's component, counted from
     0 by first appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding.
     opposites: triangles that repeat an earlier one with the opposite winding. degenerate: triangles without area.
+
+    odd: edges that an odd number of triangles share. unbalanced: edges used more often in one direction than in the
+    other; 0 says that the surface bounds a volume. flipped: the even ones among those. nonmanifold: edges of more than
+    two triangles.
     """
 
     corners: np.ndarray
@@ -184,6 +204,10 @@ class Topology:
     duplicates: np.ndarray
     opposites: int
     degenerate: int
+    odd: int
+    unbalanced: int
+    flipped: int
+    nonmanifold: int
 
     @property
     def boundary(self) -> np.ndarray:
@@ -191,25 +215,9 @@ class Topology:
         return self.edges[self.edges[:, 2] + self.edges[:, 3] == 1]
 
     @property
-    def unbalanced(self) -> int:
-        """Edges used more often in one direction than in the other; 0 says that the surface bounds a volume."""
-        return int(np.count_nonzero(self.edges[:, 2] != self.edges[:, 3]))
-
-    @property
-    def flipped(self) -> int:
-        """Edges that an even number of triangles share, but not half of them in each direction."""
-        uses = self.edges[:, 2] + self.edges[:, 3]
-        return int(np.count_nonzero((uses % 2 == 0) & (self.edges[:, 2] != self.edges[:, 3])))
-
-    @property
-    def nonmanifold(self) -> int:
-        """Edges that more than two triangles share."""
-        return int(np.count_nonzero(self.edges[:, 2] + self.edges[:, 3] > 2))
-
-    @property
     def watertight(self) -> bool:
         """No edge is used an odd number of times."""
-        return not np.any((self.edges[:, 2] + self.edges[:, 3]) & 1)
+        return self.odd == 0
 
 
 @njit(cache=True, nogil=True)
@@ -234,7 +242,8 @@ def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     edges, component, components, repeats = _edges(corners, len(vertices))
     duplicates, opposites = _repeated(corners) if repeats else (np.zeros(len(corners), dtype=bool), 0)
     degenerate = int(_without_area(vertices, triangles))
-    return Topology(corners, edges, component, components, duplicates, opposites, degenerate)
+    counts = (int(count) for count in _counts(edges))
+    return Topology(corners, edges, component, components, duplicates, opposites, degenerate, *counts)
 
 
 def _repeated(corners: np.ndarray) -> tuple[np.ndarray, int]:

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""Mutated files: every reader, the verdict and the repair give a mesh, a verdict or one line, never another exception."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mass_solids import box, inward, moved, sphere, together
+from mesh_files import CUBE_QUADS, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mesh.reading import Mesh, _read
+
+SEEDS = {
+    "a.obj": obj(faces=CUBE_QUADS),
+    "a.off": off(),
+    "a.ply": ply(faces=CUBE_QUADS),
+    "b.ply": ply_binary(),
+    "c.ply": ply_binary(faces=CUBE_QUADS, big=True),
+    "a.stl": stl(),
+    "b.stl": stl_text(),
+}
+WORDS = [
+    b"nan",
+    b"-1",
+    b"1e999",
+    b"99999999999999999999",
+    b"\0",
+    b"/",
+    b"\n",
+    b" ",
+    b"\xff\xfe",
+    b"#",
+    b"f 1 1 1\n",
+    b"0x1",
+    b"e",
+    b"\r",
+]
+
+
+def mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """One to four changes: a byte, a word put in, a piece cut out, doubled, or the end cut off."""
+    for _ in range(int(rng.integers(1, 5))):
+        if not data:
+            break
+        at, end = sorted(rng.integers(0, len(data) + 1, 2).tolist())
+        kind = rng.integers(0, 6)
+        if kind == 0:
+            data = data[:at] + bytes([int(rng.integers(0, 256))]) + data[at + 1 :]
+        elif kind == 1:
+            data = data[:at] + WORDS[int(rng.integers(len(WORDS)))] + data[at:]
+        elif kind == 2:
+            data = data[:at] + data[min(end, at + 40) :]
+        elif kind == 3:
+            data = data[:end] + data[at:end][:200] + data[end:]
+        elif kind == 4:
+            data = data[:end]
+        else:
+            data = data[:at] + bytes([int(rng.integers(48, 58))]) + data[at + 1 :]
+    return data
+
+
+def read_mutated(count: int, seed: int) -> int:
+    """Read ``count`` mutated files of every kind and repair what could be read; returns how many could."""
+    rng = np.random.default_rng(seed)
+    read = 0
+    for name, data in SEEDS.items():
+        for _ in range(count):
+            changed = mutated(data, rng)
+            try:
+                content = _read(changed, Path(name), 10_000)
+            except InputError as error:
+                assert str(error).isprintable(), (name, str(error))
+                continue
+            assert content.triangles.shape[1:] == (3,) and content.vertices.shape[1:] == (3,)
+            assert not content.triangles.size or 0 <= content.triangles.min() <= content.triangles.max() < len(
+                content.vertices
+            )
+            read += 1
+            repaired(content.vertices, content.triangles, content.polygon_starts, f"{seed} {name} {read}")
+    return read
+
+
+def repaired(vertices: np.ndarray, triangles: np.ndarray, starts: np.ndarray | None, name: str) -> None:
+    """A closed verdict after repair has a positive volume; a refusal is an InputError."""
+    mesh = Mesh("made", "/made.obj", vertices, triangles, starts, name)
+    for kind in (True, "union"):
+        try:
+            body = mesh_body(mesh, repair=kind)
+            if body.verdict.closed:
+                assert body.moments.moments("solid").measure > 0.0
+        except InputError as error:
+            assert str(error).isprintable()
+
+
+def repair_broken(count: int, seed: int) -> None:
+    """Repair ``count`` surfaces whose faces were cut out, doubled, turned or bent, and whose vertices were moved."""
+    rng = np.random.default_rng(seed)
+    whole = [
+        box(cells=2),
+        sphere(5),
+        together(box((2.0, 2.0, 2.0), 2), inward(sphere(4))),
+        together(box(cells=2), moved(box(cells=2), (0.5, 0.25, 0.0))),
+    ]
+    for number in range(count):
+        vertices, triangles = whole[number % len(whole)]
+        vertices, triangles = vertices.copy(), triangles.copy()
+        for _ in range(int(rng.integers(1, 5))):
+            chosen = rng.random(len(triangles)) < rng.choice([0.02, 0.1, 0.5])
+            kind = rng.integers(0, 6)
+            if kind == 0 and not chosen.all():
+                triangles = triangles[~chosen]
+            elif kind == 1:
+                triangles = np.concatenate([triangles, triangles[chosen]])
+            elif kind == 2:
+                triangles[chosen] = triangles[chosen][:, [0, 2, 1]]
+            elif kind == 3:
+                triangles[rng.integers(len(triangles)), rng.integers(3)] = rng.integers(len(vertices))
+            elif kind == 4:
+                soup = vertices[triangles].reshape(-1, 3)
+                vertices = soup + rng.choice([0.0, 1e-15, 1e-9, 1e-6]) * rng.uniform(-1.0, 1.0, soup.shape)
+                triangles = np.arange(len(soup)).reshape(-1, 3)
+            else:
+                vertices[rng.integers(len(vertices))] = vertices[rng.integers(len(vertices))]
+        repaired(vertices, triangles, None, f"{seed} {number}")
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+
+
+def test_mutated_files_give_a_mesh_or_one_line():
+    assert read_mutated(40, 1) > 20
+
+
+def test_broken_surfaces_are_repaired_or_refused():
+    repair_broken(80, 2)
+
+
+@pytest.mark.stress
+def test_ten_thousand_mutated_files_of_each_kind():
+    read_mutated(10_000, 3)
+
+
+@pytest.mark.stress
+def test_ten_thousand_broken_surfaces():
+    repair_broken(10_000, 4)
+
+
+def test_the_seeds_themselves_are_read():
+    for name, data in SEEDS.items():
+        assert np.array_equal(
+            np.unique(_read(data, Path(name), 100).vertices, axis=0), np.unique(CUBE_VERTICES, axis=0)
+        )
