@@ -277,7 +277,7 @@ def _cap_holes(surface: RepairedSurface) -> list[str]:
 def _turn_outward(surface: RepairedSurface) -> list[str]:
     """Outermost components outward, those inside one of them inward, and so on by parity."""
     topology = surface.topology()
-    if topology.unbalanced or topology.components > MAX_NESTED_COMPONENTS:
+    if topology.unbalanced or not 0 < topology.components <= MAX_NESTED_COMPONENTS:
         return []
     extent = referenced_extent(surface.vertices, surface.triangles)
     sums = component_sums(surface.vertices, surface.triangles, topology, 0.5 * extent.lower + 0.5 * extent.upper)

@@ -77,7 +77,7 @@ def _header(data: bytes, name: str) -> tuple[str, list[_Element], int]:
     layout = ""
     elements: list[_Element] = []
     for line in data[:end].decode("ascii", "replace").splitlines()[1:]:
-        words = line.split()
+        words = ["".join(c if c.isprintable() else "?" for c in word) for word in line.split()]
         try:
             if words[:1] == ["format"]:
                 layout = words[1]

@@ -257,6 +257,7 @@ def test_a_ply_whose_faces_name_fractions_of_vertices_is_refused(tmp_path):
         ("nul.obj", b"#" * 5000 + b"\nv 0 0 \0\0\0\nf 1 1 1\n"),
         ("nul.off", b"OFF\n3 1 0\n0 0 0\n\0\0\0 0 0\n1 1 1\n3 0 1 2\n"),
         ("nul.ply", ply().replace(b"element face", b"elem\0\0ent face", 1)),
+        ("name.ply", ply(announced=99).replace(b"element face", b"element f\x13ce", 1)),
     ],
 )
 def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data):
