@@ -291,14 +291,14 @@ def settle(
     frame: Frame,
     force: Numbers,
     torque: Numbers,
-    body: Body,
+    body: Body | None,
     surface: Surface | None,
     contacts: Mapping[str, Vector],
     state: State | None,
 ) -> Load:
     """Settle a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
 
-    state None leaves a ray unsettled: it is checked again when it takes effect.
+    without a body and a state a ray stays unsettled: it is checked again when it takes effect.
     """
     force, torque = vector(force), vector(torque)
     # Of finite numbers a sum that isn't finite overflowed; only then each is looked at.
@@ -321,7 +321,7 @@ def settle(
 
 
 def _mesh_point(
-    frame: Frame, body: Body, surface: Surface | None, contacts: Mapping[str, Vector], state: State | None
+    frame: Frame, body: Body | None, surface: Surface | None, contacts: Mapping[str, Vector], state: State | None
 ) -> Vector | None:
     word, *values = frame.point
     if word == "com":
@@ -338,7 +338,7 @@ def _mesh_point(
         if values[0] >= len(surface.vertices):
             raise CommandRefused("frame", "frame_id", frame.text, f"vertex/0 to vertex/{len(surface.vertices) - 1}")
         return vector(surface.vertices[values[0]])
-    if state is None:
+    if state is None or body is None:
         return None
     R = state.rotation
     origin = body.mesh_point(transposed_times(R, np.asarray(values[0]) - state.position))

@@ -61,7 +61,27 @@ def _extreme(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reach
 
 
 @njit(cache=True, error_model="numpy")
-def measure_flight(  # noqa: C901 - one pass over the states for all kinds of measures
+def _first(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray) -> int:
+    """The first watched sample at which the condition of a measure holds, or −1."""
+    condition = np.array([measure[CODE], measure[A], measure[B]])
+    for k in range(reached):
+        if watched[k] and met(condition, states[k], context):
+            return k
+    return -1
+
+
+@njit(cache=True, error_model="numpy")
+def _largest_difference(code: int, states: np.ndarray, others: np.ndarray, watched: np.ndarray, reached: int) -> float:
+    """Over the watched samples."""
+    largest = 0.0
+    for k in range(reached):
+        if watched[k]:
+            largest = max(largest, difference(code, states[k], others[k]))
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def measure_flight(
     measures: np.ndarray,
     states: np.ndarray,
     others: np.ndarray,
@@ -73,7 +93,7 @@ def measure_flight(  # noqa: C901 - one pass over the states for all kinds of me
 ) -> None:
     """Fill out (k,) with the measures (k, MEASURE) of a flight that reached so many of its samples.
 
-    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. watched (m,): which looks count
+    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. watched (m,): which samples count
     for extremes and firsts. NaN where there is nothing to say: an event that didn't happen, a sample after the end.
     """
     last = states[reached - 1]
@@ -89,18 +109,12 @@ def measure_flight(  # noqa: C901 - one pass over the states for all kinds of me
         elif kind in (LARGEST, SMALLEST):
             out[j] = _extreme(measure, states, watched, reached, context)
         elif kind == FIRST:
-            condition = np.array([measure[CODE], measure[A], measure[B]])
-            for k in range(reached):
-                if watched[k] and met(condition, states[k], context):
-                    out[j] = sample_ns[k] * 1e-9
-                    break
+            first = _first(measure, states, watched, reached, context)
+            if first >= 0:
+                out[j] = sample_ns[first] * 1e-9
         elif kind == FLIPS:
             out[j] = count_flips(measure, states, watched, reached, context)
         elif kind == DIFFERENCE:
             out[j] = difference(code, last, others[reached - 1])
         else:
-            largest = 0.0
-            for k in range(reached):
-                if watched[k]:
-                    largest = max(largest, difference(code, states[k], others[k]))
-            out[j] = largest
+            out[j] = _largest_difference(code, states, others, watched, reached)

@@ -73,7 +73,7 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
     key, *component = target.path
     lower, upper = {"t": (0.0, MAX_TIME_S), "duration": (1e-9, MAX_TIME_S)}.get(key, (-1e100, 1e100))
     within = (values >= lower) & (values <= upper)
-    good = within if values.ndim == 1 else within.all(axis=1)
+    good = within if values.ndim == 1 else np.logical_and.reduce(within, axis=1)
     values = np.where(within, values, 0.0)
     for k in own:
         if key in ("t", "duration"):

@@ -241,7 +241,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[
     return tuple(found)
 
 
-def _check_value(target: Target, value: Any, field: str, values: Mapping[str, object], entries: list) -> None:
+def _check_value(target: Target, value: Any, field: str, values: Mapping[str, Value], entries: list) -> None:
     """Put a value where it will stand, and see whether that is accepted there."""
     changed, copied = dict(values), copy.deepcopy(entries)
     try:

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +33,7 @@ class Target:
     entry: int = 0
     path: tuple = ()
 
-    def put(self, values: dict, entries: list, value: Any) -> None:
+    def put(self, values: MutableMapping[str, Value], entries: list, value: Any) -> None:
         """Set the varied value in parameters (complete ones) or in the script's entries."""
         if self.parameter:
             whole = _with_component(values[self.parameter], self.path[0], value) if self.path else value
@@ -69,8 +69,9 @@ def component_labels(parameter: str, count: int) -> list[str]:
     return _COMPONENTS[count].split() if count in _COMPONENTS else [str(k) for k in range(count)]
 
 
-def _with_component(vector: list, k: int, value: Any) -> list:
-    vector = list(vector) * (3 if len(vector) == 1 else 1)
+def _with_component(vector: Value, k: int, value: Any) -> list:
+    given = vector if isinstance(vector, list) else [vector]
+    vector = list(given) * (3 if len(given) == 1 else 1)
     vector[k] = value
     return vector
 

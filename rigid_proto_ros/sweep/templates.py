@@ -77,9 +77,9 @@ def settings_of(parameters: Parameters) -> np.ndarray:
 
 def times_of(parameters: Parameters) -> np.ndarray:
     """The row of times (TIMES,) of parameters."""
-    row, values = np.zeros(bb.TIMES, np.int64), parameters.named()
-    for name, at in TIMES.items():
-        row[at] = max(1, nanoseconds(values[name]))
+    row = np.zeros(bb.TIMES, np.int64)
+    row[bb.STEP_NS] = max(1, nanoseconds(parameters.step))
+    row[bb.POKE_NS] = max(1, nanoseconds(parameters.poke_duration))
     row[bb.TIMEOUT_NS] = nanoseconds(parameters.wrench_timeout)
     row[bb.DEGREE] = degree_for(parameters.accuracy)
     return row
