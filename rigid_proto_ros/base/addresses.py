@@ -15,12 +15,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import boolean, carray, config, float64, int64, types
+from numba import boolean, carray, float64, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 from numba.core.typing.templates import Signature
 
-from .compilation import intrinsic, njit
+from .compilation import INTERPRETED, intrinsic, njit
 
 STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
 """A kernel (y, p, h, n)."""
@@ -30,16 +30,13 @@ ADAPTIVE_STEPS = types.FunctionType(
 )
 """A kernel (y, p, control, following, workspace, span_ns, sampling)."""
 
-_INTERPRETED = bool(getattr(config, "DISABLE_JIT", 0))
-"""NUMBA_DISABLE_JIT=1: kernels are plain functions, for readable tracebacks."""
-
 _kept: dict[int, Any] = {}
 """What stands at the addresses given away: code must not be collected while an array points at it."""
 
 
 def address_of(kernel: Callable, taken_as: types.FunctionType) -> int:
     """The address of a compiled function for this signature, compiled or loaded from the cache if it isn't yet."""
-    if _INTERPRETED:
+    if INTERPRETED:
         found, address = kernel, id(kernel)
     else:
         kernel.compile(taken_as.signature)  # type: ignore[attr-defined]
@@ -54,7 +51,7 @@ def entry_of(kernel: Callable, signature: Signature) -> Callable:
 
     A call through numba's dispatcher looks them up each time, which costs more than a short kernel takes.
     """
-    if _INTERPRETED:
+    if INTERPRETED:
         return kernel
     kernel.compile(signature)  # type: ignore[attr-defined]
     return kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]
@@ -74,7 +71,7 @@ def _function_at(taken_as: types.FunctionType) -> Callable:
 
         return taken_as(int64), code
 
-    return _kept.__getitem__ if _INTERPRETED else function_at
+    return _kept.__getitem__ if INTERPRETED else function_at
 
 
 steps_at = _function_at(STEPS)
@@ -109,7 +106,7 @@ def _array_at(kind: types.Type, dtype: type) -> Callable:
         bytes_there = (ctypes.c_char * (8 * int(np.prod(shape)))).from_address(int(address))
         return np.frombuffer(memoryview(bytes_there), dtype).reshape(shape)
 
-    return interpreted if _INTERPRETED else compiled
+    return interpreted if INTERPRETED else compiled
 
 
 doubles_at, integers_at = _array_at(float64, np.float64), _array_at(int64, np.int64)

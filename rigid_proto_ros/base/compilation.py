@@ -22,9 +22,12 @@ from numba.core import event
 from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 from numba.extending import intrinsic as numba_intrinsic
 
-__all__ = ["intrinsic", "njit", "source_stamp", "told_when_compiling"]
+__all__ = ["INTERPRETED", "intrinsic", "njit", "source_stamp", "told_when_compiling"]
 
 _CONFIG: Any = config  # its settings are made when it is imported
+INTERPRETED = bool(_CONFIG.DISABLE_JIT)
+"""NUMBA_DISABLE_JIT=1: kernels are plain functions, for readable tracebacks."""
+
 PACKAGE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 
 _RELATIVE_IMPORT = re.compile(r"^[ \t]*from[ \t]+(\.+)([\w.]*)[ \t]+import[ \t]+(?:\(([^)]*)\)|([^\n]*))", re.MULTILINE)

@@ -17,7 +17,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import models, overload, register_model
 
-from .compilation import intrinsic
+from .compilation import INTERPRETED, intrinsic
 
 _DOUBLE, _NUMBER = ir.DoubleType(), ir.IntType(32)
 _LINE = 64
@@ -50,6 +50,11 @@ def aligned(shape: tuple[int, int]) -> np.ndarray:
     return whole[first : first + shape[0] * shape[1]].reshape(shape)
 
 
+def _operation_on_vectors(plain: Callable, **options: bool) -> Any:
+    """An intrinsic; where nothing is compiled vectors are arrays, and ``plain`` does the same with them."""
+    return (lambda _: plain) if INTERPRETED else intrinsic(**options)
+
+
 def _pointer(context: Any, builder: ir.IRBuilder, kind: Any, array: Any, at: Any, count: Any) -> Any:
     """Of ``count`` doubles in a contiguous array, from the one numbered ``at`` on."""
     first = builder.gep(context.make_array(kind)(context, builder, array).data, [at])
@@ -66,7 +71,7 @@ def _filled(builder: ir.IRBuilder, x: Any, count: Any) -> Any:
     return _shuffled(builder, builder.insert_element(unknown, x, ir.Constant(_NUMBER, 0)), unknown, [0] * count)
 
 
-@intrinsic
+@_operation_on_vectors(lambda array, at, like: array.reshape(-1)[at : at + like.size].copy())
 def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> tuple:
     """Numbers of a contiguous array from the number ``at`` on, as many as the vector ``like`` has."""
 
@@ -78,7 +83,7 @@ def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> tuple:
     return like(array, types.int64, like), code
 
 
-@intrinsic
+@_operation_on_vectors(lambda array, at, vector: array.reshape(-1).__setitem__(slice(at, at + vector.size), vector))
 def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> tuple:
     """Put a vector into a contiguous array from the number ``at`` on."""
 
@@ -90,7 +95,7 @@ def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> tuple:
     return types.void(array, types.int64, vector), code
 
 
-@intrinsic(prefer_literal=True)
+@_operation_on_vectors(lambda x, count: np.full(count, float(x)), prefer_literal=True)
 def filled(_typing_context: Any, _x: Any, count: Any) -> tuple:
     """A constant number of times x."""
     kind = Doubles(count.literal_value)
@@ -99,7 +104,7 @@ def filled(_typing_context: Any, _x: Any, count: Any) -> tuple:
     )
 
 
-@intrinsic
+@_operation_on_vectors(lambda vector: vector.size)
 def width(_typing_context: Any, vector: Any) -> tuple:
     """How many doubles a vector has."""
     return types.int64(vector), lambda _context, _builder, _signature, _arguments: ir.Constant(
@@ -107,7 +112,7 @@ def width(_typing_context: Any, vector: Any) -> tuple:
     )
 
 
-@intrinsic
+@_operation_on_vectors(lambda *parts: np.concatenate(parts))
 def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
     """The vector of the components a, b, c, d."""
 
@@ -119,7 +124,10 @@ def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
     return Doubles(4 * a.count)(a, b, c, d), code
 
 
-@intrinsic(prefer_literal=True)
+@_operation_on_vectors(
+    lambda vector, order: np.concatenate([vector.reshape(4, -1), -vector.reshape(4, -1)])[list(order)].ravel(),
+    prefer_literal=True,
+)
 def arranged(_typing_context: Any, vector: Any, order: Any) -> tuple:
     """Components of a vector of four in another order; 4 to 7 stand for the negatives of 0 to 3."""
     each = vector.count // 4
@@ -131,7 +139,9 @@ def arranged(_typing_context: Any, vector: Any, order: Any) -> tuple:
     return vector(vector, order), code
 
 
-@intrinsic(prefer_literal=True)
+@_operation_on_vectors(
+    lambda a, b, order: np.concatenate([a.reshape(4, -1), b.reshape(4, -1)])[list(order)].ravel(), prefer_literal=True
+)
 def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> tuple:
     """Components of two vectors of four: 0 to 3 of the first, 4 to 7 of the second."""
     each = a.count // 4
@@ -143,7 +153,7 @@ def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> tuple:
     return a(a, b, order), code
 
 
-@intrinsic(prefer_literal=True)
+@_operation_on_vectors(lambda vector, number: vector.reshape(4, -1)[number], prefer_literal=True)
 def component(_typing_context: Any, vector: Any, number: Any) -> tuple:
     """One component of a vector of four."""
     each = vector.count // 4
@@ -155,7 +165,7 @@ def component(_typing_context: Any, vector: Any, number: Any) -> tuple:
     return Doubles(each)(vector, number), code
 
 
-@intrinsic(prefer_literal=True)
+@_operation_on_vectors(lambda vector, at: float(vector[at]), prefer_literal=True)
 def number(_typing_context: Any, vector: Any, at: Any) -> tuple:
     """One of a vector's doubles."""
     index = ir.Constant(_NUMBER, at.literal_value)
@@ -164,7 +174,7 @@ def number(_typing_context: Any, vector: Any, at: Any) -> tuple:
     )
 
 
-@intrinsic
+@_operation_on_vectors(lambda vector: np.sqrt(vector))
 def root(_typing_context: Any, vector: Any) -> tuple:
     """Square roots."""
 

@@ -68,7 +68,7 @@ def _digits(buffer: np.ndarray, i: int, stop: int) -> tuple[int, int, int, int]:
                 digits += 1
             if digits > MAX_DIGITS:
                 break
-            mantissa = mantissa * 10 + (c - 48)
+            mantissa = mantissa * 10 + (np.int64(c) - 48)
             if point:
                 exponent -= 1
         elif c == 46 and not point:

@@ -61,7 +61,7 @@ def _corner(buffer: np.ndarray, i: int, known: int) -> tuple[int, int]:
     index = 0
     first = i
     while i < end and 48 <= buffer[i] <= 57 and i - first < 18:
-        index = index * 10 + (buffer[i] - 48)
+        index = index * 10 + (np.int64(buffer[i]) - 48)
         i += 1
     ends = i >= end or is_blank(buffer[i]) or buffer[i] == 10 or buffer[i] == 47
     if index == 0 or not ends:

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 
-from ...base.compilation import intrinsic, njit
+from ...base.compilation import INTERPRETED, intrinsic, njit
 
 _BIAS, _MANTISSA_BITS = 1023, 52
 _MANTISSA = (1 << _MANTISSA_BITS) - 1
@@ -29,6 +30,15 @@ def _of_bits(_typing_context: Any, _bits: Any) -> tuple:
     return types.float64(types.int64), lambda _, builder, _signature, arguments: builder.bitcast(
         arguments[0], ir.DoubleType()
     )
+
+
+if INTERPRETED:
+
+    def _bits(x: float) -> int:
+        return int(np.float64(x).view(np.int64))
+
+    def _of_bits(bits: int) -> float:
+        return float(np.int64(bits).view(np.float64))
 
 
 @njit(cache=True, error_model="numpy")
