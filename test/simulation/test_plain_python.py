@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Without compilation (NUMBA_DISABLE_JIT=1) everything flies in plain Python: slowly, but with tracebacks that can be read."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.script import parse_script
+
+TESTS = Path(__file__).parents[1]
+SELECTION = ("motion/test_light_loads.py", "base/test_series_in_registers.py", "simulation/test_event_log.py")
+BODY = {
+    "mesh": "t_handle",
+    "initial.angular_velocity": [0.1, 5.0, 0.2],
+    "initial.linear_velocity": [0.1, 0.0, 2.0],
+    "step": 0.01,
+    "accuracy": 1e-6,
+}
+STRING = {
+    "string.attached": True,
+    "string.target": [0.0, 0.0, 0.5],
+    "string.attach": [0.1, 0.0, 0.0],
+    "string.rest_length": 0.3,
+}
+SCENES = {
+    **{name: {"integrator": name} for name in INTEGRATORS},
+    "a wrench, gravity and damping": {"gravity": [0.0, 0.0, -9.81], "linear_damping": 0.1, "angular_damping": 1e-4},
+    "a string under auto": {"gravity": [0.0, 0.0, -9.81], **STRING},
+    "a string under rk4": {"integrator": "rk4", **STRING},
+}
+WRENCH = "[{t: 0.02, wrench: {at: com, force: [0.1, 0, 0], torque: [0, 0.01, 0], axes: body, duration: 0.05}}]"
+
+
+def flown() -> dict[str, list[float]]:
+    """The last state of each scene by name."""
+    rows = {}
+    for name, changes in SCENES.items():
+        commands = parse_script(WRENCH) if name.startswith("a wrench") else []
+        run = OfflineRun(make_scenario({**BODY, **changes}), commands)
+        rows[name] = run.simulation.advance(100_000_000).row.tolist()
+    return rows
+
+
+def in_plain_python(*arguments: str) -> str:
+    ran = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=TESTS,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stdout[-4000:] + ran.stderr[-4000:]
+    return ran.stdout
+
+
+def test_every_integrator_and_method_of_auto_flies_alike_in_plain_python() -> None:
+    code = "import sys; sys.path[:0] = ['.', 'simulation']; import json, test_plain_python as t; print(json.dumps(t.flown()))"
+    plain = json.loads(in_plain_python("-c", code).splitlines()[-1])
+    compiled = flown()
+    assert plain.keys() == compiled.keys()
+    for name, row in compiled.items():
+        # Sums of more than two numbers may be taken in another order there.
+        assert plain[name] == pytest.approx(row, rel=1e-11, abs=1e-11), name
+
+
+def test_a_selection_of_tests_passes_in_plain_python() -> None:
+    said = in_plain_python("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *SELECTION)
+    assert " passed" in said
