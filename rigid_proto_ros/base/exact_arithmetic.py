@@ -8,6 +8,8 @@ fastmath: the whole point is the rounding error that algebra says is zero.
 
 from __future__ import annotations
 
+import numpy as np
+
 from .compilation import njit
 
 _SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
@@ -64,3 +66,17 @@ def pair_divide(a: float, a_low: float, b: float, b_low: float) -> tuple[float, 
     p, e = pair_multiply(q, 0.0, b, b_low)
     r, r_low = pair_add(a, a_low, -p, -e)
     return fast_two_sum(q, (r + r_low) / b)
+
+
+@njit(cache=True, error_model="numpy")
+def exact_quotient(product: float, factor: float) -> float:
+    """x with x · factor == product in double precision where there is one, else the nearest."""
+    x = product / factor
+    if x * factor == product:
+        return x
+    up, down = np.nextafter(x, np.inf), np.nextafter(x, -np.inf)
+    if up * factor == product:
+        return up
+    if down * factor == product:
+        return down
+    return x

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from .compilation import njit
-from .errors import InputError
 
 Numbers = Sequence[float] | np.ndarray
 """Components of a vector or a quaternion, as they may be given."""
@@ -82,6 +81,20 @@ def normalize(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float,
 
 
 @njit(cache=True, error_model="numpy")
+def to_unit(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, float, float]:
+    """A given quaternion scaled to unit length; zeros when it has none.
+
+    One that is unit already, to rounding, is kept bit for bit, so that a dumped state is read back as it was.
+    """
+    largest = max(abs(qx), abs(qy), abs(qz), abs(qw))
+    if not 0.0 < largest < math.inf:
+        return 0.0, 0.0, 0.0, 0.0
+    if abs(qx * qx + qy * qy + qz * qz + qw * qw - 1.0) <= 1e-15:
+        return qx, qy, qz, qw
+    return normalize(qx / largest, qy / largest, qz / largest, qw / largest)
+
+
+@njit(cache=True, error_model="numpy")
 def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Unit quaternion xyzw of the turn by |v| [rad] about v = (x, y, z); exact in the limit of small turns too."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -146,18 +159,3 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
     q = np.empty(4)
     quaternion_of_axes(np.array(R, dtype=float, order="C"), q)
     return q
-
-
-def unit_quaternion(q: Numbers, field: str) -> np.ndarray:
-    """A given quaternion scaled to unit length; raises InputError when it has none.
-
-    One that is unit already, to rounding, is kept bit for bit, so that a dumped state is read back as it was.
-    """
-    q = np.asarray(q, dtype=float)
-    largest = np.abs(q).max() if q.shape == (4,) else math.nan
-    if not (math.isfinite(largest) and largest > 0.0):
-        raise InputError(field, q.tolist(), "four finite numbers x, y, z, w, not all zero")
-    if abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) <= 1e-15:
-        return q.copy()
-    q = q / largest
-    return np.array(normalize(q[0], q[1], q[2], q[3]))

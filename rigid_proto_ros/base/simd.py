@@ -52,7 +52,9 @@ def aligned(shape: tuple[int, int]) -> np.ndarray:
 
 def _operation_on_vectors(plain: Callable, **options: bool) -> Any:
     """An intrinsic; where nothing is compiled vectors are arrays, and ``plain`` does the same with them."""
-    return (lambda _: plain) if INTERPRETED else intrinsic(**options)
+    if INTERPRETED:
+        return lambda _: plain
+    return intrinsic(**options) if options else intrinsic
 
 
 def _pointer(context: Any, builder: ir.IRBuilder, kind: Any, array: Any, at: Any, count: Any) -> Any:

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import Numbers, quaternion_from_matrix
-from ..mass.tensor import principal_axes
+from ..base.rotation import Numbers, quaternion_of_axes
+from ..mass.tensor import principal_axes_kernel
 
 # Where the numbers of a body stand in its row.
 MASS = 0
@@ -58,34 +58,63 @@ def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float
     return x / size, y / size, z / size
 
 
+@njit(cache=True, error_model="numpy")
+def fill_body(mass: float, com: np.ndarray, inertia: np.ndarray, scale: np.ndarray, body: np.ndarray) -> None:
+    """The row of a body (BODY,) without a size from com (3,), inertia (3, 3) and scale (3,), its tensor
+    diagonalized.
+    """
+    moments, axes = principal_axes_kernel(inertia)
+    quaternion_of_axes(axes, body[QUATERNION : QUATERNION + 4])
+    body[MASS], body[LENGTH] = mass, 1.0
+    for k in range(3):
+        body[COM + k] = com[k]
+        body[MOMENTS + k] = moments[k]
+        body[BODY_SCALE + k] = scale[k]
+        for j in range(3):
+            body[INERTIA + 3 * k + j] = inertia[k, j]
+            body[AXES + 3 * k + j] = axes[k, j]
+
+
 @dataclass(frozen=True)
 class Body:
-    """mass [kg], center_of_mass (3,) [m, mesh axes after scaling], inertia (3, 3) [kg m², about the COM, mesh axes].
+    """row (BODY,): the body as compiled kernels read it; none of its numbers is changed."""
 
-    principal_moments (3,) ascending; principal_axes (3, 3): columns, body axes; principal_quaternion (4,) xyzw takes
-    principal to body axes. scale (3,): mesh coordinates times scale are metres from the mesh origin.
-    """
-
-    mass: float
-    center_of_mass: np.ndarray
-    inertia: np.ndarray
-    scale: np.ndarray
-    principal_moments: np.ndarray
-    principal_axes: np.ndarray
-    principal_quaternion: np.ndarray
+    row: np.ndarray
 
     @cached_property
-    def row(self) -> np.ndarray:
-        """The body as compiled kernels read it (BODY,)."""
-        row = np.ones(BODY)
-        row[MASS] = self.mass
-        row[COM : COM + 3] = self.center_of_mass
-        row[INERTIA : INERTIA + 9] = self.inertia.ravel()
-        row[MOMENTS : MOMENTS + 3] = self.principal_moments
-        row[AXES : AXES + 9] = self.principal_axes.ravel()
-        row[QUATERNION : QUATERNION + 4] = self.principal_quaternion
-        row[BODY_SCALE : BODY_SCALE + 3] = self.scale
-        return row
+    def mass(self) -> float:
+        """[kg]"""
+        return float(self.row[MASS])
+
+    @cached_property
+    def center_of_mass(self) -> np.ndarray:
+        """(3,) [m, mesh axes after scaling]."""
+        return self.row[COM : COM + 3]
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) [kg m², about the COM, mesh axes]."""
+        return self.row[INERTIA : INERTIA + 9].reshape(3, 3)
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """(3,): mesh coordinates times it are metres from the mesh origin."""
+        return self.row[BODY_SCALE : BODY_SCALE + 3]
+
+    @cached_property
+    def principal_moments(self) -> np.ndarray:
+        """(3,) [kg m²], ascending."""
+        return self.row[MOMENTS : MOMENTS + 3]
+
+    @cached_property
+    def principal_axes(self) -> np.ndarray:
+        """(3, 3): columns, body axes."""
+        return self.row[AXES : AXES + 9].reshape(3, 3)
+
+    @cached_property
+    def principal_quaternion(self) -> np.ndarray:
+        """(4,) xyzw, takes principal to body axes."""
+        return self.row[QUATERNION : QUATERNION + 4]
 
     def point(self, mesh_point: Numbers) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""
@@ -106,14 +135,7 @@ def make_body(
     mass: float, center_of_mass: Numbers, inertia: Sequence[Numbers] | np.ndarray, scale: Numbers = (1.0, 1.0, 1.0)
 ) -> Body:
     """A body of given mass properties, its tensor diagonalized once."""
-    inertia = np.asarray(inertia, dtype=float)
-    moments, axes = principal_axes(inertia)
-    return Body(
-        mass=float(mass),
-        center_of_mass=np.asarray(center_of_mass, dtype=float),
-        inertia=inertia,
-        scale=np.asarray(scale, dtype=float),
-        principal_moments=moments,
-        principal_axes=axes,
-        principal_quaternion=quaternion_from_matrix(axes),
-    )
+    row = np.empty(BODY)
+    com, sides = (np.ascontiguousarray(numbers, dtype=float) for numbers in (center_of_mass, scale))
+    fill_body(float(mass), com, np.ascontiguousarray(inertia, dtype=float), sides, row)
+    return Body(row)

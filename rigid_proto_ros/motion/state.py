@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.rotation import Numbers, matrix_from_quaternion, times
+from ..base.compilation import njit
+from ..base.rotation import matrix_elements, matrix_from_quaternion, times, to_unit
 
 
 @dataclass(slots=True)
@@ -68,11 +69,21 @@ class State:
         return digest.hexdigest()
 
 
-def state_row(
-    position: Numbers,
-    orientation_xyzw: Numbers,
-    linear_velocity: Numbers,
-    angular_velocity_body: Numbers,
-) -> np.ndarray:
-    """The 13 numbers of a state in their order."""
-    return np.concatenate([position, orientation_xyzw, linear_velocity, angular_velocity_body]).astype(float)
+@njit(cache=True, error_model="numpy")
+def fill_initial_row(
+    position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray, row: np.ndarray
+) -> bool:
+    """A state row (13,) of an orientation (4,) of any length and of ω (3,) in world axes; False when the orientation
+    has no length.
+    """
+    x, y, z, w = to_unit(orientation[0], orientation[1], orientation[2], orientation[3])
+    row[3], row[4], row[5], row[6] = x, y, z, w
+    R = matrix_elements(x, y, z, w)
+    a, b, c = angular_velocity[0], angular_velocity[1], angular_velocity[2]
+    for k in range(3):
+        row[k] = position[k]
+        row[7 + k] = velocity[k]
+    row[10] = R[0] * a + R[3] * b + R[6] * c
+    row[11] = R[1] * a + R[4] * b + R[7] * c
+    row[12] = R[2] * a + R[5] * b + R[8] * c
+    return x != 0.0 or y != 0.0 or z != 0.0 or w != 0.0

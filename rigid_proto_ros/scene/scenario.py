@@ -7,21 +7,20 @@ The node, the offline run and replay all come through here, so that one scene me
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, MeshError
-from ..base.rotation import matrix_from_quaternion, unit_quaternion
+from ..base.exact_arithmetic import exact_quotient
 from ..mass.from_mesh import mesh_body
 from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
 from ..mass.tensor import check_tensor
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
 from ..motion.integrators import check_supported, integrator_named
-from ..motion.state import state_row
+from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from ..simulation.setup import Setup
@@ -87,7 +86,7 @@ class Scenario:
         changes: dict[str, object] = {
             "inertia_model": "explicit",
             "explicit_inertia.mass": mass,
-            "explicit_inertia.center_of_mass": [_divided(c, s) for c, s in zip(center, scale, strict=True)],
+            "explicit_inertia.center_of_mass": [exact_quotient(c, s) for c, s in zip(center, scale, strict=True)],
             "explicit_inertia.tensor": list(tensor6),
         }
         for name, (_, *place) in self.parameters.ballast.items():
@@ -168,13 +167,16 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
     check_tensor(properties.inertia)
     # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by
     # message.
-    center_of_mass = [_divided(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]
-    body = make_body(properties.mass, center_of_mass, properties.inertia, scale.tolist())
+    center_of_mass = [exact_quotient(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]
+    body = make_body(properties.mass, center_of_mass, properties.inertia, scale)
     initial, string = parameters.initial, parameters.string
-    quaternion = unit_quaternion(initial.orientation_xyzw, "initial.orientation_xyzw")
-    R = matrix_from_quaternion(quaternion)
-    w = np.asarray(initial.angular_velocity)
-    omega_body = R[0] * w[0] + R[1] * w[1] + R[2] * w[2]
+    row = np.empty(13)
+    position, orientation = np.array(initial.position), np.array(initial.orientation_xyzw)
+    if not fill_initial_row(
+        position, orientation, np.array(initial.linear_velocity), np.array(initial.angular_velocity), row
+    ):
+        accepted = "four finite numbers x, y, z, w, not all zero"
+        raise InputError("initial.orientation_xyzw", list(initial.orientation_xyzw), accepted)
     if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
         known = ", ".join(sorted(parameters.contacts)) or "the body has none"
         raise InputError("imu_contact", parameters.imu_contact, f"'' for the COM, or a contact ({known})")
@@ -204,7 +206,7 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
             timeout_ns=nanoseconds(string.timeout),
         ),
         accuracy=parameters.accuracy,
-        initial=state_row(initial.position, quaternion.tolist(), initial.linear_velocity, omega_body),
+        initial=row,
         initial_string_mass=initial.string_mass,
     )
     return setup, tuple(properties.warnings)
@@ -236,15 +238,6 @@ def check_inertia(scenario: Scenario, content: Mapping) -> Scenario:
         return scenario.with_inertia(content["mass"], content["com"], content["tensor"], content["relative"])
     except InputError as error:
         raise CommandRefused("tensor", error.field, error.received, error.accepted) from None
-
-
-def _divided(product: float, factor: float) -> float:
-    """x with x · factor == product in double precision where there is one, else the nearest."""
-    x = product / factor
-    for near in (x, math.nextafter(x, math.inf), math.nextafter(x, -math.inf)):
-        if near * factor == product:
-            return near
-    return x
 
 
 def nanoseconds(seconds: float) -> int:

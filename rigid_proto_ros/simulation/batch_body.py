@@ -13,23 +13,15 @@ import math
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import normalize, quaternion_of_axes
+from ..base.exact_arithmetic import exact_quotient
 from ..mass.properties import SCALE_LIMITS, loaded, stretched
 from ..mass.tensor import (
     MAX_MOMENT_RATIO,
     TRIANGLE_SLACK_COMPUTED,
     principal_axes_kernel,
 )
-from ..motion.body import (
-    AXES,
-    BODY_SCALE,
-    COM,
-    INERTIA,
-    LENGTH,
-    MASS,
-    MOMENTS,
-    QUATERNION,
-)
+from ..motion.body import COM, LENGTH, MASS, fill_body
+from ..motion.state import fill_initial_row
 
 # A row of settings.
 SCALE = 0  # (3,)
@@ -66,20 +58,6 @@ GYROSCOPIC = 22
 CONSTANTS = 23
 
 EXPLICIT, ORDINARY, SHELL = 0, 1, 2
-
-
-@njit(cache=True, error_model="numpy")
-def divided(product: float, factor: float) -> float:
-    """x with x · factor == product where there is one, else the nearest; as ``scenario`` does it."""
-    x = product / factor
-    if x * factor == product:
-        return x
-    up, down = np.nextafter(x, np.inf), np.nextafter(x, -np.inf)
-    if up * factor == product:
-        return up
-    if down * factor == product:
-        return down
-    return x
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,39 +158,24 @@ def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarr
         mass, com, inertia, good = _spread(s, settings, points, constants)
     if not good:
         return False
-    moments, axes = principal_axes_kernel(inertia)
-    quaternion_of_axes(axes, body[QUATERNION : QUATERNION + 4])
-    body[MASS] = mass
     diagonal = 0.0
     for k in range(3):
-        body[COM + k] = divided(com[k], s[k]) * s[k]
-        body[MOMENTS + k] = moments[k]
-        body[BODY_SCALE + k] = s[k]
+        com[k] = exact_quotient(com[k], s[k]) * s[k]
         side = constants[EXTENT + k] * s[k]
         diagonal += side * side
-        for j in range(3):
-            body[INERTIA + 3 * k + j] = inertia[k, j]
-            body[AXES + 3 * k + j] = axes[k, j]
-    body[LENGTH] = 0.5 * math.sqrt(diagonal) if constants[HAS_SURFACE] != 0.0 else 1.0
+    fill_body(mass, com, inertia, s, body)
+    if constants[HAS_SURFACE] != 0.0:
+        body[LENGTH] = 0.5 * math.sqrt(diagonal)
     return math.isfinite(body[MASS] + body[COM] + body[COM + 1] + body[COM + 2] + body[LENGTH])
 
 
 @njit(cache=True, error_model="numpy")
 def initial_row(settings: np.ndarray, row: np.ndarray) -> bool:
     """The state row (13,) at time 0; False when the orientation has no length."""
-    q = settings[ORIENTATION : ORIENTATION + 4]
-    largest = max(abs(q[0]), abs(q[1]), abs(q[2]), abs(q[3]))
-    if not 0.0 < largest < math.inf:
-        return False
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    if not abs(x * x + y * y + z * z + w * w - 1.0) <= 1e-15:
-        x, y, z, w = normalize(x / largest, y / largest, z / largest, w / largest)
-    row[3], row[4], row[5], row[6] = x, y, z, w
-    a, b, c = (settings[ANGULAR_VELOCITY], settings[ANGULAR_VELOCITY + 1], settings[ANGULAR_VELOCITY + 2])
-    row[10] = (1 - 2 * (y * y + z * z)) * a + 2 * (x * y + w * z) * b + 2 * (x * z - w * y) * c
-    row[11] = 2 * (x * y - w * z) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z + w * x) * c
-    row[12] = 2 * (x * z + w * y) * a + 2 * (y * z - w * x) * b + (1 - 2 * (x * x + y * y)) * c
-    for k in range(3):
-        row[k] = settings[POSITION + k]
-        row[7 + k] = settings[VELOCITY + k]
-    return True
+    return fill_initial_row(
+        settings[POSITION : POSITION + 3],
+        settings[ORIENTATION : ORIENTATION + 4],
+        settings[VELOCITY : VELOCITY + 3],
+        settings[ANGULAR_VELOCITY : ANGULAR_VELOCITY + 3],
+        row,
+    )
