@@ -121,7 +121,7 @@ def _matrices(q: np.ndarray, R: np.ndarray) -> None:
             R[k, j] = elements[j]
 
 
-def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
+def matrix_from_quaternion(q: Numbers) -> np.ndarray:
     """Rotation matrix (3, 3), body to world, of a unit quaternion q (4,) xyzw, or (n, 3, 3) of (n, 4)."""
     q = np.ascontiguousarray(q, dtype=float)
     R = np.empty(q.shape[:-1] + (9,))

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
+from ..base.rotation import matrix_from_quaternion
 
 MAX_BYTES = 50_000_000
 XACRO_TIMEOUT_S = 60.0
@@ -75,13 +76,7 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
 def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
     """Rotation (3, 3) of a quaternion (w, x, y, z), MuJoCo's order, of any length but 0."""
     w, x, y, z = (np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))).tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return matrix_from_quaternion([x, y, z, w])
 
 
 def floats(text: str | None, default: str, count: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import matrix_elements, matrix_from_quaternion, times, to_unit
+from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
 
 
 @dataclass(slots=True)
@@ -55,12 +55,11 @@ class State:
 
     def kinetic_energy(self, mass: float, inertia: np.ndarray) -> float:
         """½ m|v|² + ½ ωᵀIω [J]."""
-        v, w = self.linear_velocity, self.angular_velocity_body
-        return 0.5 * mass * float((v * v).sum()) + 0.5 * float((w * times(inertia, w)).sum())
+        return kinetic_energy(self.row, mass, np.ravel(inertia))
 
     def angular_momentum(self, inertia: np.ndarray) -> np.ndarray:
         """L = R I ω about the COM, world axes [N m s]."""
-        return times(self.rotation, times(inertia, self.angular_velocity_body))
+        return np.array(angular_momentum(self.row, np.ravel(inertia)))
 
     def sha256(self) -> str:
         """SHA-256 of int64 time_ns, then float64 x, q xyzw, v, ω body, little-endian, with −0 written as +0."""
@@ -87,3 +86,30 @@ def fill_initial_row(
     row[11] = R[1] * a + R[4] * b + R[7] * c
     row[12] = R[2] * a + R[5] * b + R[8] * c
     return x != 0.0 or y != 0.0 or z != 0.0 or w != 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
+    """½ m|v|² + ½ ωᵀIω [J] of a state row (≥ 13,); inertia (9,) row by row."""
+    x, y, z = row[10], row[11], row[12]
+    turning = (
+        x * (inertia[0] * x + inertia[1] * y + inertia[2] * z)
+        + y * (inertia[3] * x + inertia[4] * y + inertia[5] * z)
+        + z * (inertia[6] * x + inertia[7] * y + inertia[8] * z)
+    )
+    return 0.5 * mass * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning
+
+
+@njit(cache=True, error_model="numpy")
+def angular_momentum(row: np.ndarray, inertia: np.ndarray) -> tuple[float, float, float]:
+    """L = R I ω about the COM, world axes [N m s], likewise."""
+    x, y, z = row[10], row[11], row[12]
+    return rotate(
+        row[3],
+        row[4],
+        row[5],
+        row[6],
+        inertia[0] * x + inertia[1] * y + inertia[2] * z,
+        inertia[3] * x + inertia[4] * y + inertia[5] * z,
+        inertia[6] * x + inertia[7] * y + inertia[8] * z,
+    )

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import rotate
+from ..motion.state import angular_momentum, kinetic_energy
 
 QUANTITIES = {
     "position.x": "m",
@@ -57,28 +58,12 @@ MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10,
 
 @njit(cache=True, error_model="numpy")
 def _momentum(row: np.ndarray, context: np.ndarray) -> tuple[float, float, float]:
-    """R I ω (3,)."""
-    I, x, y, z = INERTIA, row[10], row[11], row[12]
-    return rotate(
-        row[3],
-        row[4],
-        row[5],
-        row[6],
-        context[I] * x + context[I + 1] * y + context[I + 2] * z,
-        context[I + 3] * x + context[I + 4] * y + context[I + 5] * z,
-        context[I + 6] * x + context[I + 7] * y + context[I + 8] * z,
-    )
+    return angular_momentum(row, context[INERTIA : INERTIA + 9])
 
 
 @njit(cache=True, error_model="numpy")
 def _kinetic(row: np.ndarray, context: np.ndarray) -> float:
-    I, x, y, z = INERTIA, row[10], row[11], row[12]
-    turning = (
-        x * (context[I] * x + context[I + 1] * y + context[I + 2] * z)
-        + y * (context[I + 3] * x + context[I + 4] * y + context[I + 5] * z)
-        + z * (context[I + 6] * x + context[I + 7] * y + context[I + 8] * z)
-    )
-    return 0.5 * context[MASS] * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning
+    return kinetic_energy(row, context[MASS], context[INERTIA : INERTIA + 9])
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from ...base.compilation import njit
+from ...base.rotation import matrix_elements
 
 
 @njit(cache=True, error_model="numpy")
@@ -16,11 +17,8 @@ def columns(
     x: float, y: float, z: float, w: float
 ) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
     """Columns of the rotation matrix of a unit quaternion."""
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
-        (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
-        (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
+    a, b, c, d, e, f, g, h, i = matrix_elements(x, y, z, w)
+    return (a, d, g), (b, e, h), (c, f, i)
 
 
 @njit(cache=True, error_model="numpy")
