@@ -19,6 +19,8 @@ from typing import IO
 
 import numpy as np
 
+from ..base.compilation import INTERPRETED
+
 SIZE_LIMIT = 4_000_000_000
 """Bytes that the folder may hold; the entries longest unused go first."""
 
@@ -44,7 +46,7 @@ def folder() -> Path | None:
 
 @functools.cache
 def code_tag() -> str:
-    """Hash of the modules whose results are kept."""
+    """Hash of the modules whose results are kept, and of whether they are compiled: sums may round otherwise."""
     package = Path(__file__).parent.parent
     digest = hashlib.sha256()
     sources = [
@@ -55,6 +57,7 @@ def code_tag() -> str:
     ]
     for path in sorted(sources):
         digest.update(path.read_bytes())
+    digest.update(b"interpreted" if INTERPRETED else b"")
     return digest.hexdigest()[:16]
 
 
