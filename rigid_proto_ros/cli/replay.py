@@ -110,7 +110,7 @@ def _say_how_to_see_it(args: argparse.Namespace) -> None:
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
-    from ..session.check import BeganLaterError, verify
+    from ..session.check import BeganLaterError, other_versions, verify
 
     verified = 0
     for number, session in enumerate(runs, 1):
@@ -126,6 +126,8 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
             continue
         if difference is not None:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
+            if others := other_versions(session):
+                print(f"rigid_proto replay: bit for bit it is read by what it was made with: {others}", file=sys.stderr)
             return 1
         verified += 1
     print("  verified: every command and state is reproduced bit for bit")

@@ -18,6 +18,7 @@ from .rrd_file import whole_bytes, whole_part
 STATES = "Scalars:scalars"
 TEXT = "TextLog:text"
 RECORDING = "__properties"
+MADE_WITH = "__properties/made_with"
 
 
 def read_session(path: str | Path) -> RecordedSession:
@@ -75,10 +76,8 @@ def _read(path: Path, session: RecordedSession) -> None:
             target = events if entity == e.EVENTS else refusals
             texts = [cell[0] for cell in batch.column(TEXT).to_pylist()]
             target.extend(zip(_sim_times(batch).tolist(), texts, strict=True))
-        elif entity == RECORDING and "RecordingInfo:name" in batch.schema.names:
-            # The node's name, and which run of it.
-            name = batch.column("RecordingInfo:name").to_pylist()[0][0].split(",")[0]
-            session.node_name = name if name.isidentifier() else session.node_name
+        elif entity.startswith(RECORDING):
+            _read_properties(entity, batch, session)
         elif entity == e.SCENE:
             session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
         elif entity.startswith(e.BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
@@ -97,6 +96,16 @@ def _read(path: Path, session: RecordedSession) -> None:
     session.events, session.refusals = events, refusals
     if times:
         session.times, session.rows = np.concatenate(times), np.concatenate(rows)
+
+
+def _read_properties(entity: str, batch: Any, session: RecordedSession) -> None:
+    if entity == MADE_WITH:
+        packages = dict(text.rsplit(" ", 1) for text in batch.column("versions").to_pylist()[0])
+        session.made_with = {"cpu": batch.column("cpu").to_pylist()[0][0], **packages}
+    elif "RecordingInfo:name" in batch.schema.names:
+        # The node's name, and which run of it.
+        name = batch.column("RecordingInfo:name").to_pylist()[0][0].split(",")[0]
+        session.node_name = name if name.isidentifier() else session.node_name
 
 
 def _sim_times(batch: Any) -> np.ndarray:

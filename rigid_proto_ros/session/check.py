@@ -4,18 +4,23 @@
 from __future__ import annotations
 
 import json
+import platform
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
+from ..base.provenance import cpu, versions
 from ..messages.session_messages import PROJECTIONS
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Observer
 from .recorded_session import RecordedSession
 from .replay import Resimulation, mesh_finder, resimulation, session_scenario
 from .runs import decode_event
+
+BITS_DEPEND_ON = ("rigid_proto_ros", "numpy", "numba", "cpu")
+"""Of what a recording says that it was made with: other ones may give other last digits."""
 
 
 class BeganLaterError(InputError):
@@ -82,6 +87,19 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         if count % 1000 == 0:
             progress(count / len(states))
     return _what_follows(again, lines, recorded, events)
+
+
+def other_versions(session: RecordedSession) -> str:
+    """What the recording was made with and isn't here, on which its bits depend; empty where nothing
+    differs or is known.
+    """
+    here = {"cpu": cpu(), **versions(*session.made_with)}
+    differing = [
+        f"{name} {recorded} (here {here.get(name, 'none')})"
+        for name, recorded in session.made_with.items()
+        if name in BITS_DEPEND_ON and recorded not in (here.get(name), platform.machine())
+    ]
+    return ", ".join(differing)
 
 
 def broken_link(lines: Sequence[str]) -> int | None:

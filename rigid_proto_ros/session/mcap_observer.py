@@ -30,6 +30,7 @@ from ..simulation.commands import WrenchCommand
 from ..simulation.mailbox import Block, Mailbox, Mark
 from ..simulation.observer import BodySnapshot, Observer
 from .recorded_session import file_sha256, scene_sha256
+from .runs import MADE_WITH
 
 if TYPE_CHECKING:
     from .mcap_writing import McapFile
@@ -80,7 +81,7 @@ class McapObserver(Observer):
         self._file: McapFile | None = None
         try:
             self._file = McapFile(output_file("record", path))
-            self._file.add_metadata("rigid_proto_ros", _made_with())
+            self._file.add_metadata(MADE_WITH, _made_with())
             self._channels = {
                 name: self._file.add_channel(
                     f"/{node_name.strip('/')}/{name}",

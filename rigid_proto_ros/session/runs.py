@@ -16,6 +16,9 @@ from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_sta
 from .mcap_reading import McapContent
 from .recorded_session import RecordedSession, scene_sha256
 
+MADE_WITH = "rigid_proto_ros"
+"""Name of the metadata that say which versions recorded."""
+
 RESET_WINDOW_NS = 1_000_000_000
 """Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
 
@@ -50,6 +53,7 @@ def session_runs(content: McapContent, path: Path, node: str = "") -> list[Recor
         scenes=[text for _, text in scenes],
         missing=tuple(missing),
         attachments=content.attachments,
+        made_with=content.metadata.get(MADE_WITH, {}),
         folder=path if path.is_dir() else path.parent,
     )
     cuts = {name: _cuts(logs, rows.times, resets) for name, (logs, rows) in states.items()}
