@@ -6,6 +6,7 @@ import sys
 from glob import glob
 from pathlib import Path
 
+import setuptools
 from setuptools import find_packages, setup
 
 NAME = "rigid_proto_ros"
@@ -93,7 +94,7 @@ setup(
     description="Prototype the properties of a rigid body: exact inertia from a mesh, flight under wrenches, Rerun",
     long_description=Path("README.md").read_text("utf-8"),
     long_description_content_type="text/markdown",
-    license="MIT",
+    **({"license_expression": "MIT"} if int(setuptools.__version__.partition(".")[0]) >= 77 else {"license": "MIT"}),
     license_files=["LICENSE"],
     keywords=["robotics", "ros2", "rigid body", "inertia", "simulation", "rerun"],
     classifiers=[

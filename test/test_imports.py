@@ -147,7 +147,7 @@ def test_a_launch_file_needs_no_numba() -> None:
 @pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.replay"])
 def test_simulating_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
     # scipy is not among them: numba loads it where it is installed, for linear algebra that we don't use.
-    heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d")
+    heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d", "mcap", "zstandard")
     code = f"import sys, {PACKAGE}.{module}; print(*[name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

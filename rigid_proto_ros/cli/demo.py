@@ -17,6 +17,8 @@ from .options import add_mesh
 
 FLIGHT_S = 10.0
 OUT = Path("out")
+CLEAR = "\r\033[K"
+"""Takes back the line that a terminal shows."""
 
 SPIN = 4.0
 """rad/s about the middle axis: a flip or two in ten seconds for most bodies."""
@@ -72,8 +74,7 @@ def run(args: argparse.Namespace) -> int:
         )
         print(f"2. poke_client --reset {script}", flush=True)
         client = processes.start([*own_executable("poke_client"), str(script), "--reset", "--timeout", "0"])
-        print(f"3. simulating to {until_s:g} s, recorded for Rerun", flush=True)
-        status = _wait_for_flight(node, client)
+        status = _wait_for_flight(node, client, until_s)
         if status != 0:
             print(f"rigid_proto demo: poke_client ended with status {status}", file=sys.stderr)
             return 1
@@ -126,15 +127,21 @@ def write_demo(mesh: str, folder: Path) -> tuple[Path, Path]:
     return scene_path, script_path
 
 
-def _wait_for_flight(node: subprocess.Popen, client: subprocess.Popen) -> int:
+def _wait_for_flight(node: subprocess.Popen, client: subprocess.Popen, until_s: float) -> int:
     """Return when the node has come to the end, or its client to a bad one: the client's status, 0 while it goes on."""
-    start = time.monotonic()
+    start, told = time.monotonic(), False
     while node.poll() is None and not client.poll():
+        if client.poll() == 0 and not told:
+            # It has waited until the last command acted.
+            told = True
+            print(
+                f"{CLEAR if sys.stdout.isatty() else ''}3. simulating to {until_s:g} s, recorded for Rerun", flush=True
+            )
         if sys.stdout.isatty():
             print(f"\r   {time.monotonic() - start:4.1f} s", end="", flush=True)
         time.sleep(0.05)
     if sys.stdout.isatty():
-        print("\r\033[K", end="")
+        print(CLEAR, end="")
     return client.poll() or 0
 
 

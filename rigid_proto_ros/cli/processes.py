@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import json
 import os
 import signal
@@ -11,6 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+
+from ..base.errors import InputError
 
 _MODULES = {
     "rigid_body_node": "rigid_proto_ros.ros.main",
@@ -22,7 +25,13 @@ GRACE_S = 5.0
 
 
 def own_executable(name: str) -> list[str]:
-    """How to start one of this package's executables with the interpreter and packages of this process."""
+    """How to start one of this package's executables with the interpreter and packages of this process. Raises
+    InputError where they lack ROS.
+    """
+    if importlib.util.find_spec("rclpy") is None:
+        raise InputError(
+            name, "no rclpy", "a ROS installation whose setup.bash was sourced, or pip install 'rigid_proto_ros[ros]'"
+        )
     return [sys.executable, "-m", _MODULES[name]]
 
 

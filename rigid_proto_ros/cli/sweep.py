@@ -69,7 +69,9 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
     from ..sweep.chunk import run_chunk
     from ..sweep.plot import check_plot, plot_table, read_plot
     from ..sweep.run import Interrupted, run_study
+    from ..sweep.table import arrow
 
+    arrow()  # a table that can't be written isn't flown either
     file = Path(args.output or Path(study.name).stem + ".parquet")
     plot = read_plot(args.plot, file) if args.plot else None
     try:

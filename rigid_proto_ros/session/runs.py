@@ -7,14 +7,17 @@ import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
 from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_text
-from .mcap_reading import McapContent
 from .recorded_session import RecordedSession, scene_sha256
+
+if TYPE_CHECKING:
+    from .mcap_reading import McapContent  # .rrd files are read without the package mcap
 
 MADE_WITH = "rigid_proto_ros"
 """Name of the metadata that say which versions recorded."""
