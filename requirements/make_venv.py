@@ -193,7 +193,7 @@ def installed_by_uv(python, first, files, compiling):
     if Progress("packages that the kernels need").wait(started(*uv, *first))[0]:
         return False
     compiling()
-    return Progress("the other packages; kernels beside them").wait(started(*uv, *files))[0] == 0
+    return Progress("the other packages").wait(started(*uv, *files))[0] == 0
 
 
 def install(python, *arguments):
@@ -298,13 +298,18 @@ def main(stage):
     def begin_compiling():
         compiling.extend(compile_kernels(inner))
 
+    def compile_beside():
+        # numba imports scipy and coverage where it finds them: not while they are half there.
+        if stage != "all":
+            begin_compiling()
+
     lists = ["-r", folder / (stage + ".in"), *([] if ros_installed else ["-r", folder / "ros.in"])]
     lists += [part for file in pinned for part in ("-c", file)]
     first = [line.split()[0] for name in FIRST for line in pins()[name][:1]]
     try:
         if ros_installed:
             install_beside_ros(inner, stage)
-        elif not installed_by_uv(inner, first, lists, begin_compiling):
+        elif not installed_by_uv(inner, first, lists, compile_beside):
             install(inner, *lists)
         install(inner, "--no-build-isolation", "--no-deps", "-e", ROOT)
         if not compiling:
