@@ -23,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 ROS_SETUP = VENV / ".ros"  # the setup.bash of the ROS installation, for targets of the Makefile
+OPT_ROS = Path("/opt/ros")
 SUPPORTED = ((3, 11), (3, 14))
 STAGES = ("run", "workbench", "all")
 NEEDED_BYTES = {"run": 1.5e9, "workbench": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
@@ -59,8 +60,9 @@ def ros_setup():
     """setup.bash of a ROS installation whose environment isn't on: that of $ROS_DISTRO, else the only one in /opt/ros."""
     if "AMENT_PREFIX_PATH" in os.environ:
         return None
-    folder = Path(os.environ.get("RIGID_PROTO_OPT_ROS", "/opt/ros"))
-    found = sorted(path for path in folder.glob("*/setup.bash") if list(path.parent.glob("lib/python3*/site-packages")))
+    found = sorted(
+        path for path in OPT_ROS.glob("*/setup.bash") if list(path.parent.glob("lib/python3*/site-packages"))
+    )
     asked = os.environ.get("ROS_DISTRO")
     named = [path for path in found if path.parent.name == asked]
     if not named and len(found) > 1:

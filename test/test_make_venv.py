@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""What `make setup` installs where: all of it pinned, and beside a ROS installation nothing that would stand in its way."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import rigid_proto_ros
+
+SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
+SCRIPT = SOURCE / "requirements" / "make_venv.py"
+pytestmark = pytest.mark.skipif(not SCRIPT.is_file(), reason="not run from a source tree")
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
+    """The script, with an environment in a folder of its own."""
+    spec = importlib.util.spec_from_file_location("make_venv", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.setattr(module, "VENV", tmp_path)
+    return module
+
+
+def installed_beside(script: ModuleType, monkeypatch: pytest.MonkeyPatch, system: str, stage: str) -> list[list[str]]:
+    """The calls of pip on a ROS machine whose packages are given, and the lines of the constraints last."""
+    calls: list[list[str]] = []
+    monkeypatch.setattr(script, "called", lambda *_: (0, system))
+    monkeypatch.setattr(script, "install", lambda _, *arguments: calls.append(list(map(str, arguments))))
+    script.install_beside_ros("python", stage)
+    return [*calls, (script.VENV / "constraints.txt").read_text("utf-8").split("\n")]
+
+
+@pytest.mark.parametrize("stage", ["run", "workbench", "all"])
+def test_every_package_of_every_list_is_pinned(script: ModuleType, stage: str) -> None:
+    pins = script.pins()
+    for requirement in script.wanted(SOURCE / "requirements" / f"{stage}.in"):
+        assert script.normalized(script.re.split("[<>=;]", requirement)[0]) in pins, requirement
+
+
+@pytest.mark.parametrize("stage", ["run", "workbench", "all"])
+def test_beside_ros_rclpy_and_numpy_stay_and_what_the_system_has_is_not_pinned(script, monkeypatch, stage) -> None:
+    system = "numpy=2.3.5 PyYAML=6.0.2 rclpy=10.0.1 coverage=7.6.0"
+    first, constraints = installed_beside(script, monkeypatch, system, stage)
+    assert "numpy==2.3.5" in constraints and not [line for line in constraints if line.lower().startswith("pyyaml")]
+    assert {"numba", "numpy"} <= set(first) and not [word for word in first if word.startswith(("rclpy", "ros-"))]
+    # numba doesn't start beside Debian's coverage, so that one gets a newer one before it.
+    assert "coverage" in first and any(line.startswith("coverage==") for line in constraints)
+
+
+def test_beside_numpy_1_rerun_comes_without_the_numpy_that_it_asks_for(script, monkeypatch) -> None:
+    first, second, constraints = installed_beside(script, monkeypatch, "numpy=1.26.4 PyYAML=6.0.1", "run")
+    assert "numpy==1.26.4" in constraints
+    assert not [word for word in first if word.startswith("rerun-sdk")] and "pyarrow" in first
+    assert second[0] == "--no-deps" and second[1].startswith("rerun-sdk==")
+
+
+def test_a_ros_installation_is_found_by_its_distribution_or_where_it_is_the_only_one(script, monkeypatch, tmp_path):
+    monkeypatch.setattr(script, "OPT_ROS", tmp_path)
+    for name in ("AMENT_PREFIX_PATH", "ROS_DISTRO"):
+        monkeypatch.delenv(name, raising=False)
+    assert script.ros_setup() is None
+    for distro in ("jazzy", "lyrical"):
+        (tmp_path / distro / "lib" / "python3.12" / "site-packages").mkdir(parents=True)
+        (tmp_path / distro / "setup.bash").write_text("")
+        if distro == "jazzy":
+            assert script.ros_setup() == tmp_path / "jazzy" / "setup.bash"
+    with pytest.raises(SystemExit, match="ROS_DISTRO: got nothing; accepted: one of jazzy, lyrical"):
+        script.ros_setup()
+    monkeypatch.setenv("ROS_DISTRO", "lyrical")
+    assert script.ros_setup() == tmp_path / "lyrical" / "setup.bash"
