@@ -16,6 +16,9 @@ from ..base.errors import InputError
 from .options import add_mesh
 
 FLIGHT_S = 10.0
+CONFIRM_S = 2.0
+"""How long the node goes on at least after the last command: the client waits for its confirmation."""
+
 OUT = Path("out")
 CLEAR = "\r\033[K"
 """Takes back the line that a terminal shows."""
@@ -43,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=FLIGHT_S,
         metavar="S",
-        help="simulated seconds, or to 0.5 s after the last poke (default 10)",
+        help="simulated seconds, or to 2 s after the last poke (default 10)",
     )
 
 
@@ -66,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     session.unlink(missing_ok=True)
     print(f"1. rigid_body_node: {scenario.parameters.mesh}, {scenario.setup.body.mass:.6g} kg", flush=True)
     # The last command has its time to act, and to be confirmed.
-    until_s = max(args.duration, read_script(script)[-1].t_ns * 1e-9 + 0.5)
+    until_s = max(args.duration, read_script(script)[-1].t_ns * 1e-9 + CONFIRM_S)
     with Processes() as processes:
         node = processes.start(
             [*own_executable("rigid_body_node"), "--until", repr(until_s), "--ros-args", "--params-file", str(scene)]

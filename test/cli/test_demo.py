@@ -50,9 +50,9 @@ def check(session, recorded, batches, pokes):
 
 
 def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_environment, tmp_path):
-    session, recorded, batches = fly(ros_environment, tmp_path / "out", "--duration", "9")
+    session, recorded, batches = fly(ros_environment, tmp_path / "out", "--duration", "10")
     check(session, recorded, batches, pokes=3)
-    assert recorded.times.max() == recorded.end_ns == 9_000_000_000
+    assert recorded.times.max() == recorded.end_ns == 10_000_000_000
     verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
     assert verified.returncode == 0, verified.stderr
     assert "reproduced bit for bit" in verified.stdout

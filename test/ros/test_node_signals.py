@@ -16,7 +16,8 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @needs_rerun
 @BOTH
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
-    demo = RosProcess("rigid_proto", "demo", "--out", tmp_path, environment=ros_environment, log=tmp_path / "demo")
+    flight = ("rigid_proto", "demo", "--duration", 60, "--out", tmp_path)
+    demo = RosProcess(*flight, environment=ros_environment, log=tmp_path / "demo")
     demo.wait_for("3. simulating")
     children = descendants(demo.pid)
     assert children
