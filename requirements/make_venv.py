@@ -238,16 +238,18 @@ def install_beside_ros(python, stage):
     if known.pop("coverage", None):
         # colcon brings the system's; numba doesn't even start beside an old one (Debian 13's 7.6).
         requirements.append("coverage")
-    lines = [line for name, found in pins().items() if name not in known and name != "numpy" for line in found]
     # A numpy of our own would stand before the one that the messages' code was compiled for.
     old_numpy = numpy is not None and int(numpy.partition(".")[0]) < 2
+    unpinned = {"numpy", "pyarrow"} if old_numpy else {"numpy"}
+    lines = [line for name, found in pins().items() if name not in unpinned.union(known) for line in found]
     if numpy is not None:
         lines.append("numpy==" + numpy)
         requirements = ["numpy" if normalized(re.split("[<>=]", line)[0]) == "numpy" else line for line in requirements]
     if old_numpy:
         # It asks for numpy 2 and runs with 1.26: tools/fresh_machine tries it.
-        requirements = [line for line in requirements if not line.startswith("rerun-sdk")]
-        requirements += ["attrs", "pillow", "psutil>=7", "pyarrow", "typing_extensions"]
+        requirements = [line for line in requirements if not line.startswith(("rerun-sdk", "pyarrow"))]
+        # pyarrow 26 refuses numpy 1.
+        requirements += ["attrs", "pillow", "psutil>=7", "pyarrow>=18,<22", "typing_extensions"]
     limits.write_text("\n".join(lines) + "\n", encoding="utf-8")
     install(python, "-c", limits, *requirements)
     if old_numpy:
