@@ -19,16 +19,16 @@ MODULES = {
 }
 ORDER = (
     *("base", "mesh", "mass", "motion", "simulation", "messages", "scene", "session"),
-    *("rerun_view", "ros", "workbench", "sweep", "cli"),
+    *("rerun_view", "ros", "workbench", "sweep", "identify", "cli"),
 )
 """Folders in the order of imports: each knows only those before it."""
-STRANGERS = {"sweep": ("rerun_view", "ros", "workbench")}
+STRANGERS = {"sweep": ("rerun_view", "ros", "workbench"), "identify": ("rerun_view", "ros", "workbench", "sweep")}
 """Folders that stand before one in the order but that it doesn't know all the same."""
 ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
 # Which folders or modules may import a package that is neither ours nor Python's.
 ALLOWED = {
     "numpy": ORDER,
-    "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep"),
+    "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
     "llvmlite": ("base.simd", "motion.integrators.rough_logarithm"),  # comes with numba
     "argcomplete": ("base.command_line",),
     "rich": ("cli", "base.progress"),
@@ -39,7 +39,7 @@ ALLOWED = {
     "rerun_bindings": ("rerun_view",),
     "pyarrow": ("rerun_view", "sweep.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
-    "scipy": ("mesh.hull", "sweep.sampling"),
+    "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.verdict"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs

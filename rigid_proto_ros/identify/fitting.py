@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: MIT
+"""The estimate: short segments first, which converge from far, then longer ones, at last one per flight, which uses all there is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..base.errors import InputError
+from . import mass_parameters as mp
+from . import measurements as ms
+from . import shooting as sh
+from .local_motion import least_noise, local_start, noise_by_differences, usual_rate
+from .unknowns import Unknowns, Values
+
+FIRST_ANGLE = 3.0
+"""Turn of the first segments [rad]: within it even the flight of a wrong body stays near enough for Gauss-Newton steps."""
+MOST_SEGMENTS = 16
+"""Of all flights together in the first stage."""
+FEWEST_SAMPLES = 8
+"""Of a segment in the first stage: a start has 12 numbers."""
+LENGTHENING = 4
+"""Segments become so many times longer from stage to stage."""
+HUBER = 1.5
+"""Robust fits: departures beyond so many standard deviations count by their size alone (95 % efficient at 1.345, Huber 1981)."""
+OFFSET_MARGIN_S = 0.5
+"""The largest difference of two clocks that is looked for."""
+GOOD = 2.0
+"""Departures so many times what the differences of neighbouring samples say are of another minimum, or another model."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """values: what came out. segments and starts (k, 13): one for each flight. sigmas: of each series by flight's number and name.
+
+    information (n, n) of the unknowns, the starts eliminated. root (m, n): information = rootᵀ root. evaluations: of the residuals.
+    """
+
+    values: Values
+    unknowns: Unknowns
+    segments: list[sh.Segment]
+    starts: np.ndarray
+    sigmas: dict[int, float]
+    root: np.ndarray
+    cost: float
+    evaluations: int
+
+    @property
+    def mass(self) -> mp.MassEstimate:
+        """The body."""
+        return mp.mass_of(self.values.theta)
+
+
+@dataclass
+class _Work:
+    """What stages hand on."""
+
+    flights: Sequence[ms.MeasuredFlight]
+    topics: Sequence[str]
+    unknowns: Unknowns
+    values: Values
+    sigmas: dict[int, float]
+    weights: dict[int, np.ndarray]
+    evaluations: int = 0
+
+
+def topics_of(flights: Sequence[ms.MeasuredFlight]) -> list[str]:
+    """All topics in their order."""
+    return list(dict.fromkeys(series.topic for flight in flights for series in flight.series))
+
+
+def fit_flights(
+    flights: Sequence[ms.MeasuredFlight],
+    unknowns: Unknowns,
+    values: Values,
+    robust: bool = False,
+    sigmas: dict[int, float] | None = None,
+) -> Estimate:
+    """The most likely values, from these on; raises InputError where no step from there improves them.
+
+    sigmas: standard deviations of the series by ``id``, else they are estimated with the rest.
+    """
+    series = [one for flight in flights for one in flight.series]
+    noise = {id(one): noise_by_differences(one) for one in series}
+    ones = {id(one): np.ones(len(one.times_ns)) for one in series}
+    work = _Work(flights, topics_of(flights), unknowns, values, dict(sigmas or noise), ones)
+    length = _first_length(flights)
+    longest = max(flight.duration_s for flight in flights)
+    segments = _segments(work, length)
+    starts = np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
+    work.values = _scanned(work, segments, starts)
+    while length < longest:
+        starts = _solved(work, segments, starts, 12, 1e-2)
+        if sigmas is None:
+            work.sigmas = _noise(work, segments, starts)
+        length *= LENGTHENING
+        longer = _segments(work, length)
+        starts = np.array([_start_of(segment, segments, starts) for segment in longer])
+        segments = longer
+    for turn in range(4):
+        segments = _segments(work, 2.0 * longest)
+        starts = _solved(work, segments, starts, 60, 1e-8)
+        before = dict(work.sigmas)
+        if robust:
+            work.weights = _huber_weights(work, segments, starts)
+        if sigmas is None:
+            work.sigmas = _noise(work, segments, starts)
+        if all(abs(work.sigmas[key] - before[key]) < 0.01 * before[key] for key in before) and (turn or not robust):
+            break
+    segments = _segments(work, 2.0 * longest)
+    return _estimate(work, segments, starts)
+
+
+def _first_length(flights: Sequence[ms.MeasuredFlight]) -> float:
+    total = sum(flight.duration_s for flight in flights)
+    samples = sum(len(flight.series[0].times_ns) for flight in flights)
+    rate = max(usual_rate(flight) for flight in flights)
+    turning = FIRST_ANGLE / rate if rate > 0.0 else total
+    return max(turning, total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
+
+
+def _segments(work: _Work, length_s: float) -> list[sh.Segment]:
+    offset = any(name == "offsets" for name, _ in work.unknowns.slots)
+    margin = OFFSET_MARGIN_S if offset else max(0.0, -min(work.values.offsets, default=0.0))
+    return sh.cut(
+        work.flights,
+        length_s,
+        work.topics,
+        lambda series: work.sigmas[id(series)],
+        lambda series: work.weights[id(series)],
+        margin,
+    )
+
+
+def _start_of(segment: sh.Segment, before: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+    """The start of that of the earlier segments which begins with this one, or a guess."""
+    for other, start in zip(before, starts, strict=True):
+        if other.flight is segment.flight and other.begin_ns == segment.begin_ns:
+            return start
+    return local_start(segment.flight, segment.begin_ns)
+
+
+def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> float:
+    total = 0.0
+    for segment, start in zip(segments, starts, strict=True):
+        found = sh.departures(segment, start, values)
+        if found is None:
+            return np.inf
+        for piece, departure in zip(segment.pieces, found, strict=True):
+            # Few samples that nothing could bring near must not hide what the others say.
+            scaled = np.minimum(np.abs(departure) / piece.sigma, 1e6)
+            total += float(np.sum(np.log1p(scaled * scaled)))
+    return total
+
+
+def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> Values:
+    """The values with mass and size of the tensor about right, where a load tells them: Gauss-Newton steps don't come from far."""
+    loaded = [k for k, segment in enumerate(segments) if len(segment.wrenches.commands)]
+    free = {index for _, index in work.unknowns.theta_columns}
+    values = work.values
+    if not loaded:
+        return values
+    chosen, theirs = [segments[k] for k in loaded], starts[loaded]
+    for index, of_mass in ((mp.MASS, True), (1, False)):
+        if index not in free:
+            continue
+        best, best_cost = values, np.inf
+        for power in range(-24, 25):
+            factor = 10.0 ** (0.25 * power)
+            # The mass changes alone, then the tensor alone.
+            theta = mp.scaled(values.theta, factor if of_mass else 1.0, factor**-0.5 if of_mass else factor**0.5)
+            if of_mass and 1 not in free:
+                theta = mp.scaled(values.theta, factor, 1.0)
+            tried = replace(values, theta=theta)
+            cost = _sum_of_squares(chosen, theirs, tried)
+            if cost < best_cost:
+                best, best_cost = tried, cost
+        values = best
+    return values
+
+
+def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, most: int, tolerance: float) -> np.ndarray:
+    """Improve ``work.values``; returns the starts that go with them."""
+    problem = sh.Problem(segments, starts, work.values, work.unknowns)
+    if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
+        raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
+    found = least_squares(problem.residuals, problem.first, problem.jacobian, x_scale="jac", max_nfev=most, ftol=tolerance)
+    work.evaluations += int(found.nfev)
+    work.values = problem.values(found.x)
+    return problem.starts(found.x)
+
+
+def residuals_by_series(
+    segments: Sequence[sh.Segment], starts: np.ndarray, values: Values
+) -> dict[int, np.ndarray]:
+    """Departures (n, 3) of each series in its own unit, by ``id``."""
+    parts: dict[int, list[np.ndarray]] = {}
+    for segment, start in zip(segments, starts, strict=True):
+        found = sh.departures(segment, start, values)
+        if found is None:
+            raise InputError("identify", "the estimate can't be flown; see --from and --to")
+        for piece, departure in zip(segment.pieces, found, strict=True):
+            parts.setdefault(id(piece.series), []).append(departure)
+    return {key: np.concatenate(part) for key, part in parts.items()}
+
+
+def _noise(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> dict[int, float]:
+    """Standard deviation of each series from its departures; series of one topic and quantity share it over all flights."""
+    found = residuals_by_series(segments, starts, work.values)
+    samples = sum(3 * len(part) for part in found.values())
+    left = max(1.0 - (sh.START * len(segments) + len(work.unknowns)) / samples, 0.1)
+    sums: dict[str, list[float]] = {}
+    series = [one for flight in work.flights for one in flight.series]
+    for one in series:
+        weighted = work.weights[id(one)][:, None] * found[id(one)] ** 2
+        sums.setdefault(one.name, []).append(float(weighted.sum()))
+    counts: dict[str, float] = {}
+    for one in series:
+        counts[one.name] = counts.get(one.name, 0.0) + 3.0 * float(work.weights[id(one)].sum())
+    return {
+        id(one): max(float(np.sqrt(sum(sums[one.name]) / (left * counts[one.name]))), least_noise(one))
+        for one in series
+    }
+
+
+def _huber_weights(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> dict[int, np.ndarray]:
+    """1, or less for samples that lie too far off; the middle size of the departures says what far is."""
+    weights = {}
+    for key, part in residuals_by_series(segments, starts, work.values).items():
+        size = np.linalg.norm(part, axis=1)
+        # The median length of three normal numbers is 1.538.
+        scale = max(float(np.median(size)) / 1.538, 1e-300)
+        weights[key] = np.minimum(1.0, HUBER * np.sqrt(3.0) * scale / np.maximum(size, 1e-300))
+    return weights
+
+
+def _estimate(work: _Work, segments: list[sh.Segment], starts: np.ndarray) -> Estimate:
+    roots, cost = [], 0.0
+    for segment, start in zip(segments, starts, strict=True):
+        flown = sh.linearized(segment, start, work.values, work.unknowns)
+        if flown is None:
+            raise InputError("identify", "the estimate can't be flown; see --from and --to")
+        found, jacobian = flown
+        # Rows that are left when the start has taken all that it can.
+        roots.append(np.linalg.qr(jacobian, mode="r")[sh.START :, sh.START :])
+        cost += float(sum((part**2).sum() for part in found))
+    root = np.concatenate(roots)
+    return Estimate(
+        work.values, work.unknowns, segments, starts, work.sigmas, root, cost, work.evaluations
+    )

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Guesses from a few neighbouring samples, without any body: where a segment starts, and how noisy a series is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import measurements as ms
+from . import rotations as rot
+
+NEIGHBOURS = 9
+"""Samples for a local parabola: at 100 Hz and .2 degrees of noise its slope errs by some hundredths rad/s."""
+LEAST_NOISE = 1e-10
+"""Of the largest value of a series: less can't be told from the rounding of a simulated flight."""
+
+
+def noise_by_differences(series: ms.Series) -> float:
+    """Standard deviation of one component of the noise, from third differences, in which a smooth motion hardly shows.
+
+    Rough where the samples aren't evenly spaced, and an upper bound where there is no noise.
+    """
+    values = series.values
+    if len(values) < 5:
+        return 1.0
+    if series.kind == ms.ATTITUDE:
+        first = rot.logarithm(rot.product(rot.inverse(values[:-1]), values[1:]))
+        third = np.diff(first, 2, axis=0)
+    else:
+        third = np.diff(values, 3, axis=0)
+    spread = float(np.median(np.abs(third))) / 0.6745 / np.sqrt(20.0)
+    return max(spread, least_noise(series))
+
+
+def least_noise(series: ms.Series) -> float:
+    """What rounding alone may leave."""
+    return LEAST_NOISE * max(1.0, float(np.max(np.abs(series.values))))
+
+
+def _window(series: ms.Series, time_ns: int) -> slice:
+    """The samples nearest to a time."""
+    count = min(NEIGHBOURS, len(series.times_ns))
+    first = int(np.searchsorted(series.times_ns, time_ns)) - count // 2
+    first = min(max(first, 0), len(series.times_ns) - count)
+    return slice(first, first + count)
+
+
+def _parabola(series: ms.Series, window: slice, time_ns: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Value and slope at a time, of values (k, 3)."""
+    seconds = 1e-9 * (series.times_ns[window] - time_ns)
+    span = max(float(np.ptp(seconds)), 1e-9)
+    degree = min(2, len(seconds) - 1)
+    fit = np.polynomial.polynomial.polyfit(seconds / span, values, degree)
+    return fit[0], fit[1] / span if degree else np.zeros(3)
+
+
+def _first(flight: ms.MeasuredFlight, kind: str) -> ms.Series | None:
+    return next((series for series in flight.series if series.kind == kind), None)
+
+
+def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
+    """The tracked frame's state (13,) at a time: position, attitude xyzw, velocity, angular velocity in body axes."""
+    start = np.zeros(13)
+    start[6] = 1.0
+    position, attitude = _first(flight, ms.POSITION), _first(flight, ms.ATTITUDE)
+    if position is not None:
+        window = _window(position, time_ns)
+        start[:3], start[7:10] = _parabola(position, window, time_ns, position.values[window])
+    if attitude is not None:
+        window = _window(attitude, time_ns)
+        middle = attitude.values[window][len(attitude.values[window]) // 2]
+        turns = rot.logarithm(rot.product(rot.inverse(middle), attitude.values[window]))
+        turn, slope = _parabola(attitude, window, time_ns, turns)
+        start[3:7] = rot.product(middle, rot.exponential(turn))
+        # The vector of a small turn changes as the angular velocity does.
+        start[10:13] = slope
+    rate = next((s for s in flight.series if s.kind == ms.RATE and (s.in_body or attitude is not None)), None)
+    if rate is not None:
+        window = _window(rate, time_ns)
+        value = _parabola(rate, window, time_ns, rate.values[window])[0]
+        start[10:13] = value if rate.in_body else rot.turned_back(start[3:7], value)
+    velocity = _first(flight, ms.VELOCITY)
+    if velocity is not None:
+        window = _window(velocity, time_ns)
+        value = _parabola(velocity, window, time_ns, velocity.values[window])[0]
+        start[7:10] = rot.turned(start[3:7], value) if velocity.in_body else value
+    return start
+
+
+def usual_rate(flight: ms.MeasuredFlight) -> float:
+    """Median angular speed [rad/s]."""
+    rate, attitude = _first(flight, ms.RATE), _first(flight, ms.ATTITUDE)
+    if rate is not None:
+        return float(np.median(np.linalg.norm(rate.values, axis=1)))
+    if attitude is None or len(attitude.values) < 2:
+        return 0.0
+    turns = rot.logarithm(rot.product(rot.inverse(attitude.values[:-1]), attitude.values[1:]))
+    seconds = 1e-9 * np.diff(attitude.times_ns)
+    return float(np.median(np.linalg.norm(turns, axis=1) / np.maximum(seconds, 1e-9)))

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""The ten mass parameters in log-Cholesky coordinates: whatever the numbers, a body with them can exist.
+
+Rucker and Wensing, Smooth Parameterization of Rigid-Body Inertia, IEEE Robotics and Automation Letters 7 (2022): the pseudo-inertia
+about the origin of the tracked frame is J = U Uᵀ with
+
+        [ e^d1  s12   s13   t1 ]
+    U = [  0    e^d2  s23   t2 ] e^α,    θ = (α, d1, d2, d3, s12, s23, s13, t1, t2, t3).
+        [  0     0    e^d3  t3 ]
+        [  0     0     0    1  ]
+
+So the mass is e^2α, t is the centre of mass, and Σ = m V Vᵀ (V the upper left of U without e^α) are the second moments about the
+centre of mass, of which the tensor is tr(Σ) 1 − Σ.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..mass.tensor import check_tensor, principal_axes
+
+MASS = 0
+SHAPE = slice(1, 7)
+COM = slice(7, 10)
+PARAMETERS = 10
+
+SEEN = (
+    *("mass", "size of the tensor", "ratio of the largest moment to the others", "ratio of the two smaller moments"),
+    *("turn of axes 2 and 3", "turn of axes 1 and 3", "turn of axes 1 and 2"),
+    *("centre of mass along x", "centre of mass along y", "centre of mass along z"),
+)
+"""The directions of ``physical_directions``, axes of moments ascending: 1, 2, 3; x, y, z those of the tracked frame."""
+
+
+@dataclass(frozen=True)
+class MassEstimate:
+    """mass [kg], center_of_mass (3,) [m, tracked frame], inertia (3, 3) [kg m², about the COM, axes of the tracked frame]."""
+
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+
+
+def mass_of(theta: np.ndarray) -> MassEstimate:
+    """The body with these parameters (10,)."""
+    mass = math.exp(2.0 * theta[MASS])
+    V = _upper(theta)
+    second = mass * (V @ V.T)
+    return MassEstimate(mass, theta[COM].copy(), np.trace(second) * np.eye(3) - second)
+
+
+def parameters_of(mass: float, center_of_mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """θ (10,) of a body; a flat one, on the rim of what can exist, is taken a millionth of its size thicker."""
+    check_tensor(inertia)
+    if not 0.0 < mass < math.inf:
+        raise InputError("mass", mass, "a finite number above 0 [kg]")
+    second = (0.5 * np.trace(inertia) * np.eye(3) - inertia) / mass
+    values, vectors = np.linalg.eigh(second)
+    second = (vectors * np.maximum(values, 1e-12 * values[2])) @ vectors.T
+    # Upper triangular: Cholesky of the matrix turned end for end.
+    V = np.linalg.cholesky(second[::-1, ::-1])[::-1, ::-1]
+    theta = np.zeros(PARAMETERS)
+    theta[MASS] = 0.5 * math.log(mass)
+    theta[1:4] = np.log(np.diag(V))
+    theta[4:7] = V[0, 1], V[1, 2], V[0, 2]
+    theta[COM] = center_of_mass
+    return theta
+
+
+def _upper(theta: np.ndarray) -> np.ndarray:
+    d, (s12, s23, s13) = np.exp(theta[1:4]), theta[4:7]
+    return np.array([[d[0], s12, s13], [0.0, d[1], s23], [0.0, 0.0, d[2]]])
+
+
+def scaled(theta: np.ndarray, mass: float, length: float) -> np.ndarray:
+    """The body with its mass ``mass`` times as large and its tensor so too, then all its second moments by length²."""
+    other = theta.copy()
+    other[MASS] += 0.5 * math.log(mass)
+    other[1:4] += math.log(length)
+    other[4:7] *= length
+    return other
+
+
+def difference_steps(theta: np.ndarray) -> np.ndarray:
+    """Steps (10,) for difference quotients: a relative change of moments and mass, the same part of the body's size for the COM."""
+    size = np.exp(theta[1:4])
+    return 1e-5 * np.array([1.0, 1.0, 1.0, 1.0, size[1], size[2], size[2], *[float(np.max(size))] * 3])
+
+
+def physical_directions(theta: np.ndarray) -> np.ndarray:
+    """∂φ/∂θ (10, 10): how mass, tensor and COM, in the order of ``SEEN``, change with the parameters.
+
+    The mass and the tensor relative to themselves (the tensor in its principal axes, each entry by the root of its two moments), the
+    COM in metres. Unlike angles of axes these stay regular where two moments agree.
+    """
+    moments, axes = principal_axes(mass_of(theta).inertia)
+    root = np.sqrt(np.outer(moments, moments))
+    steps = difference_steps(theta)
+    columns = []
+    for k in range(PARAMETERS):
+        step = np.zeros(PARAMETERS)
+        step[k] = steps[k]
+        up, down = mass_of(theta + step), mass_of(theta - step)
+        change = (axes.T @ (up.inertia - down.inertia) @ axes) / root
+        a, b, c = np.diag(change)
+        tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, change[1, 2], change[0, 2], change[0, 1])
+        mass = math.log(up.mass / down.mass)
+        columns.append(np.array([mass, *tensor, *(up.center_of_mass - down.center_of_mass)]) / (2.0 * steps[k]))
+    return np.array(columns).T

@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: MIT
+"""Multiple shooting: every segment of a flight has a start of its own, and all have the same body.
+
+The residuals of a segment and their derivatives come from one compiled call that flies the body beside its variations. Only what a
+least-squares step needs is kept of them: with [J r] = Q R, R alone, which has as many rows as there are unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import mass_parameters as mp
+from . import measurements as ms
+from . import rotations as rot
+from . import trajectories as tr
+from .sensors import departure, predicted
+from .unknowns import Unknowns, Values
+
+START = 12
+"""Unknowns of a segment's start: position [m], turn [rad, body axes], velocity [m/s], angular velocity [rad/s, body axes]."""
+START_STEPS = np.array([0.0] * 3 + [1e-5] * 3 + [0.0] * 3 + [1e-5] * 3)
+"""For difference quotients; how a flight shifts with its position and velocity is known in closed form."""
+OFFSET_STEP_S = 1e-5
+FAILED = 1e8
+"""Residual of a flight that didn't come through, in standard deviations: the step is then taken back."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Samples of a series within a segment. weights (n,): of robust fits, else 1."""
+
+    series: ms.Series
+    topic: int
+    times_ns: np.ndarray
+    values: np.ndarray
+    sigma: float
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class Segment:
+    """flight: which one it is of. begin_ns: when it starts, no later than its first sample."""
+
+    flight: ms.MeasuredFlight
+    begin_ns: int
+    pieces: tuple[Piece, ...]
+    wrenches: tr.Wrenches
+
+    @property
+    def samples(self) -> int:
+        """How many there are in all."""
+        return sum(len(piece.times_ns) for piece in self.pieces)
+
+
+def cut(
+    flights: Sequence[ms.MeasuredFlight],
+    lengths_s: float,
+    topics: Sequence[str],
+    sigma: Callable[[ms.Series], float],
+    weights: Callable[[ms.Series], np.ndarray],
+    margin_s: float = 0.0,
+) -> list[Segment]:
+    """Segments of about this length, alike within a flight; margin_s: how much earlier they start than their samples."""
+    margin = round(margin_s * 1e9)
+    segments = []
+    for flight in flights:
+        count = max(1, round(flight.duration_s / lengths_s))
+        edges = np.linspace(flight.begin_ns, flight.end_ns + 1, count + 1).astype(np.int64)
+        for first, last in zip(edges[:-1], edges[1:], strict=True):
+            pieces = []
+            for series in flight.series:
+                inside = slice(*np.searchsorted(series.times_ns, (first, last)))
+                if inside.stop > inside.start:
+                    times, values = series.times_ns[inside], series.values[inside]
+                    topic = topics.index(series.topic)
+                    pieces.append(Piece(series, topic, times, values, sigma(series), weights(series)[inside]))
+            if pieces:
+                begin = int(first) - margin
+                segments.append(Segment(flight, begin, tuple(pieces), flight.acting.within(begin, int(last) + margin)))
+    return segments
+
+
+def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
+    """Starts (n, 13) of the tracked frame changed by (n, 12)."""
+    moved = starts.copy()
+    moved[:, :3] += changes[:, :3]
+    attitude = rot.product(starts[:, 3:7], rot.exponential(changes[:, 3:6]))
+    moved[:, 3:7] = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
+    moved[:, 7:13] += changes[:, 6:12]
+    return moved
+
+
+def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
+    """Rows of ``trajectories.fly_rows`` (n, FLOWN): starts (n, 13) of the tracked frame as those of the centre of mass."""
+    rows = np.empty((len(starts), tr.FLOWN))
+    bodies = {id(v): (v, mp.mass_of(v.theta)) for v in values}
+    for row, v in zip(rows, values, strict=True):
+        mass = bodies[id(v)][1]
+        row[tr.MASS] = mass.mass
+        row[tr.COM : tr.COM + 3] = mass.center_of_mass
+        row[tr.INERTIA : tr.INERTIA + 9] = mass.inertia.ravel()
+        row[tr.GRAVITY : tr.GRAVITY + 3] = v.gravity
+        row[tr.LINEAR_DAMPING], row[tr.ANGULAR_DAMPING] = v.damping
+    at, com = tr.START, rows[:, tr.COM : tr.COM + 3]
+    q, w = starts[:, 3:7], starts[:, 10:13]
+    rows[:, at : at + 13] = starts
+    rows[:, at : at + 3] += rot.turned(q, com)
+    rows[:, at + 7 : at + 10] += rot.turned(q, rot.cross(w, com))
+    return rows
+
+
+def _times(segment: Segment, offsets: Sequence[float]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Times to look at, ascending from the segment's begin [ns], and for each piece which of them are its own."""
+    own = [piece.times_ns - segment.begin_ns + round(offsets[piece.topic] * 1e9) for piece in segment.pieces]
+    times, where = np.unique(np.maximum(np.concatenate(own), 0), return_inverse=True)
+    ends = np.cumsum([len(part) for part in own])
+    return times, np.split(where, ends[:-1])
+
+
+def _shown(segment: Segment, starts: np.ndarray, values: Sequence[Values]) -> tuple[list[np.ndarray], np.ndarray | None]:
+    """What each piece would show of each flight, (n, m, 3 or 4), and the samples of the first one; None where one failed."""
+    times, where = _times(segment, values[0].offsets)
+    samples, good = tr.fly_rows(flown_rows(starts, values), times, segment.wrenches)
+    if not good.all():
+        return [], None
+    com = np.array([v.theta[mp.COM] for v in values])[:, None]
+    place = np.array([v.imu_place for v in values])[:, None]
+    shown = []
+    for piece, index in zip(segment.pieces, where, strict=True):
+        series = piece.series
+        name = "accel_bias" if series.kind == ms.ACCELERATION else "gyro_bias"
+        bias = np.array([getattr(v, name) for v in values])[:, None] * (1.0 if series.is_imu else 0.0)
+        shown.append(predicted(series, samples[:, index], com, place, bias))
+    return shown, samples[0]
+
+
+def departures(segment: Segment, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
+    """Measured minus shown of each piece (m, 3), in its own unit; None where the flight failed."""
+    shown, _ = _shown(segment, start[None], [values])
+    if not shown:
+        return None
+    return [departure(p.series.kind, s[0], p.values) for p, s in zip(segment.pieces, shown, strict=True)]
+
+
+def _variations(
+    start: np.ndarray, values: Values, unknowns: Unknowns, steps: np.ndarray
+) -> tuple[np.ndarray, list[Values], list[int]]:
+    """Flights for difference quotients: the base, then those up and down of each column; starts, values, and the columns."""
+    changed = np.flatnonzero(START_STEPS)
+    varied = [k for k, (name, _) in enumerate(unknowns.slots) if name != "offsets"]
+    starts = np.repeat(start[None], 1 + 2 * (len(changed) + len(varied)), axis=0)
+    up_and_down = np.diag(START_STEPS)[changed][:, None] * np.array([1.0, -1.0])[:, None]
+    starts[1 : 1 + 2 * len(changed)] = moved_starts(starts[: 2 * len(changed)], up_and_down.reshape(-1, START))
+    theirs = [values] * (1 + 2 * len(changed))
+    base = unknowns.read(values)
+    for k in varied:
+        for sign in (1.0, -1.0):
+            numbers = base.copy()
+            numbers[k] += sign * steps[k]
+            theirs.append(unknowns.put(values, numbers))
+    return starts, theirs, [*changed.tolist(), *(START + k for k in varied)]
+
+
+def _shift_columns(piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """How a piece changes with its start's position and velocity, (m, 3, 3) each; base (m, SAMPLE), rate c/m [1/s]."""
+    m, kind = len(base), piece.series.kind
+    position, velocity = np.zeros((m, 3, 3)), np.zeros((m, 3, 3))
+    decay = np.exp(-rate * seconds)[:, None, None]
+    back = rot.turned_back(base[:, None, 3:7], np.eye(3)[None]).transpose(0, 2, 1)
+    if kind == ms.POSITION:
+        position[:] = np.eye(3)
+        way = -np.expm1(-rate * seconds) / rate if rate else seconds
+        velocity[:] = np.eye(3) * way[:, None, None]
+    elif kind == ms.VELOCITY:
+        velocity[:] = (back if piece.series.in_body else np.eye(3)) * decay
+    elif kind == ms.ACCELERATION:
+        velocity[:] = -rate * back * decay
+    return position, velocity
+
+
+def linearized(
+    segment: Segment, start: np.ndarray, values: Values, unknowns: Unknowns
+) -> tuple[list[np.ndarray], np.ndarray] | None:
+    """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 + unknowns).
+
+    Both in units of the standard deviations, weighted. None where a flight failed.
+    """
+    steps = unknowns.steps(values)
+    starts, theirs, columns = _variations(start, values, unknowns, steps)
+    shown, base = _shown(segment, starts, theirs)
+    if base is None:
+        return None
+    times, where = _times(segment, values.offsets)
+    rate = values.damping[0] / mp.mass_of(values.theta).mass
+    widths = np.concatenate([START_STEPS, steps])
+    blocks, found = [], []
+    for piece, own, index in zip(segment.pieces, shown, where, strict=True):
+        kind = piece.series.kind
+        block = np.zeros((len(index), 3, START + len(unknowns)))
+        block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate)
+        # What a flight shows moves by minus what its departure from a nearby one says.
+        difference = departure(kind, own[2::2], own[1::2])
+        block[:, :, columns] = (difference / (2.0 * widths[columns])[:, None, None]).transpose(1, 2, 0)
+        weight = np.sqrt(piece.weights)[:, None] / piece.sigma
+        blocks.append(-block * weight[:, :, None])
+        found.append(departure(kind, own[0], piece.values) * weight)
+    for k, (name, topic) in enumerate(unknowns.slots):
+        if name == "offsets":
+            _fill_offset(segment, start, values, topic, [block[:, :, START + k] for block in blocks])
+    return found, np.concatenate([block.reshape(-1, START + len(unknowns)) for block in blocks])
+
+
+def _fill_offset(
+    segment: Segment, start: np.ndarray, values: Values, topic: int, columns: Sequence[np.ndarray]
+) -> None:
+    """How what a topic shows changes with its clock, into a column (m, 3) of each piece."""
+    sides = []
+    for sign in (1.0, -1.0):
+        offsets = list(values.offsets)
+        offsets[topic] += sign * OFFSET_STEP_S
+        moved = replace(values, offsets=tuple(offsets))
+        sides.append(_shown(segment, start[None], [moved])[0])
+    for number, (piece, column) in enumerate(zip(segment.pieces, columns, strict=True)):
+        if piece.topic == topic:
+            change = departure(piece.series.kind, sides[1][number][0], sides[0][number][0])
+            weight = np.sqrt(piece.weights)[:, None] / piece.sigma
+            column[:] = -weight * change / (2.0 * OFFSET_STEP_S)
+
+
+def compressed(found: Sequence[np.ndarray], jacobian: np.ndarray) -> np.ndarray:
+    """[J r] as an upper triangle (k, columns + 1) with the same products of its columns.
+
+    In slices: small ones are done where they are, and a busy machine's cores don't wait for one another.
+    """
+    whole = np.column_stack([jacobian, np.concatenate([part.ravel() for part in found])])
+    width = whole.shape[1]
+    triangle = np.zeros((0, width))
+    for first in range(0, len(whole), SLICE):
+        triangle = np.linalg.qr(np.vstack([triangle, whole[first : first + SLICE]]), mode="r")
+    short = width - len(triangle)
+    return np.vstack([triangle, np.zeros((short, width))]) if short > 0 else triangle
+
+
+SLICE = 400
+"""Rows of a QR decomposition at a time."""
+
+
+class Problem:
+    """Residuals of all segments and of a wide prior as SciPy takes them, of the unknowns alone.
+
+    With [J_start J r] = Q R the start of a segment takes what it can of the residuals, and the rows of R below the twelfth are what is left:
+    so every segment finds its own start while SciPy steps in the few numbers that all share (variable projection: Golub and Pereyra,
+    SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative).
+    """
+
+    def __init__(self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns) -> None:
+        self.segments, self.unknowns, self._given = segments, unknowns, values
+        self.first = unknowns.read(values)
+        # So wide that it only holds what the motion can't tell.
+        self._widths = 1e6 * unknowns.steps(values)
+        self._base: _Linearized | None = None
+        self._trial: _Linearized | None = None
+        self._starts = starts
+
+    def values(self, numbers: np.ndarray) -> Values:
+        """With these unknowns."""
+        return self.unknowns.put(self._given, numbers)
+
+    def starts(self, numbers: np.ndarray) -> np.ndarray:
+        """The best starts (k, 13) for these unknowns, at which the last step ended."""
+        at = self._at(numbers)
+        return at.starts_for(numbers) if at.triangles is not None else at.starts
+
+    def residuals(self, numbers: np.ndarray) -> np.ndarray:
+        """For SciPy."""
+        return self._at(numbers).residuals
+
+    def jacobian(self, numbers: np.ndarray) -> np.ndarray:
+        """For SciPy, which asks only where it stays: later starts are foretold from here."""
+        self._base = self._at(numbers)
+        return self._base.jacobian
+
+    def _at(self, numbers: np.ndarray) -> _Linearized:
+        for known in (self._trial, self._base):
+            if known is not None and np.array_equal(known.numbers, numbers):
+                return known
+        starts = self._starts if self._base is None else self._base.starts_for(numbers)
+        self._trial = self._linearized(numbers, starts)
+        return self._trial
+
+    def _linearized(self, numbers: np.ndarray, starts: np.ndarray) -> _Linearized:
+        values, free = self.values(numbers), len(self.unknowns)
+        triangles = []
+        prior = ((numbers - self.first) / self._widths, np.diag(1.0 / self._widths))
+        for segment, start in zip(self.segments, starts, strict=True):
+            flown = linearized(segment, start, values, self.unknowns)
+            if flown is None:
+                rows = len(self.segments) * (free + 1)
+                failed = np.concatenate([np.full(rows, FAILED), prior[0]])
+                return _Linearized(numbers, starts, None, failed, np.vstack([np.zeros((rows, free)), prior[1]]))
+            triangles.append(compressed(*flown))
+        below = np.concatenate([triangle[START:, START:] for triangle in triangles])
+        residuals = np.concatenate([below[:, -1], prior[0]])
+        return _Linearized(numbers, starts, triangles, residuals, np.vstack([below[:, :-1], prior[1]]))
+
+
+@dataclass(frozen=True)
+class _Linearized:
+    """numbers: the unknowns. starts (k, 13): where the segments were flown from. triangles: ``compressed`` ones, None where one failed."""
+
+    numbers: np.ndarray
+    starts: np.ndarray
+    triangles: list[np.ndarray] | None
+    residuals: np.ndarray
+    jacobian: np.ndarray
+
+    def starts_for(self, numbers: np.ndarray) -> np.ndarray:
+        """The best starts for other unknowns, as far as the derivatives say."""
+        if self.triangles is None:
+            return self.starts
+        change = np.append(numbers - self.numbers, 1.0)
+        steps = []
+        for triangle in self.triangles:
+            own, rest = triangle[:START, :START], triangle[:START, START:] @ change
+            # Tiny prior on the start: what too few samples leave open stays where it is.
+            prior = np.diag(1.0 / START_WIDTHS)
+            whole = np.vstack([own, prior])
+            steps.append(-np.linalg.lstsq(whole, np.concatenate([rest, np.zeros(START)]), rcond=None)[0])
+        return moved_starts(self.starts, np.array(steps))
+
+
+START_WIDTHS = np.repeat([1e3, 1e2, 1e3, 1e3], 3)
+"""Of what is assumed of a start beforehand."""

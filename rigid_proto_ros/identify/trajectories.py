@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""Many bodies through one shooting segment in one compiled call: the same flight that simulations, replays and sweeps advance with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import int64, types
+
+from ..base.compilation import njit
+from ..base.rotation import quaternion_of_axes, rotate, rotate_inverse
+from ..mass.tensor import principal_axes_kernel
+from ..motion import body as of_body
+from ..motion import loads as ld
+from ..motion import problem as pr
+from ..motion.integrators.auto import AUTO
+from ..motion.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
+from ..motion.integrators.taylor_adaptive import degree_for
+from ..simulation import flight as fl
+
+ACCURACY = 1e-11
+"""Local error rate: differences over steps of 1e-5 then keep five digits, more than an estimate needs."""
+
+# A row of a body to fly: what of it varies.
+MASS = 0
+COM = 1  # (3,) [m, tracked frame]
+INERTIA = 4  # (9,) [kg m²]
+GRAVITY = 13  # (3,) [m/s²]
+LINEAR_DAMPING, ANGULAR_DAMPING = 16, 17
+START = 18  # (13,) state of the COM at the segment's start
+FLOWN = 31
+
+# A row of what is known at a sample.
+STATE = 0  # (13,)
+SPECIFIC_FORCE = 13  # (3,) at the COM: acceleration without gravity [m/s², body axes]
+ANGULAR_ACCELERATION = 16  # (3,) [rad/s², body axes]
+SAMPLE = 19
+
+DONE = -1
+
+
+@dataclass(frozen=True)
+class Wrenches:
+    """What acts in a segment: times (c, 3) and loads (c, LOAD) as simulation/flight.py takes them, from the segment's start."""
+
+    commands: np.ndarray
+    loads: np.ndarray
+
+
+@njit(cache=True, error_model="numpy")
+def _make_body(flown, body):
+    """Fill ``body`` (BODY,) from a row; whether a body can have it."""
+    inertia = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            inertia[i, j] = flown[INERTIA + 3 * i + j]
+    moments, axes = principal_axes_kernel(inertia)
+    body[of_body.MASS] = flown[MASS]
+    quaternion_of_axes(axes, body[of_body.QUATERNION : of_body.QUATERNION + 4])
+    for k in range(3):
+        body[of_body.COM + k] = flown[COM + k]
+        body[of_body.MOMENTS + k] = moments[k]
+        body[of_body.BODY_SCALE + k] = 1.0
+        for j in range(3):
+            body[of_body.INERTIA + 3 * k + j] = inertia[k, j]
+            body[of_body.AXES + 3 * k + j] = axes[k, j]
+    body[of_body.LENGTH] = 1.0
+    return moments[0] > 0.0 and np.isfinite(moments[2]) and flown[MASS] > 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _rates(flown, body, sums, row, sample):
+    """What an accelerometer at the COM feels, and ω', from the loads that act: both from the equations of motion."""
+    qx, qy, qz, qw = row[3], row[4], row[5], row[6]
+    wx, wy, wz = row[10], row[11], row[12]
+    W, B, T, U, M = ld.FORCE_WORLD, ld.FORCE_BODY, ld.TORQUE_WORLD, ld.TORQUE_BODY, ld.MOMENT
+    c, d = flown[LINEAR_DAMPING], flown[ANGULAR_DAMPING]
+    force = (sums[W] - c * row[7], sums[W + 1] - c * row[8], sums[W + 2] - c * row[9])
+    fx, fy, fz = rotate_inverse(qx, qy, qz, qw, force[0], force[1], force[2])
+    m = flown[MASS]
+    sample[SPECIFIC_FORCE] = (fx + sums[B]) / m
+    sample[SPECIFIC_FORCE + 1] = (fy + sums[B + 1]) / m
+    sample[SPECIFIC_FORCE + 2] = (fz + sums[B + 2]) / m
+    tx, ty, tz = rotate_inverse(qx, qy, qz, qw, sums[T], sums[T + 1], sums[T + 2])
+    _, m01, m02 = rotate_inverse(qx, qy, qz, qw, sums[M], sums[M + 1], sums[M + 2])
+    m10, _, m12 = rotate_inverse(qx, qy, qz, qw, sums[M + 3], sums[M + 4], sums[M + 5])
+    m20, m21, _ = rotate_inverse(qx, qy, qz, qw, sums[M + 6], sums[M + 7], sums[M + 8])
+    I = of_body.INERTIA
+    lx = body[I] * wx + body[I + 1] * wy + body[I + 2] * wz
+    ly = body[I + 3] * wx + body[I + 4] * wy + body[I + 5] * wz
+    lz = body[I + 6] * wx + body[I + 7] * wy + body[I + 8] * wz
+    tx += sums[U] + (m12 - m21) - d * wx - (wy * lz - wz * ly)
+    ty += sums[U + 1] + (m20 - m02) - d * wy - (wz * lx - wx * lz)
+    tz += sums[U + 2] + (m01 - m10) - d * wz - (wx * ly - wy * lx)
+    x, y, z = of_body.angular_acceleration(body, tx, ty, tz)
+    sample[ANGULAR_ACCELERATION], sample[ANGULAR_ACCELERATION + 1], sample[ANGULAR_ACCELERATION + 2] = x, y, z
+
+
+def _fly_all(flown, times_ns, commands, loads, methods, degree, samples, good):  # noqa: PLR0913
+    """Each row of flown (n, FLOWN) through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it came through.
+
+    Returns DONE, or the number of the method that must be compiled first.
+    """
+    count, room = commands.shape[0], 0
+    for k in range(methods.shape[0]):
+        room = max(room, methods[k, ROWS] * methods[k, COLUMNS])
+    f, n = np.zeros(fl.ROOM + room), np.zeros(fl.INTEGERS, np.int64)
+    events = np.zeros((4 * count + 8, fl.EVENT), np.int64)
+    rows_ns, rows = np.zeros((count + 1, fl.TIMES), np.int64), np.zeros((count + 1, fl.LOAD_ROW))
+    body = np.zeros(of_body.BODY)
+    for i in range(flown.shape[0]):
+        own = flown[i]
+        good[i] = 0
+        if not _make_body(own, body):
+            continue
+        f[: fl.ROOM] = 0.0
+        n[:] = 0
+        n[fl.HELD], n[fl.METHOD], n[fl.CHOOSES] = fl.NOBODY, -1, 1
+        n[fl.STEP_NS] = 1_000_000
+        row = f[fl.ROW : fl.ROW + 13]
+        row[:] = own[START : START + 13]
+        f[fl.START : fl.START + 13] = row
+        f[fl.BODY : fl.BODY + of_body.BODY] = body
+        common = f[fl.COMMON : fl.COMMON + pr.SIZE]
+        pr.begin_body(common, body, own[GRAVITY : GRAVITY + 3], own[LINEAR_DAMPING], own[ANGULAR_DAMPING], 1.0)
+        f[fl.ACCURACY], f[fl.DEGREE] = ACCURACY, degree
+        for c in range(count):
+            rows_ns[c, :3] = commands[c]
+            rows[c, : ld.LOAD] = loads[c]
+        n[fl.DUE_END] = count
+        fl.begin_segment(f, n, rows, methods)
+        good[i] = 1
+        for k in range(times_ns.shape[0]):
+            came = fl.fly(f, n, rows_ns, rows, events, methods, times_ns[k])
+            if came == fl.NO_KERNEL:
+                return n[fl.METHOD]
+            if came != fl.REACHED:
+                good[i] = 0
+                break
+            samples[i, k, :13] = row
+            _rates(own, body, f[fl.SUMS : fl.SUMS + ld.LOADS_SIZE], row, samples[i, k])
+    return DONE
+
+
+@cache
+def _compiled():
+    """``_fly_all`` compiled, or loaded from the cache, the table of the methods, and the degree of their series."""
+    flat, table, cube = types.float64[:, ::1], types.int64[:, ::1], types.float64[:, :, ::1]
+    signature = int64(flat, types.int64[::1], table, flat, table, int64, cube, types.int64[::1])
+    degree = degree_for(ACCURACY)
+    methods = method_table(AUTO, degree)
+    return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_all), methods, degree
+
+
+def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tuple[np.ndarray, np.ndarray]:
+    """Samples (n, m, SAMPLE) of each row of ``flown`` (n, FLOWN) at times_ns (m,) ascending from 0, and whether it came through (n,)."""
+    kernel, methods, degree = _compiled()
+    samples = np.empty((len(flown), len(times_ns), SAMPLE))
+    good = np.zeros(len(flown), np.int64)
+    while True:
+        wanted = kernel(flown, times_ns, wrenches.commands, wrenches.loads, methods, degree, samples, good)
+        if wanted == DONE:
+            return samples, good == 1
+        provide_kernel(AUTO, methods, wanted)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Flights as a motion capture would see them: made by the simulation's own kernels, with noise from a seeded generator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_proto_ros.identify import measurements as ms
+from rigid_proto_ros.identify import rotations as rot
+from rigid_proto_ros.identify import shooting as sh
+from rigid_proto_ros.identify import trajectories as tr
+from rigid_proto_ros.identify.mass_parameters import parameters_of
+from rigid_proto_ros.identify.unknowns import Values
+from rigid_proto_ros.motion.loads import Load
+
+MOCAP = (0.5e-3, np.radians(0.2))
+"""Of position [m] and attitude [rad], each component."""
+
+
+def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0), topics=1) -> Values:
+    """All that is known of a body."""
+    zero = np.zeros(3)
+    theta = parameters_of(mass, np.asarray(com, float), np.asarray(inertia, float))
+    return Values(theta, np.array(damping, float), np.array(gravity, float), (0.0,) * topics, zero, zero, zero)
+
+
+def acting(*pokes) -> ms.Acting:
+    """Loads from (begin [s], duration [s] or 0 for an impulse, axes, point in the tracked frame or None, force, torque)."""
+    begin = np.array([round(p[0] * 1e9) for p in pokes], np.int64)
+    end = begin + np.array([round(p[1] * 1e9) for p in pokes], np.int64)
+    loads = [Load(axes, point, tuple(force), tuple(torque)).row for _, _, axes, point, force, torque in pokes]
+    return ms.Acting(begin, end, np.array(loads))
+
+
+def flown(values, start, times_s, load=None):
+    """Samples (m, SAMPLE) of a flight from the tracked frame's start (13,) at time 0."""
+    times_ns = np.round(np.asarray(times_s) * 1e9).astype(np.int64)
+    wrenches = (load or ms.nothing_acting()).within(0, int(times_ns[-1]) + 1)
+    samples, good = tr.fly_rows(sh.flown_rows(np.asarray(start, float)[None], [values]), times_ns, wrenches)
+    assert good.all()
+    return times_ns, samples[0]
+
+
+def mocap(values, start, rng, seconds=5.0, rate=100.0, load=None, noise=MOCAP, topic="/mocap/pose") -> ms.MeasuredFlight:
+    """A flight whose pose was measured."""
+    times, samples = flown(values, start, np.arange(0.0, seconds, 1.0 / rate), load)
+    com = values.theta[7:10]
+    position = samples[:, :3] - rot.turned(samples[:, 3:7], com) + noise[0] * rng.standard_normal((len(times), 3))
+    attitude = rot.product(samples[:, 3:7], rot.exponential(noise[1] * rng.standard_normal((len(times), 3))))
+    series = (ms.Series(topic, ms.POSITION, times, position), ms.Series(topic, ms.ATTITUDE, times, attitude))
+    return ms.MeasuredFlight("flight", series, load or ms.nothing_acting(), tuple(values.gravity))
+
+
+def tumbling(rate=(0.4, 6.0, 0.3), velocity=(0.3, -0.2, 3.0)) -> np.ndarray:
+    """A start (13,)."""
+    return np.array([0.1, 0.2, 1.0, 0.0, 0.0, 0.0, 1.0, *velocity, *rate])
