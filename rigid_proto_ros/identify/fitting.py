@@ -184,7 +184,7 @@ def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) ->
 
 def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, most: int, tolerance: float) -> np.ndarray:
     """Improve ``work.values``; returns the starts that go with them."""
-    problem = sh.Problem(segments, starts, work.values, work.unknowns)
+    problem = sh.Problem(segments, starts, work.values, work.unknowns, central=tolerance < 1e-3)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
         raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
     found = least_squares(problem.residuals, problem.first, problem.jacobian, x_scale="jac", max_nfev=most, ftol=tolerance)

@@ -76,6 +76,11 @@ def _upper(theta: np.ndarray) -> np.ndarray:
     return np.array([[d[0], s12, s13], [0.0, d[1], s23], [0.0, 0.0, d[2]]])
 
 
+def principal(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments (3,) ascending and axes (3, 3), columns."""
+    return principal_axes(mass_of(theta).inertia)
+
+
 def scaled(theta: np.ndarray, mass: float, length: float) -> np.ndarray:
     """The body with its mass ``mass`` times as large and its tensor so too, then all its second moments by length²."""
     other = theta.copy()
@@ -97,7 +102,7 @@ def physical_directions(theta: np.ndarray) -> np.ndarray:
     The mass and the tensor relative to themselves (the tensor in its principal axes, each entry by the root of its two moments), the
     COM in metres. Unlike angles of axes these stay regular where two moments agree.
     """
-    moments, axes = principal_axes(mass_of(theta).inertia)
+    moments, axes = principal(theta)
     root = np.sqrt(np.outer(moments, moments))
     steps = difference_steps(theta)
     columns = []

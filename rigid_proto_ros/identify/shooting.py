@@ -146,18 +146,18 @@ def departures(segment: Segment, start: np.ndarray, values: Values) -> list[np.n
 
 
 def _variations(
-    start: np.ndarray, values: Values, unknowns: Unknowns, steps: np.ndarray
+    start: np.ndarray, values: Values, unknowns: Unknowns, steps: np.ndarray, sides: Sequence[float]
 ) -> tuple[np.ndarray, list[Values], list[int]]:
-    """Flights for difference quotients: the base, then those up and down of each column; starts, values, and the columns."""
+    """Flights for difference quotients: the base, then those to each side of each column; starts, values, and the columns."""
     changed = np.flatnonzero(START_STEPS)
     varied = [k for k, (name, _) in enumerate(unknowns.slots) if name != "offsets"]
-    starts = np.repeat(start[None], 1 + 2 * (len(changed) + len(varied)), axis=0)
-    up_and_down = np.diag(START_STEPS)[changed][:, None] * np.array([1.0, -1.0])[:, None]
-    starts[1 : 1 + 2 * len(changed)] = moved_starts(starts[: 2 * len(changed)], up_and_down.reshape(-1, START))
-    theirs = [values] * (1 + 2 * len(changed))
+    starts = np.repeat(start[None], 1 + len(sides) * (len(changed) + len(varied)), axis=0)
+    changes = (np.diag(START_STEPS)[changed][:, None] * np.array(sides)[:, None]).reshape(-1, START)
+    starts[1 : 1 + len(changes)] = moved_starts(starts[: len(changes)], changes)
+    theirs = [values] * (1 + len(changes))
     base = unknowns.read(values)
     for k in varied:
-        for sign in (1.0, -1.0):
+        for sign in sides:
             numbers = base.copy()
             numbers[k] += sign * steps[k]
             theirs.append(unknowns.put(values, numbers))
@@ -182,14 +182,16 @@ def _shift_columns(piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: fl
 
 
 def linearized(
-    segment: Segment, start: np.ndarray, values: Values, unknowns: Unknowns
+    segment: Segment, start: np.ndarray, values: Values, unknowns: Unknowns, central: bool = True
 ) -> tuple[list[np.ndarray], np.ndarray] | None:
     """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 + unknowns).
 
-    Both in units of the standard deviations, weighted. None where a flight failed.
+    Both in units of the standard deviations, weighted. central: difference quotients to both sides, which cost twice as much. None
+    where a flight failed.
     """
     steps = unknowns.steps(values)
-    starts, theirs, columns = _variations(start, values, unknowns, steps)
+    sides = (1.0, -1.0) if central else (1.0,)
+    starts, theirs, columns = _variations(start, values, unknowns, steps, sides)
     shown, base = _shown(segment, starts, theirs)
     if base is None:
         return None
@@ -202,8 +204,8 @@ def linearized(
         block = np.zeros((len(index), 3, START + len(unknowns)))
         block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate)
         # What a flight shows moves by minus what its departure from a nearby one says.
-        difference = departure(kind, own[2::2], own[1::2])
-        block[:, :, columns] = (difference / (2.0 * widths[columns])[:, None, None]).transpose(1, 2, 0)
+        difference = departure(kind, own[2::2] if central else own[:1], own[1 :: len(sides)])
+        block[:, :, columns] = (difference / (len(sides) * widths[columns])[:, None, None]).transpose(1, 2, 0)
         weight = np.sqrt(piece.weights)[:, None] / piece.sigma
         blocks.append(-block * weight[:, :, None])
         found.append(departure(kind, own[0], piece.values) * weight)
@@ -248,6 +250,11 @@ SLICE = 400
 """Rows of a QR decomposition at a time."""
 
 
+PRIOR_STEPS = 1e5
+"""Widths of the prior in steps of difference quotients: moments by a factor e, the COM by the body's size. It holds what the motion can't
+tell; the rest it hardly moves, as it is about the last stage's estimate."""
+
+
 class Problem:
     """Residuals of all segments and of a wide prior as SciPy takes them, of the unknowns alone.
 
@@ -256,11 +263,12 @@ class Problem:
     SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative).
     """
 
-    def __init__(self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns) -> None:
-        self.segments, self.unknowns, self._given = segments, unknowns, values
+    def __init__(
+        self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns, central: bool
+    ) -> None:
+        self.segments, self.unknowns, self._given, self._central = segments, unknowns, values, central
         self.first = unknowns.read(values)
-        # So wide that it only holds what the motion can't tell.
-        self._widths = 1e6 * unknowns.steps(values)
+        self._widths = PRIOR_STEPS * unknowns.steps(values)
         self._base: _Linearized | None = None
         self._trial: _Linearized | None = None
         self._starts = starts
@@ -296,7 +304,7 @@ class Problem:
         triangles = []
         prior = ((numbers - self.first) / self._widths, np.diag(1.0 / self._widths))
         for segment, start in zip(self.segments, starts, strict=True):
-            flown = linearized(segment, start, values, self.unknowns)
+            flown = linearized(segment, start, values, self.unknowns, self._central)
             if flown is None:
                 rows = len(self.segments) * (free + 1)
                 failed = np.concatenate([np.full(rows, FAILED), prior[0]])
