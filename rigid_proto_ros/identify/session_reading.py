@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""Our own sessions as measured flights: the states that were published, and the loads of the event log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.errors import CommandRefused, InputError
+from ..motion.loads import LOAD, Load, settle
+from ..scene.command_codec import command_of_event
+from ..scene.scenario import Scenario
+from ..session.recorded_session import RecordedSession
+from ..session.replay import session_scenario
+from ..session.runs import decode_event
+from ..simulation.commands import ClearWrench, WrenchCommand
+from ..simulation.setup import Setup
+from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, Acting, MeasuredFlight, Series
+
+
+def is_own_session(session: RecordedSession) -> bool:
+    """Whether it says what was flown."""
+    return bool(session.scene)
+
+
+def session_flight(session: RecordedSession, name: str, first_s: float, last_s: float) -> tuple[MeasuredFlight, Scenario]:
+    """What was measured between two simulated times; raises InputError where something acted that can't be taken into account.
+
+    The tracked frame has the axes of the mesh and stands at the centre of mass that the scene says.
+    """
+    scenario = session_scenario(session)
+    setup = scenario.setup
+    if setup.string.attached:
+        raise InputError("session", f"{name} has a string tied to the body from its start; only wrenches and pokes are taken")
+    if not setup.gyroscopic:
+        raise InputError("session", f"{name} was flown with gyroscopic: false, which no body does")
+    end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
+    acting = _acting(session, setup, name, end_ns)
+    series = [_cut(one, round(first_s * 1e9), end_ns) for one in _series(session)]
+    series = [one for one in series if len(one.times_ns)]
+    if not series:
+        raise InputError("--from", first_s, f"a time within {name}, which ends at {1e-9 * session.end_ns:g} s")
+    x, y, z = (float(value) for value in setup.gravity)
+    damping = float(setup.linear_damping), float(setup.angular_damping)
+    return MeasuredFlight(name, tuple(series), acting, (x, y, z), *damping, gravity_from="the scene"), scenario
+
+
+def _series(session: RecordedSession) -> list[Series]:
+    if not session.published:
+        rows, times = session.rows, session.times
+        parts = (POSITION, rows[:, :3]), (ATTITUDE, rows[:, 3:7]), (VELOCITY, rows[:, 7:10])
+        return [Series("states", kind, times, values) for kind, values in parts] + [
+            Series("states", RATE, times, rows[:, 10:13], in_body=True)
+        ]
+    found = []
+    for topic, stamped in session.published.items():
+        times, rows = stamped.times, stamped.rows
+        own = topic == "odom"
+        if topic in ("pose", "odom"):
+            found += [Series(topic, POSITION, times, rows[:, :3]), Series(topic, ATTITUDE, times, rows[:, 3:7])]
+        if topic in ("twist", "odom"):
+            first = 7 if own else 0
+            found.append(Series(topic, VELOCITY, times, rows[:, first : first + 3], in_body=own))
+            found.append(Series(topic, RATE, times, rows[:, first + 3 : first + 6], in_body=own))
+    return found
+
+
+def _cut(series: Series, first_ns: int, last_ns: int) -> Series:
+    inside = slice(*np.searchsorted(series.times_ns, (first_ns, last_ns + 1)))
+    times, values = series.times_ns[inside], series.values[inside]
+    return Series(series.topic, series.kind, times, values, series.in_body, series.is_imu)
+
+
+def _acting(session: RecordedSession, setup: Setup, name: str, end_ns: int) -> Acting:
+    """Loads of the event log up to a time, as intervals."""
+    body_frame = setup.body_frame or session.node_name.rpartition("/")[2]
+    frames = (setup.world_frame, body_frame)
+    rows: list[tuple[int, int, np.ndarray]] = []
+    held: tuple[int, np.ndarray] | None = None
+    for number, line in enumerate(session.lines, 1):
+        time_ns, kind, content = decode_event(line, number)
+        if time_ns > end_ns:
+            break
+        command = command_of_event(kind, content, setup.contacts, frames)
+        if command is None and kind not in ("set", "inertia"):
+            continue
+        if isinstance(command, ClearWrench):
+            rows = [(begin, min(end, max(time_ns, begin)), row) for begin, end, row in rows]
+            held = _let_go(rows, held, time_ns, setup)
+            continue
+        if not isinstance(command, WrenchCommand):
+            reason = f"at {1e-9 * time_ns:g} s {name} has a {kind} event"
+            raise InputError("session", f"{reason}: only wrenches and pokes are taken; end before it with --to")
+        row = _tracked(command, setup, name, time_ns)
+        if command.held:
+            held = _let_go(rows, held, time_ns, setup)
+            held = (time_ns, row) if np.any(row[5:11]) else None
+        elif command.frame.impulse:
+            rows.append((time_ns, time_ns, row))
+        else:
+            duration = command.duration_ns if command.duration_ns >= 0 else setup.poke_duration_ns
+            rows.append((time_ns, time_ns + duration, row))
+    _let_go(rows, held, end_ns, setup)
+    return as_acting(rows)
+
+
+def as_acting(rows: Sequence[tuple[int, int, np.ndarray]]) -> Acting:
+    """Of (begin, end, load)."""
+    begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
+    return Acting(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
+
+
+def _let_go(rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray] | None, time_ns: int, setup: Setup) -> None:
+    """End a held wrench at a time, or when its timeout came before."""
+    if held is not None and time_ns > held[0]:
+        timeout = held[0] + setup.wrench_timeout_ns if setup.wrench_timeout_ns else time_ns
+        rows.append((held[0], min(time_ns, timeout), held[1]))
+
+
+def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> np.ndarray:
+    """The load with its point in the tracked frame."""
+    if command.frame.point[0] == "ray":
+        where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
+        raise InputError("session", f"{where}: where it hit is not in the log; end before it with --to")
+    try:
+        load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), None)
+    except CommandRefused as refusal:
+        raise InputError("session", f"a command of {name} can't have been taken: {refusal}") from None
+    point = None if load.mesh_point is None else tuple(float(x) for x in load.arm(setup.body))
+    if load.axes == "normal":
+        force = tuple(float(f) for f in load.own_force(setup.body))
+        return Load("body", point, force, load.torque).row
+    return Load(load.axes, point, load.force, load.torque).row
