@@ -37,7 +37,9 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Choice:
-    """What of a bag counts. topics: by option, as given, ``TOPIC`` or ``TOPIC@frame``. offsets [s] by topic: given ones."""
+    """What of a bag counts. topics: by option, as given, ``TOPIC`` or ``TOPIC@frame``. offsets [s] by
+    topic: given ones.
+    """
 
     topics: dict[str, str] = field(default_factory=dict)
     offsets: dict[str, float] = field(default_factory=dict)
@@ -81,9 +83,7 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     acting = _acting(chosen["wrench"], chosen) if "wrench" in chosen else ms.nothing_acting()
     given = choice.gravity is not None
     where = "--gravity" if given else "assumed, as no --gravity was given"
-    return ms.MeasuredFlight(
-        str(path), tuple(series), acting, choice.gravity or EARTH, gravity_from=where
-    )
+    return ms.MeasuredFlight(str(path), tuple(series), acting, choice.gravity or EARTH, gravity_from=where)
 
 
 def _chosen(content: McapContent, given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
@@ -95,7 +95,9 @@ def _chosen(content: McapContent, given: dict[str, str], path: str) -> dict[str,
         topics = sorted(topic for topic, its_type in content.types.items() if its_type in types)
         topics = [topic for topic in topics if content.messages.get(topic)]
         if len(topics) > 1:
-            raise InputError("session", f"{path} has several {kind} topics, {', '.join(topics)}; say which with --{kind}")
+            raise InputError(
+                "session", f"{path} has several {kind} topics, {', '.join(topics)}; say which with --{kind}"
+            )
         if topics:
             found[kind] = (topics[0], "")
     return found
@@ -105,7 +107,9 @@ def _split(text: str, content: McapContent, kind: str) -> tuple[str, str]:
     topic, _, frame = text.partition("@")
     if topic not in content.types:
         fitting = sorted(t for t, its_type in content.types.items() if its_type in KINDS[kind])
-        raise InputError(f"--{kind}", topic, f"a topic of the bag: {', '.join(fitting) or 'it has none of such a type'}")
+        raise InputError(
+            f"--{kind}", topic, f"a topic of the bag: {', '.join(fitting) or 'it has none of such a type'}"
+        )
     if content.types[topic] not in KINDS[kind]:
         raise InputError(f"--{kind}", f"{topic}, a {content.types[topic]}", " or ".join(KINDS[kind]))
     return topic, frame
@@ -192,7 +196,9 @@ def _is_in_body(topic: _Topic, chosen: dict[str, _Topic]) -> bool:
     if frame in bodies:
         return True
     known = ", ".join(sorted(worlds | bodies))
-    raise InputError("--twist", f"{topic.name} in frame {frame!r}", f"{topic.name}@world or {topic.name}@body, or one of {known}")
+    raise InputError(
+        "--twist", f"{topic.name} in frame {frame!r}", f"{topic.name}@world or {topic.name}@body, or one of {known}"
+    )
 
 
 def _units(q: np.ndarray, topic: _Topic) -> np.ndarray:
@@ -217,7 +223,10 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
         shift = round(1e9 * (choice.offsets.get(name, 0.0) - choice.offsets.get(first[0], 0.0)))
         if begin + shift > first[1][1] or end + shift < first[1][0]:
             apart = 1e-9 * (begin + shift - first[1][0])
-            raise InputError("clocks", f"{name} begins {apart:.6g} s after {first[0]} and they have no time in common; --offset {name}=S")
+            raise InputError(
+                "clocks",
+                f"{name} begins {apart:.6g} s after {first[0]} and they have no time in common; --offset {name}=S",
+            )
 
 
 def _acting(topic: _Topic, chosen: dict[str, _Topic]) -> ms.Acting:
@@ -230,7 +239,9 @@ def _acting(topic: _Topic, chosen: dict[str, _Topic]) -> ms.Acting:
         frame = parse_frame(f"{axes}@{point if at else 'origin'}")
     except CommandRefused:
         known = ", ".join(sorted(worlds | bodies))
-        accepted = f"{topic.name}@AXES or {topic.name}@AXES@POINT, axes one of {known}, point com, origin or point/x,y,z"
+        accepted = (
+            f"{topic.name}@AXES or {topic.name}@AXES@POINT, axes one of {known}, point com, origin or point/x,y,z"
+        )
         raise InputError("--wrench", f"{topic.name} in frame {text!r}", accepted) from None
     if frame.axes == "normal" or frame.point[0] not in ("com", "origin", "point") or frame.options:
         raise InputError("--wrench", text, "axes world or body, at com, origin or point/x,y,z")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The estimate: short segments first, which converge from far, then longer ones, at last one per flight, which uses all there is."""
+"""The estimate: short segments first, which converge from far, then longer ones, at last one per flight,
+which uses all there is.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from .local_motion import least_noise, local_start, noise_by_differences, usual_
 from .unknowns import Unknowns, Values
 
 FIRST_ANGLE = 3.0
-"""Turn of the first segments [rad]: within it even the flight of a wrong body stays near enough for Gauss-Newton steps."""
+"""Turn of the first segments [rad]: within it even the flight of a wrong body stays near enough for
+Gauss-Newton steps.
+"""
 MOST_SEGMENTS = 16
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 8
@@ -25,18 +29,23 @@ FEWEST_SAMPLES = 8
 LENGTHENING = 4
 """Segments become so many times longer from stage to stage."""
 HUBER = 1.5
-"""Robust fits: departures beyond so many standard deviations count by their size alone (95 % efficient at 1.345, Huber 1981)."""
+"""Robust fits: departures beyond so many standard deviations count by their size alone (95 % efficient at
+1.345, Huber 1981).
+"""
 OFFSET_MARGIN_S = 0.5
 """The largest difference of two clocks that is looked for."""
-GOOD = 2.0
-"""Departures so many times what the differences of neighbouring samples say are of another minimum, or another model."""
+WIDER = 8.0
+"""Of steps of difference quotients: of what is rounding alone so much less is left."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """values: what came out. segments and starts (k, 13): one for each flight. sigmas: of each series by flight's number and name.
+    """values: what came out. segments and starts (k, 13): one for each flight. sigmas: of each series by flight's
+    number and name.
 
-    information (n, n) of the unknowns, the starts eliminated. root (m, n): information = rootᵀ root. evaluations: of the residuals.
+    root (m, n): rootᵀ root is the Fisher information of the unknowns, the starts eliminated; root_wide by steps WIDER
+    times as long, which shows what of it is rounding. cost: sum of squares in standard deviations. evaluations: of the
+    residuals.
     """
 
     values: Values
@@ -45,6 +54,7 @@ class Estimate:
     starts: np.ndarray
     sigmas: dict[int, float]
     root: np.ndarray
+    root_wide: np.ndarray
     cost: float
     evaluations: int
 
@@ -77,41 +87,47 @@ def fit_flights(
     unknowns: Unknowns,
     values: Values,
     robust: bool = False,
-    sigmas: dict[int, float] | None = None,
+    known: Estimate | None = None,
 ) -> Estimate:
-    """The most likely values, from these on; raises InputError where no step from there improves them.
+    """The most likely values, from these on; raises InputError where they can't be flown.
 
-    sigmas: standard deviations of the series by ``id``, else they are estimated with the rest.
+    known: an estimate of the same flights whose noise counts and whose starts are near.
     """
     series = [one for flight in flights for one in flight.series]
     noise = {id(one): noise_by_differences(one) for one in series}
     ones = {id(one): np.ones(len(one.times_ns)) for one in series}
-    work = _Work(flights, topics_of(flights), unknowns, values, dict(sigmas or noise), ones)
-    length = _first_length(flights)
-    longest = max(flight.duration_s for flight in flights)
-    segments = _segments(work, length)
-    starts = np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
-    work.values = _scanned(work, segments, starts)
-    while length < longest:
-        starts = _solved(work, segments, starts, 12, 1e-2)
-        if sigmas is None:
-            work.sigmas = _noise(work, segments, starts)
-        length *= LENGTHENING
-        longer = _segments(work, length)
-        starts = np.array([_start_of(segment, segments, starts) for segment in longer])
-        segments = longer
+    work = _Work(flights, topics_of(flights), unknowns, values, dict(known.sigmas if known else noise), ones)
+    whole = 2.0 * max(flight.duration_s for flight in flights)
+    if known is not None:
+        segments = _segments(work, whole)
+        return _estimate(work, segments, _solved(work, segments, known.starts, 30, 1e-8))
+    starts = _approached(work, whole)
     for turn in range(4):
-        segments = _segments(work, 2.0 * longest)
+        segments = _segments(work, whole)
         starts = _solved(work, segments, starts, 60, 1e-8)
         before = dict(work.sigmas)
         if robust:
             work.weights = _huber_weights(work, segments, starts)
-        if sigmas is None:
-            work.sigmas = _noise(work, segments, starts)
+        work.sigmas = _noise(work, segments, starts)
         if all(abs(work.sigmas[key] - before[key]) < 0.01 * before[key] for key in before) and (turn or not robust):
             break
-    segments = _segments(work, 2.0 * longest)
-    return _estimate(work, segments, starts)
+    return _estimate(work, _segments(work, whole), starts)
+
+
+def _approached(work: _Work, whole: float) -> np.ndarray:
+    """Bring ``work`` near by ever longer segments; returns starts of one segment for each flight."""
+    length = _first_length(work.flights)
+    segments = _segments(work, length)
+    starts = np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
+    work.values = _scanned(work, segments, starts)
+    while length < whole:
+        starts = _solved(work, segments, starts, 12, 1e-2)
+        work.sigmas = _noise(work, segments, starts)
+        length *= LENGTHENING
+        longer = _segments(work, min(length, whole))
+        starts = np.array([_start_of(segment, segments, starts) for segment in longer])
+        segments = longer
+    return starts
 
 
 def _first_length(flights: Sequence[ms.MeasuredFlight]) -> float:
@@ -157,14 +173,16 @@ def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: 
 
 
 def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> Values:
-    """The values with mass and size of the tensor about right, where a load tells them: Gauss-Newton steps don't come from far."""
+    """The values with mass and size of the tensor about right, where a load tells them: Gauss-Newton
+    steps don't come from far.
+    """
     loaded = [k for k, segment in enumerate(segments) if len(segment.wrenches.commands)]
     free = {index for _, index in work.unknowns.theta_columns}
     values = work.values
     if not loaded:
         return values
     chosen, theirs = [segments[k] for k in loaded], starts[loaded]
-    for index, of_mass in ((mp.MASS, True), (1, False)):
+    for index, of_mass in ((mp.MASS, True), (mp.SIZE, False)):
         if index not in free:
             continue
         best, best_cost = values, np.inf
@@ -172,7 +190,7 @@ def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) ->
             factor = 10.0 ** (0.25 * power)
             # The mass changes alone, then the tensor alone.
             theta = mp.scaled(values.theta, factor if of_mass else 1.0, factor**-0.5 if of_mass else factor**0.5)
-            if of_mass and 1 not in free:
+            if of_mass and mp.SIZE not in free:
                 theta = mp.scaled(values.theta, factor, 1.0)
             tried = replace(values, theta=theta)
             cost = _sum_of_squares(chosen, theirs, tried)
@@ -187,15 +205,15 @@ def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, mos
     problem = sh.Problem(segments, starts, work.values, work.unknowns, central=tolerance < 1e-3)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
         raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
-    found = least_squares(problem.residuals, problem.first, problem.jacobian, x_scale="jac", max_nfev=most, ftol=tolerance)
+    found = least_squares(
+        problem.residuals, problem.first, problem.jacobian, x_scale="jac", max_nfev=most, ftol=tolerance
+    )
     work.evaluations += int(found.nfev)
     work.values = problem.values(found.x)
     return problem.starts(found.x)
 
 
-def residuals_by_series(
-    segments: Sequence[sh.Segment], starts: np.ndarray, values: Values
-) -> dict[int, np.ndarray]:
+def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> dict[int, np.ndarray]:
     """Departures (n, 3) of each series in its own unit, by ``id``."""
     parts: dict[int, list[np.ndarray]] = {}
     for segment, start in zip(segments, starts, strict=True):
@@ -208,7 +226,9 @@ def residuals_by_series(
 
 
 def _noise(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> dict[int, float]:
-    """Standard deviation of each series from its departures; series of one topic and quantity share it over all flights."""
+    """Standard deviation of each series from its departures; series of one topic and quantity share it
+    over all flights.
+    """
     found = residuals_by_series(segments, starts, work.values)
     samples = sum(3 * len(part) for part in found.values())
     left = max(1.0 - (sh.START * len(segments) + len(work.unknowns)) / samples, 0.1)
@@ -238,16 +258,16 @@ def _huber_weights(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarr
 
 
 def _estimate(work: _Work, segments: list[sh.Segment], starts: np.ndarray) -> Estimate:
-    roots, cost = [], 0.0
-    for segment, start in zip(segments, starts, strict=True):
-        flown = sh.linearized(segment, start, work.values, work.unknowns)
-        if flown is None:
-            raise InputError("identify", "the estimate can't be flown; see --from and --to")
-        found, jacobian = flown
-        # Rows that are left when the start has taken all that it can.
-        roots.append(np.linalg.qr(jacobian, mode="r")[sh.START :, sh.START :])
-        cost += float(sum((part**2).sum() for part in found))
-    root = np.concatenate(roots)
-    return Estimate(
-        work.values, work.unknowns, segments, starts, work.sigmas, root, cost, work.evaluations
-    )
+    roots: dict[float, list[np.ndarray]] = {1.0: [], WIDER: []}
+    cost = 0.0
+    for wider, parts in roots.items():
+        for segment, start in zip(segments, starts, strict=True):
+            flown = sh.linearized(segment, start, work.values, work.unknowns, wider=wider)
+            if flown is None:
+                raise InputError("identify", "the estimate can't be flown; see --from and --to")
+            triangle = sh.compressed(*flown)
+            # Rows that are left when the start has taken all that it can.
+            parts.append(triangle[sh.START : -1, sh.START : -1])
+            cost += float(sum((part**2).sum() for part in flown[0])) if wider == 1.0 else 0.0
+    near, far = (np.concatenate(parts) for parts in roots.values())
+    return Estimate(work.values, work.unknowns, segments, starts, work.sigmas, near, far, cost, work.evaluations)

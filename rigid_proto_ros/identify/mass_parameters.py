@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
 """The ten mass parameters in log-Cholesky coordinates: whatever the numbers, a body with them can exist.
 
-Rucker and Wensing, Smooth Parameterization of Rigid-Body Inertia, IEEE Robotics and Automation Letters 7 (2022): the pseudo-inertia
-about the origin of the tracked frame is J = U Uᵀ with
+Rucker and Wensing, Smooth Parameterization of Rigid-Body Inertia, IEEE Robotics and Automation Letters 7 (2022): the
+pseudo-inertia about the origin of the tracked frame is J = U Uᵀ with
 
         [ e^d1  s12   s13   t1 ]
-    U = [  0    e^d2  s23   t2 ] e^α,    θ = (α, d1, d2, d3, s12, s23, s13, t1, t2, t3).
+    U = [  0    e^d2  s23   t2 ] e^α,    parameters (α, d1, d2, d3, s12, s23, s13, t1, t2, t3).
         [  0     0    e^d3  t3 ]
         [  0     0     0    1  ]
 
 So the mass is e^2α, t is the centre of mass, and Σ = m V Vᵀ (V the upper left of U without e^α) are the second moments about the
-centre of mass, of which the tensor is tr(Σ) 1 − Σ.
+centre of mass, of which the tensor is tr(Σ) 1 − Σ. The numbers kept here are θ = (α, λ, e1, e2, s12 e^-λ, s23 e^-λ, s13 e^-λ, t) with
+d = λ + (e1, e2, −e1 − e2): the size e^λ apart from the shape, so that what a free flight can't tell, α and λ, is two of them.
 """
 
 from __future__ import annotations
@@ -24,9 +25,12 @@ from ..base.errors import InputError
 from ..mass.tensor import check_tensor, principal_axes
 
 MASS = 0
-SHAPE = slice(1, 7)
+SIZE = 1
 COM = slice(7, 10)
 PARAMETERS = 10
+
+STEP = 2e-6
+"""Of difference quotients: long flights bend so much that 1e-5 is too long for some, and 1e-7 leaves too little above rounding."""
 
 SEEN = (
     *("mass", "size of the tensor", "ratio of the largest moment to the others", "ratio of the two smaller moments"),
@@ -38,7 +42,9 @@ SEEN = (
 
 @dataclass(frozen=True)
 class MassEstimate:
-    """mass [kg], center_of_mass (3,) [m, tracked frame], inertia (3, 3) [kg m², about the COM, axes of the tracked frame]."""
+    """mass [kg], center_of_mass (3,) [m, tracked frame], inertia (3, 3) [kg m², about the COM, axes of
+    the tracked frame].
+    """
 
     mass: float
     center_of_mass: np.ndarray
@@ -65,15 +71,18 @@ def parameters_of(mass: float, center_of_mass: np.ndarray, inertia: np.ndarray) 
     V = np.linalg.cholesky(second[::-1, ::-1])[::-1, ::-1]
     theta = np.zeros(PARAMETERS)
     theta[MASS] = 0.5 * math.log(mass)
-    theta[1:4] = np.log(np.diag(V))
-    theta[4:7] = V[0, 1], V[1, 2], V[0, 2]
+    d = np.log(np.diag(V))
+    size = theta[SIZE] = float(d.mean())
+    theta[2:4] = d[:2] - size
+    theta[4:7] = np.array([V[0, 1], V[1, 2], V[0, 2]]) * math.exp(-size)
     theta[COM] = center_of_mass
     return theta
 
 
 def _upper(theta: np.ndarray) -> np.ndarray:
-    d, (s12, s23, s13) = np.exp(theta[1:4]), theta[4:7]
-    return np.array([[d[0], s12, s13], [0.0, d[1], s23], [0.0, 0.0, d[2]]])
+    (e1, e2), (s12, s23, s13) = theta[2:4].tolist(), theta[4:7].tolist()
+    shape = [[math.exp(e1), s12, s13], [0.0, math.exp(e2), s23], [0.0, 0.0, math.exp(-e1 - e2)]]
+    return math.exp(theta[SIZE]) * np.array(shape)
 
 
 def principal(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -85,22 +94,25 @@ def scaled(theta: np.ndarray, mass: float, length: float) -> np.ndarray:
     """The body with its mass ``mass`` times as large and its tensor so too, then all its second moments by length²."""
     other = theta.copy()
     other[MASS] += 0.5 * math.log(mass)
-    other[1:4] += math.log(length)
-    other[4:7] *= length
+    other[SIZE] += math.log(length)
     return other
 
 
 def difference_steps(theta: np.ndarray) -> np.ndarray:
-    """Steps (10,) for difference quotients: a relative change of moments and mass, the same part of the body's size for the COM."""
-    size = np.exp(theta[1:4])
-    return 1e-5 * np.array([1.0, 1.0, 1.0, 1.0, size[1], size[2], size[2], *[float(np.max(size))] * 3])
+    """Steps (10,) for difference quotients: a relative change of moments and mass, the same part of the
+    body's size for the COM.
+    """
+    e1, e2 = theta[2:4].tolist()
+    middle, last = math.exp(e2), math.exp(-e1 - e2)
+    size = math.exp(theta[SIZE]) * max(math.exp(e1), middle, last)
+    return STEP * np.array([1.0, 1.0, 1.0, 1.0, middle, last, last, size, size, size])
 
 
 def physical_directions(theta: np.ndarray) -> np.ndarray:
     """∂φ/∂θ (10, 10): how mass, tensor and COM, in the order of ``SEEN``, change with the parameters.
 
-    The mass and the tensor relative to themselves (the tensor in its principal axes, each entry by the root of its two moments), the
-    COM in metres. Unlike angles of axes these stay regular where two moments agree.
+    The mass and the tensor relative to themselves (the tensor in its principal axes, each entry by the root of its two
+    moments), the COM in metres. Unlike angles of axes these stay regular where two moments agree.
     """
     moments, axes = principal(theta)
     root = np.sqrt(np.outer(moments, moments))

@@ -17,10 +17,11 @@ UNITS = {POSITION: "m", ATTITUDE: "rad", VELOCITY: "m/s", RATE: "rad/s", ACCELER
 
 @dataclass(frozen=True)
 class Series:
-    """Samples of one quantity of one topic. kind: POSITION and the others. times_ns (n,) ascending; values (n, 3), or (n, 4) xyzw.
+    """Samples of one quantity of one topic. kind: POSITION and the others. times_ns (n,) ascending; values (n, 3), or
+    (n, 4) xyzw.
 
-    in_body: velocities and rates are in axes of the tracked frame, else in the world's. All are of the tracked frame's origin but
-    ACCELERATION and an IMU's RATE, which are of the place and in the axes of that sensor (``is_imu``).
+    in_body: velocities and rates are in axes of the tracked frame, else in the world's. All are of the tracked frame's
+    origin but ACCELERATION and an IMU's RATE, which are of the place and in the axes of that sensor (``is_imu``).
     """
 
     topic: str
@@ -38,7 +39,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Acting:
-    """Loads that acted: begin_ns (c,), end_ns (c,), the same for an impulse, and loads (c, LOAD), points in the tracked frame."""
+    """Loads that acted: begin_ns (c,), end_ns (c,), the same for an impulse, and loads (c, LOAD), points
+    in the tracked frame.
+    """
 
     begin_ns: np.ndarray
     end_ns: np.ndarray
@@ -62,7 +65,8 @@ def nothing_acting() -> Acting:
 
 @dataclass(frozen=True)
 class MeasuredFlight:
-    """One flight: where it is from, its series, the loads, gravity (3,) [m/s²] and damping [N s/m, N m s] as they are known.
+    """One flight: where it is from, its series, the loads, gravity (3,) [m/s²] and damping [N s/m, N m s] as they are
+    known.
 
     gravity_from and damping_from say from where.
     """

@@ -15,7 +15,8 @@ def predicted(
 ) -> np.ndarray:
     """What the series would show, (..., m, 3) or (..., m, 4), of samples (..., m, SAMPLE).
 
-    com, place and bias (..., 1, 3): of the centre of mass and of the IMU in the tracked frame [m], and what the IMU adds.
+    com, place and bias (..., 1, 3): of the centre of mass and of the IMU in the tracked frame [m], and what the IMU
+    adds.
     """
     q, w = samples[..., 3:7], samples[..., 10:13]
     if series.kind == ms.ATTITUDE:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.loads import LOAD, Load, settle
-from ..scene.command_codec import command_of_event
+from ..scene.command_codec import command_of_event, frame_names
 from ..scene.scenario import Scenario
 from ..session.recorded_session import RecordedSession
 from ..session.replay import session_scenario
@@ -24,19 +24,25 @@ def is_own_session(session: RecordedSession) -> bool:
     return bool(session.scene)
 
 
-def session_flight(session: RecordedSession, name: str, first_s: float, last_s: float) -> tuple[MeasuredFlight, Scenario]:
-    """What was measured between two simulated times; raises InputError where something acted that can't be taken into account.
+def session_flight(
+    session: RecordedSession, name: str, first_s: float, last_s: float
+) -> tuple[MeasuredFlight, Scenario]:
+    """What was measured between two simulated times; raises InputError where something acted that can't be taken into
+    account.
 
     The tracked frame has the axes of the mesh and stands at the centre of mass that the scene says.
     """
     scenario = session_scenario(session)
     setup = scenario.setup
     if setup.string.attached:
-        raise InputError("session", f"{name} has a string tied to the body from its start; only wrenches and pokes are taken")
+        raise InputError(
+            "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are taken"
+        )
     if not setup.gyroscopic:
         raise InputError("session", f"{name} was flown with gyroscopic: false, which no body does")
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
-    acting = _acting(session, setup, name, end_ns)
+    frames = frame_names(scenario.values, session.node_name)
+    acting = _acting(session, setup, frames, name, end_ns)
     series = [_cut(one, round(first_s * 1e9), end_ns) for one in _series(session)]
     series = [one for one in series if len(one.times_ns)]
     if not series:
@@ -72,10 +78,8 @@ def _cut(series: Series, first_ns: int, last_ns: int) -> Series:
     return Series(series.topic, series.kind, times, values, series.in_body, series.is_imu)
 
 
-def _acting(session: RecordedSession, setup: Setup, name: str, end_ns: int) -> Acting:
+def _acting(session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int) -> Acting:
     """Loads of the event log up to a time, as intervals."""
-    body_frame = setup.body_frame or session.node_name.rpartition("/")[2]
-    frames = (setup.world_frame, body_frame)
     rows: list[tuple[int, int, np.ndarray]] = []
     held: tuple[int, np.ndarray] | None = None
     for number, line in enumerate(session.lines, 1):
@@ -87,14 +91,15 @@ def _acting(session: RecordedSession, setup: Setup, name: str, end_ns: int) -> A
             continue
         if isinstance(command, ClearWrench):
             rows = [(begin, min(end, max(time_ns, begin)), row) for begin, end, row in rows]
-            held = _let_go(rows, held, time_ns, setup)
+            _let_go(rows, held, time_ns, setup)
+            held = None
             continue
         if not isinstance(command, WrenchCommand):
             reason = f"at {1e-9 * time_ns:g} s {name} has a {kind} event"
             raise InputError("session", f"{reason}: only wrenches and pokes are taken; end before it with --to")
         row = _tracked(command, setup, name, time_ns)
         if command.held:
-            held = _let_go(rows, held, time_ns, setup)
+            _let_go(rows, held, time_ns, setup)
             held = (time_ns, row) if np.any(row[5:11]) else None
         elif command.frame.impulse:
             rows.append((time_ns, time_ns, row))
@@ -111,7 +116,9 @@ def as_acting(rows: Sequence[tuple[int, int, np.ndarray]]) -> Acting:
     return Acting(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
 
 
-def _let_go(rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray] | None, time_ns: int, setup: Setup) -> None:
+def _let_go(
+    rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray] | None, time_ns: int, setup: Setup
+) -> None:
     """End a held wrench at a time, or when its timeout came before."""
     if held is not None and time_ns > held[0]:
         timeout = held[0] + setup.wrench_timeout_ns if setup.wrench_timeout_ns else time_ns
@@ -124,11 +131,17 @@ def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> n
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
         raise InputError("session", f"{where}: where it hit is not in the log; end before it with --to")
     try:
-        load = settle(command.frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), None)
+        load = settle(
+            command.frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), None
+        )
     except CommandRefused as refusal:
         raise InputError("session", f"a command of {name} can't have been taken: {refusal}") from None
-    point = None if load.mesh_point is None else tuple(float(x) for x in load.arm(setup.body))
+    point = None if load.mesh_point is None else _three(load.arm(setup.body))
     if load.axes == "normal":
-        force = tuple(float(f) for f in load.own_force(setup.body))
-        return Load("body", point, force, load.torque).row
+        return Load("body", point, _three(load.own_force(setup.body)), load.torque).row
     return Load(load.axes, point, load.force, load.torque).row
+
+
+def _three(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z

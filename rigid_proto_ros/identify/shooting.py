@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Multiple shooting: every segment of a flight has a start of its own, and all have the same body.
 
-The residuals of a segment and their derivatives come from one compiled call that flies the body beside its variations. Only what a
-least-squares step needs is kept of them: with [J r] = Q R, R alone, which has as many rows as there are unknowns.
+The residuals of a segment and their derivatives come from one compiled call that flies the body beside its variations.
+Only what a least-squares step needs is kept of them: with [J r] = Q R, R alone, which has as many rows as there are
+unknowns.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from .sensors import departure, predicted
 from .unknowns import Unknowns, Values
 
 START = 12
-"""Unknowns of a segment's start: position [m], turn [rad, body axes], velocity [m/s], angular velocity [rad/s, body axes]."""
-START_STEPS = np.array([0.0] * 3 + [1e-5] * 3 + [0.0] * 3 + [1e-5] * 3)
+"""Unknowns of a segment's start: position [m], turn [rad, body axes], velocity [m/s], angular velocity
+[rad/s, body axes].
+"""
+START_STEPS = np.array([0.0] * 3 + [mp.STEP] * 3 + [0.0] * 3 + [mp.STEP] * 3)
 """For difference quotients; how a flight shifts with its position and velocity is known in closed form."""
 OFFSET_STEP_S = 1e-5
 FAILED = 1e8
@@ -63,7 +66,9 @@ def cut(
     weights: Callable[[ms.Series], np.ndarray],
     margin_s: float = 0.0,
 ) -> list[Segment]:
-    """Segments of about this length, alike within a flight; margin_s: how much earlier they start than their samples."""
+    """Segments of about this length, alike within a flight; margin_s: how much earlier they start than
+    their samples.
+    """
     margin = round(margin_s * 1e9)
     segments = []
     for flight in flights:
@@ -94,7 +99,9 @@ def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
 
 
 def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
-    """Rows of ``trajectories.fly_rows`` (n, FLOWN): starts (n, 13) of the tracked frame as those of the centre of mass."""
+    """Rows of ``trajectories.fly_rows`` (n, FLOWN): starts (n, 13) of the tracked frame as those of the
+    centre of mass.
+    """
     rows = np.empty((len(starts), tr.FLOWN))
     bodies = {id(v): (v, mp.mass_of(v.theta)) for v in values}
     for row, v in zip(rows, values, strict=True):
@@ -120,8 +127,12 @@ def _times(segment: Segment, offsets: Sequence[float]) -> tuple[np.ndarray, list
     return times, np.split(where, ends[:-1])
 
 
-def _shown(segment: Segment, starts: np.ndarray, values: Sequence[Values]) -> tuple[list[np.ndarray], np.ndarray | None]:
-    """What each piece would show of each flight, (n, m, 3 or 4), and the samples of the first one; None where one failed."""
+def _shown(
+    segment: Segment, starts: np.ndarray, values: Sequence[Values]
+) -> tuple[list[np.ndarray], np.ndarray | None]:
+    """What each piece would show of each flight, (n, m, 3 or 4), and the samples of the first one; None
+    where one failed.
+    """
     times, where = _times(segment, values[0].offsets)
     samples, good = tr.fly_rows(flown_rows(starts, values), times, segment.wrenches)
     if not good.all():
@@ -146,20 +157,22 @@ def departures(segment: Segment, start: np.ndarray, values: Values) -> list[np.n
 
 
 def _variations(
-    start: np.ndarray, values: Values, unknowns: Unknowns, steps: np.ndarray, sides: Sequence[float]
+    start: np.ndarray, values: Values, unknowns: Unknowns, steps: tuple[np.ndarray, np.ndarray], sides: Sequence[float]
 ) -> tuple[np.ndarray, list[Values], list[int]]:
-    """Flights for difference quotients: the base, then those to each side of each column; starts, values, and the columns."""
+    """Flights for difference quotients: the base, then those to each side of each column; starts, values,
+    and the columns.
+    """
     changed = np.flatnonzero(START_STEPS)
     varied = [k for k, (name, _) in enumerate(unknowns.slots) if name != "offsets"]
     starts = np.repeat(start[None], 1 + len(sides) * (len(changed) + len(varied)), axis=0)
-    changes = (np.diag(START_STEPS)[changed][:, None] * np.array(sides)[:, None]).reshape(-1, START)
+    changes = (np.diag(steps[0])[changed][:, None] * np.array(sides)[:, None]).reshape(-1, START)
     starts[1 : 1 + len(changes)] = moved_starts(starts[: len(changes)], changes)
     theirs = [values] * (1 + len(changes))
     base = unknowns.read(values)
     for k in varied:
         for sign in sides:
             numbers = base.copy()
-            numbers[k] += sign * steps[k]
+            numbers[k] += sign * steps[1][k]
             theirs.append(unknowns.put(values, numbers))
     return starts, theirs, [*changed.tolist(), *(START + k for k in varied)]
 
@@ -182,22 +195,23 @@ def _shift_columns(piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: fl
 
 
 def linearized(
-    segment: Segment, start: np.ndarray, values: Values, unknowns: Unknowns, central: bool = True
+    segment: Segment, start: np.ndarray, values: Values, unknowns: Unknowns, central: bool = True, wider: float = 1.0
 ) -> tuple[list[np.ndarray], np.ndarray] | None:
-    """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 + unknowns).
+    """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 +
+    unknowns).
 
-    Both in units of the standard deviations, weighted. central: difference quotients to both sides, which cost twice as much. None
-    where a flight failed.
+    Both in units of the standard deviations, weighted. central: difference quotients to both sides, which cost twice as
+    much. wider: by how much their steps are longer. None where a flight failed.
     """
-    steps = unknowns.steps(values)
+    steps = wider * unknowns.steps(values)
     sides = (1.0, -1.0) if central else (1.0,)
-    starts, theirs, columns = _variations(start, values, unknowns, steps, sides)
+    starts, theirs, columns = _variations(start, values, unknowns, (wider * START_STEPS, steps), sides)
     shown, base = _shown(segment, starts, theirs)
     if base is None:
         return None
     times, where = _times(segment, values.offsets)
     rate = values.damping[0] / mp.mass_of(values.theta).mass
-    widths = np.concatenate([START_STEPS, steps])
+    widths = np.concatenate([wider * START_STEPS, steps])
     blocks, found = [], []
     for piece, own, index in zip(segment.pieces, shown, where, strict=True):
         kind = piece.series.kind
@@ -232,6 +246,11 @@ def _fill_offset(
             column[:] = -weight * change / (2.0 * OFFSET_STEP_S)
 
 
+def upper_triangle(matrix: np.ndarray) -> np.ndarray:
+    """R of Q R."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
+
+
 def compressed(found: Sequence[np.ndarray], jacobian: np.ndarray) -> np.ndarray:
     """[J r] as an upper triangle (k, columns + 1) with the same products of its columns.
 
@@ -241,7 +260,7 @@ def compressed(found: Sequence[np.ndarray], jacobian: np.ndarray) -> np.ndarray:
     width = whole.shape[1]
     triangle = np.zeros((0, width))
     for first in range(0, len(whole), SLICE):
-        triangle = np.linalg.qr(np.vstack([triangle, whole[first : first + SLICE]]), mode="r")
+        triangle = upper_triangle(np.vstack([triangle, whole[first : first + SLICE]]))
     short = width - len(triangle)
     return np.vstack([triangle, np.zeros((short, width))]) if short > 0 else triangle
 
@@ -250,17 +269,18 @@ SLICE = 400
 """Rows of a QR decomposition at a time."""
 
 
-PRIOR_STEPS = 1e5
-"""Widths of the prior in steps of difference quotients: moments by a factor e, the COM by the body's size. It holds what the motion can't
-tell; the rest it hardly moves, as it is about the last stage's estimate."""
+PRIOR_STEPS = 1.0 / mp.STEP
+"""Widths of the prior in steps of difference quotients: moments by a factor e, the COM by the body's size. It holds
+what the motion can't tell; the rest it hardly moves, as it is about the last stage's estimate.
+"""
 
 
 class Problem:
     """Residuals of all segments and of a wide prior as SciPy takes them, of the unknowns alone.
 
-    With [J_start J r] = Q R the start of a segment takes what it can of the residuals, and the rows of R below the twelfth are what is left:
-    so every segment finds its own start while SciPy steps in the few numbers that all share (variable projection: Golub and Pereyra,
-    SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative).
+    With [J_start J r] = Q R the start of a segment takes what it can of the residuals, and the rows of R below the
+    twelfth are what is left: so every segment finds its own start while SciPy steps in the few numbers that all share
+    (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative).
     """
 
     def __init__(
@@ -301,7 +321,7 @@ class Problem:
 
     def _linearized(self, numbers: np.ndarray, starts: np.ndarray) -> _Linearized:
         values, free = self.values(numbers), len(self.unknowns)
-        triangles = []
+        triangles: list[np.ndarray] = []
         prior = ((numbers - self.first) / self._widths, np.diag(1.0 / self._widths))
         for segment, start in zip(self.segments, starts, strict=True):
             flown = linearized(segment, start, values, self.unknowns, self._central)
@@ -317,7 +337,9 @@ class Problem:
 
 @dataclass(frozen=True)
 class _Linearized:
-    """numbers: the unknowns. starts (k, 13): where the segments were flown from. triangles: ``compressed`` ones, None where one failed."""
+    """numbers: the unknowns. starts (k, 13): where the segments were flown from. triangles:
+    ``compressed`` ones, None where one failed.
+    """
 
     numbers: np.ndarray
     starts: np.ndarray

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Many bodies through one shooting segment in one compiled call: the same flight that simulations, replays and sweeps advance with."""
+"""Many bodies through one shooting segment in one compiled call: the same flight that simulations,
+replays and sweeps advance with.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -10,7 +13,7 @@ import numpy as np
 from numba import int64, types
 
 from ..base.compilation import njit
-from ..base.rotation import quaternion_of_axes, rotate, rotate_inverse
+from ..base.rotation import quaternion_of_axes, rotate_inverse
 from ..mass.tensor import principal_axes_kernel
 from ..motion import body as of_body
 from ..motion import loads as ld
@@ -43,14 +46,16 @@ DONE = -1
 
 @dataclass(frozen=True)
 class Wrenches:
-    """What acts in a segment: times (c, 3) and loads (c, LOAD) as simulation/flight.py takes them, from the segment's start."""
+    """What acts in a segment: times (c, 3) and loads (c, LOAD) as simulation/flight.py takes them, from
+    the segment's start.
+    """
 
     commands: np.ndarray
     loads: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
-def _make_body(flown, body):
+def _make_body(flown: np.ndarray, body: np.ndarray) -> bool:
     """Fill ``body`` (BODY,) from a row; whether a body can have it."""
     inertia = np.empty((3, 3))
     for i in range(3):
@@ -67,11 +72,11 @@ def _make_body(flown, body):
             body[of_body.INERTIA + 3 * k + j] = inertia[k, j]
             body[of_body.AXES + 3 * k + j] = axes[k, j]
     body[of_body.LENGTH] = 1.0
-    return moments[0] > 0.0 and np.isfinite(moments[2]) and flown[MASS] > 0.0
+    return bool(moments[0] > 0.0 and np.isfinite(moments[2]) and flown[MASS] > 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _rates(flown, body, sums, row, sample):
+def _rates(flown: np.ndarray, body: np.ndarray, sums: np.ndarray, row: np.ndarray, sample: np.ndarray) -> None:
     """What an accelerometer at the COM feels, and ω', from the loads that act: both from the equations of motion."""
     qx, qy, qz, qw = row[3], row[4], row[5], row[6]
     wx, wy, wz = row[10], row[11], row[12]
@@ -98,8 +103,18 @@ def _rates(flown, body, sums, row, sample):
     sample[ANGULAR_ACCELERATION], sample[ANGULAR_ACCELERATION + 1], sample[ANGULAR_ACCELERATION + 2] = x, y, z
 
 
-def _fly_all(flown, times_ns, commands, loads, methods, degree, samples, good):  # noqa: PLR0913
-    """Each row of flown (n, FLOWN) through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it came through.
+def _fly_all(
+    flown: np.ndarray,
+    times_ns: np.ndarray,
+    commands: np.ndarray,
+    loads: np.ndarray,
+    methods: np.ndarray,
+    degree: int,
+    samples: np.ndarray,
+    good: np.ndarray,
+) -> int:  # noqa: PLR0913
+    """Each row of flown (n, FLOWN) through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
+    came through.
 
     Returns DONE, or the number of the method that must be compiled first.
     """
@@ -145,7 +160,7 @@ def _fly_all(flown, times_ns, commands, loads, methods, degree, samples, good): 
 
 
 @cache
-def _compiled():
+def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
     """``_fly_all`` compiled, or loaded from the cache, the table of the methods, and the degree of their series."""
     flat, table, cube = types.float64[:, ::1], types.int64[:, ::1], types.float64[:, :, ::1]
     signature = int64(flat, types.int64[::1], table, flat, table, int64, cube, types.int64[::1])
@@ -155,7 +170,9 @@ def _compiled():
 
 
 def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tuple[np.ndarray, np.ndarray]:
-    """Samples (n, m, SAMPLE) of each row of ``flown`` (n, FLOWN) at times_ns (m,) ascending from 0, and whether it came through (n,)."""
+    """Samples (n, m, SAMPLE) of each row of ``flown`` (n, FLOWN) at times_ns (m,) ascending from 0, and
+    whether it came through (n,).
+    """
     kernel, methods, degree = _compiled()
     samples = np.empty((len(flown), len(times_ns), SAMPLE))
     good = np.zeros(len(flown), np.int64)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is estimated: the ten mass parameters, and on request damping, gravity, clock offsets, an IMU's place and biases."""
+"""What is estimated: the ten mass parameters, and on request damping, gravity, clock offsets, an IMU's
+place and biases.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ import numpy as np
 from ..base.errors import InputError
 from . import mass_parameters as mp
 
-MASS_NAMES = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
+MASS_NAMES = ("alpha", "lambda", "e1", "e2", "s12", "s23", "s13", "t1", "t2", "t3")
 GROUPS = ("mass", "com", "inertia", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
 """What ``--fit`` takes."""
 DEFAULT_FIT = ("mass", "com", "inertia")
@@ -21,8 +23,8 @@ DEFAULT_FIT = ("mass", "com", "inertia")
 class Values:
     """theta (10,): mass_parameters.py. damping (2,): linear [N s/m], angular [N m s]. gravity (3,) [m/s²].
 
-    offsets [s] by topic: a sample stamped t was taken at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²], and imu_place
-    (3,) [m, tracked frame] of the IMU.
+    offsets [s] by topic: a sample stamped t was taken at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²],
+    and imu_place (3,) [m, tracked frame] of the IMU.
     """
 
     theta: np.ndarray
@@ -69,9 +71,9 @@ class Unknowns:
         """Steps for difference quotients."""
         theta = mp.difference_steps(values.theta)
         mass = mp.mass_of(values.theta)
-        damping = 1e-4 * np.array([mass.mass, np.trace(mass.inertia) / 3.0])
+        damping = 10.0 * mp.STEP * np.array([mass.mass, np.trace(mass.inertia) / 3.0])
         given = {"theta": theta, "damping": damping}
-        return np.array([float(given[name][index]) if name in given else 1e-5 for name, index in self.slots])
+        return np.array([float(given[name][index]) if name in given else mp.STEP for name, index in self.slots])
 
 
 def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a motion can tell of a body, before any number: the directions in which its Fisher information is nothing, in physical words."""
+"""What a motion can tell of a body, before any number: the directions in which its Fisher information is
+nothing, in physical words.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +16,15 @@ from .fitting import Estimate
 from .unknowns import Unknowns, Values
 
 MOST_RELATIVE = 0.5
-"""A standard deviation of more than half of what is looked for says nothing: neither the number nor its error is printed."""
+"""A standard deviation of more than half of what is looked for says nothing: neither the number nor its
+error is printed.
+"""
 LEAST_SHARE = 1e-3
-"""A quantity that changes by more than this part of itself along a direction that can't be seen can't be seen either."""
-ROUNDING = 1e-9
-"""Information below this part of the largest, by its root, is what difference quotients leave of none."""
+"""A quantity that changes by more than this part of itself along a direction that can't be seen can't be
+seen either.
+"""
+ROUNDING = 0.5
+"""Where longer difference quotients leave less than this part of the information, by its root, it is rounding."""
 NAMED = 0.98
 """Part of a named direction's square that must lie among those that can't be seen."""
 
@@ -30,7 +36,9 @@ _REMEDIES = {
     "mass, tensor and damping by one factor": f"{POKE}, or --mass",
 }
 UNITS = {"damping": 1.0, "gravity": 1.0, "offsets": 0.01, "gyro_bias": 0.1, "accel_bias": 1.0, "imu_place": 0.1}
-"""Of what a standard deviation is to be small for it to be seen: N s/m and N m s by the body's own, m/s², s, rad/s, m/s², m."""
+"""Of what a standard deviation is to be small for it to be seen: N s/m and N m s by the body's own, m/s²,
+s, rad/s, m/s², m.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,19 +58,23 @@ class Quantity:
 
 
 class Visibility:
-    """Which directions of the unknowns a flight tells, in coordinates in which 1 is much: (``mass_parameters.SEEN``, then the others)."""
+    """Which directions of the unknowns a flight tells, in coordinates in which 1 is much:
+    (``mass_parameters.SEEN``, then the others).
+    """
 
     def __init__(self, estimate: Estimate, length: float) -> None:
         """length: by which an error of the centre of mass is called large [m]."""
         self.unknowns, self.values = estimate.unknowns, estimate.values
         self.names, self._to_physical = _coordinates(estimate.unknowns, estimate.values, length)
-        root = estimate.root @ np.linalg.inv(self._to_physical)
+        back = np.linalg.inv(self._to_physical)
+        root = estimate.root @ back
         # Fewer rows than columns: the rest of the directions has no information at all.
         short = root.shape[1] - root.shape[0]
         root = np.vstack([root, np.zeros((max(short, 0), root.shape[1]))])
         _, self.roots, directions = np.linalg.svd(root, full_matrices=False)
         self._directions = directions.T
-        self._hidden = self.roots < max(1.0 / MOST_RELATIVE, ROUNDING * float(self.roots[0]))
+        wide = np.linalg.norm(estimate.root_wide @ back @ self._directions, axis=0)
+        self._hidden = (self.roots < 1.0 / MOST_RELATIVE) | (wide < ROUNDING * self.roots)
 
     @property
     def sds(self) -> np.ndarray:
@@ -116,8 +128,14 @@ class Visibility:
             return TUMBLE
         return "a longer flight, or a given value"
 
+    def told(self, count: int) -> int:
+        """How many of the directions among the first ``count`` coordinates can be seen."""
+        return count - int(np.linalg.matrix_rank(self._directions[:count, self._hidden], tol=0.5))
+
     def quantity(self, of: Callable[[Values], float]) -> Quantity:
-        """A function of the estimate with its standard deviation, or nothing where a direction that can't be seen changes it."""
+        """A function of the estimate with its standard deviation, or nothing where a direction that can't
+        be seen changes it.
+        """
         base, steps = self.unknowns.read(self.values), self.unknowns.steps(self.values)
         gradient = np.empty(len(base))
         for k, step in enumerate(steps):

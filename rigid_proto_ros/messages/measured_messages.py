@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Messages that anybody's sensors and controllers send, from their bytes: poses, transforms, twists, odometry, IMUs, wrenches."""
+"""Messages that anybody's sensors and controllers send, from their bytes: poses, transforms, twists,
+odometry, IMUs, wrenches.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,10 @@ from dataclasses import dataclass
 
 from ..base.errors import InputError
 
-_LITTLE_ENDIAN = (b"\x00\x01", b"\x00\x07")  # plain CDR of XCDR1 and XCDR2; these messages have the same layout in both but for 8-byte alignment
+_LITTLE_ENDIAN = (
+    b"\x00\x01",
+    b"\x00\x07",
+)  # plain CDR of XCDR1 and XCDR2; these messages have the same layout in both but for 8-byte alignment
 _XCDR2 = b"\x00\x07"
 
 

@@ -41,7 +41,9 @@ def flown(values, start, times_s, load=None):
     return times_ns, samples[0]
 
 
-def mocap(values, start, rng, seconds=5.0, rate=100.0, load=None, noise=MOCAP, topic="/mocap/pose") -> ms.MeasuredFlight:
+def mocap(
+    values, start, rng, seconds=5.0, rate=100.0, load=None, noise=MOCAP, topic="/mocap/pose"
+) -> ms.MeasuredFlight:
     """A flight whose pose was measured."""
     times, samples = flown(values, start, np.arange(0.0, seconds, 1.0 / rate), load)
     com = values.theta[7:10]

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto identify``: mass properties from recorded motion, and first what the motion can tell of them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.errors import InputError
+
+if TYPE_CHECKING:
+    from ..identify.bag_reading import Choice
+    from ..identify.comparison import Candidate
+    from ..identify.identification import Known
+    from ..identify.measurements import MeasuredFlight
+    from ..mass.from_mesh import MeshBody
+
+EXAMPLES = (
+    ("rigid_proto identify out/flight.mcap", "what a recorded flight tells of the body, and what it can't"),
+    ("rigid_proto identify throws/*.mcap --mass 1.2 --urdf", "several throws of a weighed body, as a URDF <inertial>"),
+    ("rigid_proto identify throw.mcap --mesh hammer", "is it solid, a shell, or as its bounding box says?"),
+    (
+        "rigid_proto identify rov.mcap --odom /odom --wrench /thrusters@base_link --fit mass,com,inertia,damping",
+        "a bag of another robot",
+    ),
+)
+SENSORS = ("pose", "twist", "odom", "imu", "wrench")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument(
+        "sessions", nargs="+", metavar="SESSION", help="recordings of ours (.rrd, .mcap), or bags of anybody"
+    )
+    parser.add_argument("--mass", type=float, metavar="M", help="the mass [kg], where it is known")
+    parser.add_argument(
+        "--mesh",
+        metavar="PART",
+        help="the body's mesh, in axes of the tracked frame: its models are compared with the motion",
+    )
+    parser.add_argument("--density", type=float, metavar="D", help="with --mesh: the mass is that of the solid [kg/m3]")
+    parser.add_argument(
+        "--against", metavar="ROBOT.urdf", help="compare its inertials with the motion (SDF and MJCF too)"
+    )
+    for sensor in SENSORS:
+        frame = "[@FRAME]" if sensor in ("twist", "wrench") else "[@CHILD]" if sensor == "pose" else ""
+        parser.add_argument(f"--{sensor}", metavar=f"TOPIC{frame}", help=f"the {sensor} topic of a bag")
+    parser.add_argument(
+        "--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="[m/s2] (default: the scene's, or 0 0 -9.81)"
+    )
+    parser.add_argument(
+        "--offset", action="append", default=[], metavar="TOPIC=S", help="seconds to add to a topic's stamps"
+    )
+    parser.add_argument(
+        "--from", type=float, default=0.0, dest="first", metavar="S", help="use what was recorded from here on"
+    )
+    parser.add_argument("--to", type=float, default=math.inf, dest="last", metavar="S", help="and up to here")
+    parser.add_argument(
+        "--fit",
+        default="mass,com,inertia",
+        metavar="LIST",
+        help="what to estimate, also damping, gravity, offset, gyro_bias, accel_bias, imu_place",
+    )
+    parser.add_argument("--robust", action="store_true", help="give samples that lie far off less weight")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--urdf", action="store_true", help="print a URDF <inertial>")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read, estimate, and say it."""
+    try:
+        from ..identify.identification import identify
+        from ..identify.report import as_json, as_text, as_urdf
+    except ImportError as error:
+        raise InputError(
+            "identify", f"scipy and mcap have to be installed: pip install scipy mcap zstandard ({error})"
+        ) from None
+    choice = _choice(args)
+    flights, scenes = _flights(args.sessions, choice)
+    known, candidates = _known(args, choice, scenes)
+    fit = [word.strip() for word in args.fit.split(",") if word.strip()]
+    found = identify(flights, fit, known, candidates, args.robust)
+    if args.json:
+        print(json.dumps(as_json(found)))
+    elif args.urdf:
+        print(as_urdf(found), end="")
+    else:
+        print("\n".join(as_text(found)))
+    return 0
+
+
+def _choice(args: argparse.Namespace) -> Choice:
+    from ..identify.bag_reading import Choice, given_offsets
+
+    for name, value in (("--mass", args.mass), ("--density", args.density)):
+        if value is not None and not (0.0 < value < math.inf):
+            raise InputError(name, value, "a finite number above 0")
+    if args.density is not None and (args.mesh is None or args.mass is not None):
+        raise InputError("--density", args.density, "it with --mesh, and no --mass")
+    if not (0.0 <= args.first < args.last):
+        raise InputError("--from", args.first, f"0 or more, and less than --to ({args.last:g})")
+    if args.gravity is not None and not all(map(math.isfinite, args.gravity)):
+        raise InputError("--gravity", args.gravity, "three finite numbers [m/s2]")
+    if args.json and args.urdf:
+        raise InputError("--urdf", "with --json", "one of the two")
+    topics = {sensor: getattr(args, sensor) for sensor in SENSORS if getattr(args, sensor)}
+    gravity = None if args.gravity is None else tuple(args.gravity)
+    return Choice(topics, given_offsets(args.offset), args.first, args.last, gravity)
+
+
+def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], list]:
+    """All flights of the sessions, and the scenarios of those that are ours."""
+    from dataclasses import replace
+
+    from ..identify.bag_reading import bag_flight
+    from ..identify.session_reading import is_own_session, session_flight
+    from ..rerun_view.session_files import is_bag, read_runs
+
+    flights, scenes = [], []
+    for name in names:
+        path = Path(name)
+        if not path.exists():
+            raise InputError("session", name, "a recording (.rrd or .mcap) or the folder of a bag")
+        runs = []
+        if not choice.topics and (not is_bag(path) or has_scene(path)):
+            runs = [run for run in read_runs(path) if is_own_session(run)]
+        if not runs:
+            flights.append(bag_flight(path, choice))
+        for number, run in enumerate(runs, 1):
+            title = name if len(runs) == 1 else f"{name}, run {number}"
+            flight, scenario = session_flight(run, title, choice.first_s, choice.last_s)
+            if choice.gravity is not None:
+                flight = replace(flight, gravity=choice.gravity, gravity_from="--gravity")
+            flights.append(flight)
+            scenes.append(scenario)
+    return flights, scenes
+
+
+def has_scene(path: Path) -> bool:
+    """Whether a bag says what was flown, as ours do."""
+    from ..session.bag import read_bag
+
+    content = read_bag(path, lambda topic: topic.endswith("/scene"))
+    return any(topic.endswith("/scene") for topic in content.messages)
+
+
+def _known(args: argparse.Namespace, choice: Choice, scenes: list) -> tuple[Known, dict[str, Candidate]]:
+    """What is known beforehand, and the bodies that are to be compared with the motion."""
+    import numpy as np
+
+    from ..identify.identification import GUESSED_RADIUS, Known
+    from ..identify.mass_parameters import parameters_of
+
+    candidates: dict[str, Candidate] = {}
+    mass, theta, length = args.mass, None, GUESSED_RADIUS
+    if args.mesh is not None:
+        body = _mesh_body(args.mesh)
+        models = _models(body, args.mass, args.density)
+        candidates |= models
+        if args.density is not None:
+            mass = next(iter(models.values())).mass
+        best = next(iter(models.values()))
+        theta = parameters_of(best.mass, np.zeros(3), best.inertia)
+        points = body.vertices
+        length = 0.5 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    elif scenes:
+        body = scenes[0].setup.body
+        length = scenes[0].setup.length
+        theta = parameters_of(body.mass, np.zeros(3), body.inertia)
+    if args.against is not None:
+        candidates |= _inertials(Path(args.against))
+    return Known(mass, theta, length, choice.offsets), candidates
+
+
+def _mesh_body(part: str) -> MeshBody:
+    from ..mass.from_mesh import mesh_body
+
+    return mesh_body(part)
+
+
+def _models(body: MeshBody, mass: float | None, density: float | None) -> dict[str, Candidate]:
+    """The mesh's models by name, those that it can have."""
+    from ..identify.comparison import Candidate
+    from ..mass.inspection import MODELS, inspect_mesh
+
+    found = inspect_mesh(body, mass=mass or (0.0 if density or body.verdict.closed else 1.0), density=density or 1000.0)
+    if not found.models:
+        raise found.refusal or InputError("--mesh", body.mesh.name, "a mesh that has mass properties")
+    return {
+        f"{body.mesh.name} as {name}": Candidate(found.models[name].mass, found.models[name].inertia)
+        for name in MODELS
+        if name in found.models
+    }
+
+
+def _inertials(path: Path) -> dict[str, Candidate]:
+    """The links of a robot file that have an inertial."""
+    from ..identify.comparison import Candidate
+    from ..mass.robot_files import read_robot
+    from ..mass.tensor import check_tensor
+
+    found = {}
+    for link in read_robot(path):
+        if not link.problem and link.mass > 0.0:
+            check_tensor(link.inertia, source=f"{path.name}, {link.link}")
+            found[f"{path.name}, {link.link}"] = Candidate(link.mass, link.inertia, fixes_mass=True)
+    if not found:
+        raise InputError("--against", str(path), "a robot file with inertials")
+    return found

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Which tensor is true: given ones are flown against the data, all else fitted anew, and compared by likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..base.errors import InputError
+from . import mass_parameters as mp
+from .fitting import Estimate, fit_flights, topics_of
+from .measurements import MeasuredFlight
+from .unknowns import make_unknowns
+
+CONTRADICTED = 1e-3
+"""Probability below which the data contradict a tensor."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A given body. fixes_mass: its mass counts as given too, else only its tensor for each kg."""
+
+    mass: float
+    inertia: np.ndarray
+    fixes_mass: bool = False
+
+
+@dataclass(frozen=True)
+class Judged:
+    """log_likelihood: of the candidate less that of the free fit, at most 0. freedoms: of the numbers that it fixes and
+    the motion tells.
+
+    probability: of a true tensor fitting so badly. weight: the candidate's share of likelihood among all candidates.
+    """
+
+    name: str
+    log_likelihood: float
+    freedoms: int
+    probability: float
+    weight: float
+    problem: str = ""
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether the data contradict it."""
+        return self.probability < CONTRADICTED
+
+
+def compare(
+    flights: Sequence[MeasuredFlight],
+    estimate: Estimate,
+    candidates: Mapping[str, Candidate],
+    fit: Sequence[str],
+    told: int,
+) -> list[Judged]:
+    """The most likely first. fit: the groups that the free fit had; told: how many of its mass parameters
+    the motion tells.
+    """
+    fixed = {True: [g for g in fit if g not in ("inertia", "mass")], False: [g for g in fit if g != "inertia"]}
+    found = []
+    for name, candidate in candidates.items():
+        theta = mp.parameters_of(candidate.mass, estimate.values.theta[mp.COM], candidate.inertia)
+        if not candidate.fixes_mass:
+            theta = mp.scaled(theta, estimate.mass.mass / candidate.mass, 1.0)
+        values = replace(estimate.values, theta=theta)
+        try:
+            unknowns = make_unknowns(fixed[candidate.fixes_mass], topics_of(flights))
+            cost = fit_flights(flights, unknowns, values, known=estimate).cost
+        except InputError as error:
+            found.append(Judged(name, -np.inf, 0, 0.0, 0.0, str(error)))
+            continue
+        fewer = max(1, min(told, len(estimate.unknowns.theta_columns)) - len(unknowns.theta_columns))
+        gain = max(cost - estimate.cost, 0.0)
+        found.append(Judged(name, -0.5 * gain, fewer, float(chi2.sf(gain, fewer)), 0.0))
+    best = max((one.log_likelihood for one in found), default=0.0)
+    weights = [float(np.exp(one.log_likelihood - best)) if np.isfinite(best) else 0.0 for one in found]
+    total = sum(weights) or 1.0
+    found = [replace(one, weight=weight / total) for one, weight in zip(found, weights, strict=True)]
+    return sorted(found, key=lambda one: -one.log_likelihood)

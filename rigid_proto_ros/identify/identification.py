@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""From measured flights to everything that is to be said of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import mass_parameters as mp
+from .comparison import Candidate, compare
+from .fitting import fit_flights, topics_of
+from .measurements import ACCELERATION, MeasuredFlight
+from .report import Identification
+from .residual_checks import check_residuals
+from .unknowns import DEFAULT_FIT, Values, make_unknowns
+from .verdict import Visibility
+
+GUESSED_RADIUS = 0.1
+"""Of the ball that stands for a body of which nothing is known [m]."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """mass [kg] when it is known. theta: a body to start from, or None. length: of the body, by which an error of its
+    COM is large [m].
+
+    offsets [s]: given, by topic; damping: in place of the flights' own.
+    """
+
+    mass: float | None = None
+    theta: np.ndarray | None = None
+    length: float = GUESSED_RADIUS
+    offsets: Mapping[str, float] = field(default_factory=dict)
+
+
+def identify(
+    flights: Sequence[MeasuredFlight],
+    fit: Sequence[str] = DEFAULT_FIT,
+    known: Known | None = None,
+    candidates: Mapping[str, Candidate] | None = None,
+    robust: bool = False,
+) -> Identification:
+    """What the flights tell of the body that flew in all of them; raises InputError."""
+    known = known or Known()
+    topics = topics_of(flights)
+    theta = _first_guess(known)
+    fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
+    first = flights[0]
+    offsets = tuple(known.offsets.get(topic, 0.0) for topic in topics)
+    damping = np.array([first.linear_damping, first.angular_damping])
+    zero = np.zeros(3)
+    values = Values(theta, damping, np.array(first.gravity, float), offsets, zero, zero, zero)
+    unknowns = make_unknowns(fit, topics)
+    estimate = fit_flights(flights, unknowns, values, robust)
+    visibility = Visibility(estimate, known.length)
+    compared = []
+    if candidates:
+        compared = compare(flights, estimate, candidates, fit, visibility.told(len(unknowns.theta_columns)))
+    return Identification(
+        flights, estimate, visibility, check_residuals(flights, estimate), compared, _assumed(flights, known, fit)
+    )
+
+
+def _first_guess(known: Known) -> np.ndarray:
+    mass = known.mass or 1.0
+    if known.theta is None:
+        return mp.parameters_of(mass, np.zeros(3), 0.4 * mass * GUESSED_RADIUS**2 * np.eye(3))
+    if known.mass is None:
+        return known.theta
+    return mp.scaled(known.theta, known.mass / mp.mass_of(known.theta).mass, 1.0)
+
+
+def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]) -> list[str]:
+    """What was taken as given, in words."""
+    first = flights[0]
+    said = []
+    if known.mass is not None:
+        said.append(f"mass {known.mass:g} kg, given")
+    if "gravity" not in fit:
+        said.append(f"gravity {' '.join(f'{g:g}' for g in first.gravity)} m/s2, from {first.gravity_from}")
+    if "damping" not in fit:
+        said.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
+    if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
+        said.append("the IMU stands at the tracked frame's origin, its axes those of the frame")
+    return said
