@@ -26,6 +26,8 @@ MOST_SEGMENTS = 16
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 8
 """Of a segment in the first stage: a start has 12 numbers."""
+FIRST_STEP = 1.0
+"""In units of the prior: moments by a factor e."""
 LENGTHENING = 4
 """Segments become so many times longer from stage to stage."""
 HUBER = 1.5
@@ -205,12 +207,19 @@ def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, mos
     problem = sh.Problem(segments, starts, work.values, work.unknowns, central=tolerance < 1e-3)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
         raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
+    # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may go.
+    widths, away = problem.widths, np.full(len(problem.first), FIRST_STEP / np.sqrt(len(problem.first)))
     found = least_squares(
-        problem.residuals, problem.first, problem.jacobian, x_scale="jac", max_nfev=most, ftol=tolerance
+        lambda z: problem.residuals(problem.first + widths * (z - away)),
+        away,
+        lambda z: problem.jacobian(problem.first + widths * (z - away)) * widths,
+        max_nfev=most,
+        ftol=tolerance,
     )
     work.evaluations += int(found.nfev)
-    work.values = problem.values(found.x)
-    return problem.starts(found.x)
+    numbers = problem.first + widths * (found.x - away)
+    work.values = problem.values(numbers)
+    return problem.starts(numbers)
 
 
 def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> dict[int, np.ndarray]:

@@ -288,7 +288,7 @@ class Problem:
     ) -> None:
         self.segments, self.unknowns, self._given, self._central = segments, unknowns, values, central
         self.first = unknowns.read(values)
-        self._widths = PRIOR_STEPS * unknowns.steps(values)
+        self.widths = PRIOR_STEPS * unknowns.steps(values)
         self._base: _Linearized | None = None
         self._trial: _Linearized | None = None
         self._starts = starts
@@ -322,7 +322,7 @@ class Problem:
     def _linearized(self, numbers: np.ndarray, starts: np.ndarray) -> _Linearized:
         values, free = self.values(numbers), len(self.unknowns)
         triangles: list[np.ndarray] = []
-        prior = ((numbers - self.first) / self._widths, np.diag(1.0 / self._widths))
+        prior = ((numbers - self.first) / self.widths, np.diag(1.0 / self.widths))
         for segment, start in zip(self.segments, starts, strict=True):
             flown = linearized(segment, start, values, self.unknowns, self._central)
             if flown is None:
