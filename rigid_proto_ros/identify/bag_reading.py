@@ -67,7 +67,7 @@ class _Topic:
 
 def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     """What was measured in a bag; raises InputError naming the topic and what is wrong with it."""
-    content = read_bag(path, lambda topic: True)
+    content = read_bag(path, lambda _: True)
     chosen = {kind: _read(content, *found) for kind, found in _chosen(content, choice.topics, str(path)).items()}
     if not set(chosen) & {"pose", "odom", "imu", "twist"}:
         known = ", ".join(f"{t} ({k})" for t, k in sorted(content.types.items())[:6]) or "nothing"

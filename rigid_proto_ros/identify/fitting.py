@@ -5,6 +5,7 @@ which uses all there is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,21 +16,23 @@ from ..base.errors import InputError
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import shooting as sh
-from .local_motion import least_noise, local_start, noise_by_differences, usual_rate
+from .local_motion import high_rate, least_noise, local_start, noise_by_differences
 from .unknowns import Unknowns, Values
 
 FIRST_ANGLE = 3.0
 """Turn of the first segments [rad]: within it even the flight of a wrong body stays near enough for
 Gauss-Newton steps.
 """
-MOST_SEGMENTS = 16
+MOST_SEGMENTS = 40
 """Of all flights together in the first stage."""
-FEWEST_SAMPLES = 8
+FEWEST_SAMPLES = 6
 """Of a segment in the first stage: a start has 12 numbers."""
 FIRST_STEP = 1.0
 """In units of the prior: moments by a factor e."""
-LENGTHENING = 4
-"""Segments become so many times longer from stage to stage."""
+LENGTHENING = 4.0
+"""Segments become so many times longer from stage to stage, or the root of it where that is too much."""
+GROWN = 1.5
+"""Departures of longer segments so many times those of shorter ones are no noise."""
 HUBER = 1.5
 """Robust fits: departures beyond so many standard deviations count by their size alone (95 % efficient at
 1.345, Huber 1981).
@@ -121,21 +124,32 @@ def _approached(work: _Work, whole: float) -> np.ndarray:
     length = _first_length(work.flights)
     segments = _segments(work, length)
     starts = np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
+    free = [k for k, segment in enumerate(segments) if not len(segment.wrenches.commands)]
+    if free and len(free) < len(segments):
+        # Shape and centre of mass first, where no load hides them: what a load does then tells mass and size at once.
+        starts[free] = _solved(work, [segments[k] for k in free], starts[free], 12, 1e-2)
     work.values = _scanned(work, segments, starts)
+    starts = _solved(work, segments, starts, 12, 1e-2)
+    work.sigmas = _noise(work, segments, starts)
+    factor = LENGTHENING
     while length < whole:
-        starts = _solved(work, segments, starts, 12, 1e-2)
-        work.sigmas = _noise(work, segments, starts)
-        length *= LENGTHENING
-        longer = _segments(work, min(length, whole))
-        starts = np.array([_start_of(segment, segments, starts) for segment in longer])
-        segments = longer
+        values, sigmas = work.values, work.sigmas
+        longer = _segments(work, min(factor * length, whole))
+        joined = np.array([_start_of(segment, segments, starts) for segment in longer])
+        joined = _solved(work, longer, joined, 12, 1e-2)
+        work.sigmas = _noise(work, longer, joined)
+        if factor > 2.0 and any(work.sigmas[key] > GROWN * sigmas[key] for key in sigmas):
+            # Too long at once: the flight has left the way to the truth. Back, and on in smaller steps.
+            work.values, work.sigmas, factor = values, sigmas, math.sqrt(factor)
+            continue
+        length, segments, starts = factor * length, longer, joined
     return starts
 
 
 def _first_length(flights: Sequence[ms.MeasuredFlight]) -> float:
     total = sum(flight.duration_s for flight in flights)
     samples = sum(len(flight.series[0].times_ns) for flight in flights)
-    rate = max(usual_rate(flight) for flight in flights)
+    rate = max(high_rate(flight) for flight in flights)
     turning = FIRST_ANGLE / rate if rate > 0.0 else total
     return max(turning, total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
 
@@ -207,7 +221,8 @@ def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, mos
     problem = sh.Problem(segments, starts, work.values, work.unknowns, central=tolerance < 1e-3)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
         raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
-    # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may go.
+    # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may
+    # go.
     widths, away = problem.widths, np.full(len(problem.first), FIRST_STEP / np.sqrt(len(problem.first)))
     found = least_squares(
         lambda z: problem.residuals(problem.first + widths * (z - away)),
@@ -271,7 +286,7 @@ def _estimate(work: _Work, segments: list[sh.Segment], starts: np.ndarray) -> Es
     cost = 0.0
     for wider, parts in roots.items():
         for segment, start in zip(segments, starts, strict=True):
-            flown = sh.linearized(segment, start, work.values, work.unknowns, wider=wider)
+            flown = sh.linearized(segment, start, work.values, work.unknowns.physical, wider=wider)
             if flown is None:
                 raise InputError("identify", "the estimate can't be flown; see --from and --to")
             triangle = sh.compressed(*flown)

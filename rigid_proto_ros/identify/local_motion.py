@@ -10,6 +10,8 @@ from . import rotations as rot
 
 NEIGHBOURS = 9
 """Samples for a local parabola: at 100 Hz and .2 degrees of noise its slope errs by some hundredths rad/s."""
+NEAR_TURN = 1.5
+"""Over which rotation vectors change nearly as the angular velocity does [rad]."""
 LEAST_NOISE = 1e-10
 """Of the largest value of a series: less can't be told from the rounding of a simulated flight."""
 
@@ -36,9 +38,9 @@ def least_noise(series: ms.Series) -> float:
     return LEAST_NOISE * max(1.0, float(np.max(np.abs(series.values))))
 
 
-def _window(series: ms.Series, time_ns: int) -> slice:
+def _window(series: ms.Series, time_ns: int, most: int = NEIGHBOURS) -> slice:
     """The samples nearest to a time."""
-    count = min(NEIGHBOURS, len(series.times_ns))
+    count = min(most, len(series.times_ns))
     first = int(np.searchsorted(series.times_ns, time_ns)) - count // 2
     first = min(max(first, 0), len(series.times_ns) - count)
     return slice(first, first + count)
@@ -66,13 +68,7 @@ def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
         window = _window(position, time_ns)
         start[:3], start[7:10] = _parabola(position, window, time_ns, position.values[window])
     if attitude is not None:
-        window = _window(attitude, time_ns)
-        middle = attitude.values[window][len(attitude.values[window]) // 2]
-        turns = rot.logarithm(rot.product(rot.inverse(middle), attitude.values[window]))
-        turn, slope = _parabola(attitude, window, time_ns, turns)
-        start[3:7] = rot.product(middle, rot.exponential(turn))
-        # The vector of a small turn changes as the angular velocity does.
-        start[10:13] = slope
+        start[3:7], start[10:13] = _local_turn(attitude, time_ns)
     rate = next((s for s in flight.series if s.kind == ms.RATE and (s.in_body or attitude is not None)), None)
     if rate is not None:
         window = _window(rate, time_ns)
@@ -86,13 +82,33 @@ def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
     return start
 
 
-def usual_rate(flight: ms.MeasuredFlight) -> float:
-    """Median angular speed [rad/s]."""
+def _local_turn(attitude: ms.Series, time_ns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Attitude xyzw and angular velocity [rad/s, body axes] at a time."""
+    window = _window(attitude, time_ns)
+    q = attitude.values[window]
+    if len(q) < 2:
+        return q[0], np.zeros(3)
+    turns = rot.logarithm(rot.product(rot.inverse(q[:-1]), q[1:]))
+    largest = float(np.median(np.linalg.norm(turns, axis=1)))
+    if largest * len(turns) > NEAR_TURN:
+        # Farther away the body has turned so much that a parabola doesn't follow.
+        window = _window(attitude, time_ns, max(3, int(NEAR_TURN / largest) + 1))
+        q = attitude.values[window]
+    middle = q[len(q) // 2]
+    turns = rot.logarithm(rot.product(rot.inverse(middle), q))
+    turn, slope = _parabola(attitude, window, time_ns, turns)
+    # A vector's rate is the angular velocity but for half its product with it, and so on; of a small turn nothing is
+    # left of that.
+    return rot.product(middle, rot.exponential(turn)), slope - 0.5 * rot.cross(turn, slope)
+
+
+def high_rate(flight: ms.MeasuredFlight) -> float:
+    """Angular speed that four of five samples don't pass [rad/s]."""
     rate, attitude = _first(flight, ms.RATE), _first(flight, ms.ATTITUDE)
     if rate is not None:
-        return float(np.median(np.linalg.norm(rate.values, axis=1)))
+        return float(np.quantile(np.linalg.norm(rate.values, axis=1), 0.8))
     if attitude is None or len(attitude.values) < 2:
         return 0.0
     turns = rot.logarithm(rot.product(rot.inverse(attitude.values[:-1]), attitude.values[1:]))
     seconds = 1e-9 * np.diff(attitude.times_ns)
-    return float(np.median(np.linalg.norm(turns, axis=1) / np.maximum(seconds, 1e-9)))
+    return float(np.quantile(np.linalg.norm(turns, axis=1) / np.maximum(seconds, 1e-9), 0.8))

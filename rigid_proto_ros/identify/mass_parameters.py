@@ -9,9 +9,10 @@ pseudo-inertia about the origin of the tracked frame is J = U Uᵀ with
         [  0     0    e^d3  t3 ]
         [  0     0     0    1  ]
 
-So the mass is e^2α, t is the centre of mass, and Σ = m V Vᵀ (V the upper left of U without e^α) are the second moments about the
-centre of mass, of which the tensor is tr(Σ) 1 − Σ. The numbers kept here are θ = (α, λ, e1, e2, s12 e^-λ, s23 e^-λ, s13 e^-λ, t) with
-d = λ + (e1, e2, −e1 − e2): the size e^λ apart from the shape, so that what a free flight can't tell, α and λ, is two of them.
+So the mass is e^2α, t is the centre of mass, and Σ = m V Vᵀ (V the upper left of U without e^α) are the second moments
+about the centre of mass, of which the tensor is tr(Σ) 1 − Σ. The numbers kept here are θ = (α, λ, e1, e2, s12 e^-λ, s23
+e^-λ, s13 e^-λ, t) with d = λ + (e1, e2, −e1 − e2): the size e^λ apart from the shape, so that what a free flight can't
+tell, α and λ, is two of them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ COM = slice(7, 10)
 PARAMETERS = 10
 
 STEP = 2e-6
-"""Of difference quotients: long flights bend so much that 1e-5 is too long for some, and 1e-7 leaves too little above rounding."""
+"""Of difference quotients: long flights bend so much that 1e-5 is too long for some, and 1e-7 leaves too
+little above rounding.
+"""
 
 SEEN = (
     *("mass", "size of the tensor", "ratio of the largest moment to the others", "ratio of the two smaller moments"),
@@ -108,23 +111,25 @@ def difference_steps(theta: np.ndarray) -> np.ndarray:
     return STEP * np.array([1.0, 1.0, 1.0, 1.0, middle, last, last, size, size, size])
 
 
-def physical_directions(theta: np.ndarray) -> np.ndarray:
-    """∂φ/∂θ (10, 10): how mass, tensor and COM, in the order of ``SEEN``, change with the parameters.
+def physical_change(theta: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """How far another body is from this one (10,), in the order of ``SEEN``.
 
-    The mass and the tensor relative to themselves (the tensor in its principal axes, each entry by the root of its two
-    moments), the COM in metres. Unlike angles of axes these stay regular where two moments agree.
+    The mass by its logarithm, the tensor's difference in this one's principal axes, each entry by the root of its two
+    moments, the COM in metres. Unlike angles of axes these stay regular where two moments agree.
     """
-    moments, axes = principal(theta)
-    root = np.sqrt(np.outer(moments, moments))
-    steps = difference_steps(theta)
-    columns = []
-    for k in range(PARAMETERS):
-        step = np.zeros(PARAMETERS)
-        step[k] = steps[k]
-        up, down = mass_of(theta + step), mass_of(theta - step)
-        change = (axes.T @ (up.inertia - down.inertia) @ axes) / root
-        a, b, c = np.diag(change)
-        tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, change[1, 2], change[0, 2], change[0, 1])
-        mass = math.log(up.mass / down.mass)
-        columns.append(np.array([mass, *tensor, *(up.center_of_mass - down.center_of_mass)]) / (2.0 * steps[k]))
-    return np.array(columns).T
+    this, that = mass_of(theta), mass_of(other)
+    moments, axes = principal_axes(this.inertia)
+    change = (axes.T @ (that.inertia - this.inertia) @ axes) / np.sqrt(np.outer(moments, moments))
+    a, b, c = np.diag(change)
+    tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, change[1, 2], change[0, 2], change[0, 1])
+    return np.array([math.log(that.mass / this.mass), *tensor, *(that.center_of_mass - this.center_of_mass)])
+
+
+def changed_tensor(body: MassEstimate, change: np.ndarray) -> MassEstimate:
+    """A body with the tensor changed (6,) as ``physical_change`` would say it, but for its first number."""
+    moments, axes = principal_axes(body.inertia)
+    size, ratio, smaller, turn23, turn13, turn12 = change.tolist()
+    a, b, c = size - ratio / 3.0 - 0.5 * smaller, size - ratio / 3.0 + 0.5 * smaller, size + 2.0 * ratio / 3.0
+    relative = np.array([[a, turn12, turn13], [turn12, b, turn23], [turn13, turn23, c]])
+    inertia = body.inertia + axes @ (relative * np.sqrt(np.outer(moments, moments))) @ axes.T
+    return MassEstimate(body.mass, body.center_of_mass, 0.5 * (inertia + inertia.T))

@@ -91,7 +91,7 @@ class Identification:
         }
 
     def _of(self, read: Callable[[mp.MassEstimate], float]) -> Quantity:
-        return self.visibility.quantity(lambda values: read(mp.mass_of(values.theta)))
+        return self.visibility.quantity(lambda values: read(values.body))
 
     def _each(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int) -> list[Quantity]:
         def one(k: int) -> Quantity:

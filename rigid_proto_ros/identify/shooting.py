@@ -103,9 +103,9 @@ def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
     centre of mass.
     """
     rows = np.empty((len(starts), tr.FLOWN))
-    bodies = {id(v): (v, mp.mass_of(v.theta)) for v in values}
+    bodies = {id(v): v.body for v in values}
     for row, v in zip(rows, values, strict=True):
-        mass = bodies[id(v)][1]
+        mass = bodies[id(v)]
         row[tr.MASS] = mass.mass
         row[tr.COM : tr.COM + 3] = mass.center_of_mass
         row[tr.INERTIA : tr.INERTIA + 9] = mass.inertia.ravel()
@@ -210,7 +210,7 @@ def linearized(
     if base is None:
         return None
     times, where = _times(segment, values.offsets)
-    rate = values.damping[0] / mp.mass_of(values.theta).mass
+    rate = values.damping[0] / values.body.mass
     widths = np.concatenate([wider * START_STEPS, steps])
     blocks, found = [], []
     for piece, own, index in zip(segment.pieces, shown, where, strict=True):
@@ -315,8 +315,16 @@ class Problem:
         for known in (self._trial, self._base):
             if known is not None and np.array_equal(known.numbers, numbers):
                 return known
-        starts = self._starts if self._base is None else self._base.starts_for(numbers)
-        self._trial = self._linearized(numbers, starts)
+        if self._base is not None:
+            self._trial = self._linearized(numbers, self._base.starts_for(numbers))
+            return self._trial
+        # What a start could still take counts as taken already: so it has to be near before steps are judged by what is
+        # left.
+        self._trial = self._linearized(numbers, self._starts)
+        for _ in range(SETTLING):
+            if self._trial.is_settled:
+                break
+            self._trial = self._linearized(numbers, self._trial.starts_for(numbers))
         return self._trial
 
     def _linearized(self, numbers: np.ndarray, starts: np.ndarray) -> _Linearized:
@@ -347,6 +355,14 @@ class _Linearized:
     residuals: np.ndarray
     jacobian: np.ndarray
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether the starts are as good as they can be for these unknowns, or so bad that they can't be flown."""
+        if self.triangles is None:
+            return True
+        could = sum(float(triangle[:START, -1] @ triangle[:START, -1]) for triangle in self.triangles)
+        return could <= SETTLED * float(self.residuals @ self.residuals)
+
     def starts_for(self, numbers: np.ndarray) -> np.ndarray:
         """The best starts for other unknowns, as far as the derivatives say."""
         if self.triangles is None:
@@ -361,6 +377,11 @@ class _Linearized:
             steps.append(-np.linalg.lstsq(whole, np.concatenate([rest, np.zeros(START)]), rcond=None)[0])
         return moved_starts(self.starts, np.array(steps))
 
+
+SETTLING = 6
+"""Most steps of the starts alone before the first step of the unknowns."""
+SETTLED = 0.01
+"""Part of the squares that starts could still take away."""
 
 START_WIDTHS = np.repeat([1e3, 1e2, 1e3, 1e3], 3)
 """Of what is assumed of a start beforehand."""

@@ -6,7 +6,7 @@ place and biases.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,6 +34,13 @@ class Values:
     gyro_bias: np.ndarray
     accel_bias: np.ndarray
     imu_place: np.ndarray
+    tensor_change: np.ndarray = field(default_factory=lambda: np.zeros(6))
+
+    @property
+    def body(self) -> mp.MassEstimate:
+        """The body that these say."""
+        body = mp.mass_of(self.theta)
+        return mp.changed_tensor(body, self.tensor_change) if self.tensor_change.any() else body
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,14 @@ class Unknowns:
         """(place among the unknowns, index in theta) of the mass parameters that are free."""
         return [(k, index) for k, (name, index) in enumerate(self.slots) if name == "theta"]
 
+    @property
+    def physical(self) -> Unknowns:
+        """The same with the tensor itself for its parameters, which near the rim of what can exist hardly
+        change it any more.
+        """
+        slots = [("tensor_change", i - 1) if n == "theta" and 1 <= i <= 6 else (n, i) for n, i in self.slots]
+        return Unknowns(tuple(slots), self.names)
+
     def read(self, values: Values) -> np.ndarray:
         """The free numbers of ``values``."""
         return np.array([float(getattr(values, name)[index]) for name, index in self.slots])
@@ -70,7 +85,7 @@ class Unknowns:
     def steps(self, values: Values) -> np.ndarray:
         """Steps for difference quotients."""
         theta = mp.difference_steps(values.theta)
-        mass = mp.mass_of(values.theta)
+        mass = values.body
         damping = 10.0 * mp.STEP * np.array([mass.mass, np.trace(mass.inertia) / 3.0])
         given = {"theta": theta, "damping": damping}
         return np.array([float(given[name][index]) if name in given else mp.STEP for name, index in self.slots])

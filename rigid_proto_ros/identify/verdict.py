@@ -64,7 +64,7 @@ class Visibility:
 
     def __init__(self, estimate: Estimate, length: float) -> None:
         """length: by which an error of the centre of mass is called large [m]."""
-        self.unknowns, self.values = estimate.unknowns, estimate.values
+        self.unknowns, self.values, self._length = estimate.unknowns.physical, estimate.values, length
         self.names, self._to_physical = _coordinates(estimate.unknowns, estimate.values, length)
         back = np.linalg.inv(self._to_physical)
         root = estimate.root @ back
@@ -132,6 +132,18 @@ class Visibility:
         """How many of the directions among the first ``count`` coordinates can be seen."""
         return count - int(np.linalg.matrix_rank(self._directions[:count, self._hidden], tol=0.5))
 
+    def errors(self, other: Values) -> np.ndarray:
+        """How far other values are off along the directions that can be seen, each in its standard deviation."""
+        numbers, own = self.unknowns.read(other), self.unknowns.read(self.values)
+        mass = mp.physical_change(self.values.theta, other.theta)
+        mass[mp.COM] /= self._length
+        change = self._to_physical @ (numbers - own)
+        for k, (name, index) in enumerate(self.unknowns.slots):
+            if name in ("theta", "tensor_change"):
+                change[k] = mass[index + (name == "tensor_change")]
+        seen = ~self._hidden
+        return self.roots[seen] * (self._directions[:, seen].T @ change)
+
     def quantity(self, of: Callable[[Values], float]) -> Quantity:
         """A function of the estimate with its standard deviation, or nothing where a direction that can't
         be seen changes it.
@@ -154,22 +166,27 @@ class Visibility:
 
 
 def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], np.ndarray]:
-    """Names of the coordinates in which 1 is much, and their change with the unknowns (n, n)."""
-    physical = mp.physical_directions(values.theta)
-    physical[7:10] /= length
-    mass = mp.mass_of(values.theta)
-    matrix = np.zeros((len(unknowns), len(unknowns)))
-    names = []
-    own = unknowns.theta_columns
+    """Names of the coordinates in which 1 is much, and their change with the (physical) unknowns (n, n)."""
+    body = values.body
+    names, matrix = [], np.zeros((len(unknowns), len(unknowns)))
     for k, (name, index) in enumerate(unknowns.slots):
-        if name == "theta":
+        matrix[k, k] = 1.0
+        if name == "theta" and index == mp.MASS:
+            names.append(mp.SEEN[mp.MASS])
+            # The tensor for each kg stays: so its size grows with the mass.
+            matrix[k, k] = 2.0
+            for other, slot in enumerate(unknowns.slots):
+                if slot == ("tensor_change", 0):
+                    matrix[other, k] = 2.0
+        elif name == "theta":
             names.append(mp.SEEN[index])
-            for column, other in own:
-                matrix[k, column] = physical[index, other]
+            matrix[k, k] = 1.0 / length
+        elif name == "tensor_change":
+            names.append(mp.SEEN[1 + index])
         else:
             unit = UNITS[name]
             if name == "damping":
-                unit = mass.mass if index == 0 else float(np.trace(mass.inertia)) / 3.0
+                unit = body.mass if index == 0 else float(np.trace(body.inertia)) / 3.0
             names.append(unknowns.names[k].replace("_", " "))
             matrix[k, k] = 1.0 / unit
     return names, matrix

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Flights as a motion capture would see them: made by the simulation's own kernels, with noise from a seeded generator."""
+"""Flights as a motion capture would see them: made by the simulation's own kernels, with noise from a
+seeded generator.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0), t
 
 
 def acting(*pokes) -> ms.Acting:
-    """Loads from (begin [s], duration [s] or 0 for an impulse, axes, point in the tracked frame or None, force, torque)."""
+    """Loads from (begin [s], duration [s] or 0 for an impulse, axes, point in the tracked frame or None,
+    force, torque).
+    """
     begin = np.array([round(p[0] * 1e9) for p in pokes], np.int64)
     end = begin + np.array([round(p[1] * 1e9) for p in pokes], np.int64)
     loads = [Load(axes, point, tuple(force), tuple(torque)).row for _, _, axes, point, force, torque in pokes]
