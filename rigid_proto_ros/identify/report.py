@@ -68,17 +68,17 @@ class Identification:
     @property
     def inertia(self) -> list[Quantity]:
         """ixx ixy ixz iyy iyz izz [kg m², about the COM, axes of the tracked frame]."""
-        return self._each(lambda body: np.array(six_from_tensor(body.inertia)), 6)
+        return self._whole(lambda body: np.array(six_from_tensor(body.inertia)), 6)
 
     @property
     def shape(self) -> list[Quantity]:
         """The same divided by the tensor's trace."""
-        return self._each(lambda body: np.array(six_from_tensor(body.inertia)) / np.trace(body.inertia), 6)
+        return self._whole(lambda body: np.array(six_from_tensor(body.inertia)) / np.trace(body.inertia), 6)
 
     @property
     def moments(self) -> list[Quantity]:
         """Principal moments, ascending [kg m²]."""
-        return self._each(lambda body: principal_axes(body.inertia)[0], 3)
+        return self._whole(lambda body: principal_axes(body.inertia)[0], 3)
 
     @property
     def others(self) -> dict[str, Quantity]:
@@ -98,6 +98,11 @@ class Identification:
             return self._of(lambda body: float(read(body)[k]))
 
         return [one(k) for k in range(count)]
+
+    def _whole(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int) -> list[Quantity]:
+        """All of them or none: an entry that happens to be 0 has the size of the others."""
+        found = self._each(read, count)
+        return found if all(one.value is not None for one in found) else [Quantity(None, None)] * count
 
     @property
     def remarks(self) -> list[str]:

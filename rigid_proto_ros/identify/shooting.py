@@ -244,6 +244,9 @@ def _fill_offset(
             change = departure(piece.series.kind, sides[1][number][0], sides[0][number][0])
             weight = np.sqrt(piece.weights)[:, None] / piece.sigma
             column[:] = -weight * change / (2.0 * OFFSET_STEP_S)
+            # Where a load begins or ends an accelerometer's curve jumps, and says nothing about its slope.
+            times = piece.times_ns - segment.begin_ns + round(values.offsets[topic] * 1e9)
+            column[segment.wrenches.is_near_edge(times, round(2e9 * OFFSET_STEP_S))] = 0.0
 
 
 def upper_triangle(matrix: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from . import mass_parameters as mp
+from . import shooting as sh
 from .fitting import Estimate
 from .unknowns import Unknowns, Values
 
@@ -27,6 +28,13 @@ ROUNDING = 0.5
 """Where longer difference quotients leave less than this part of the information, by its root, it is rounding."""
 NAMED = 0.98
 """Part of a named direction's square that must lie among those that can't be seen."""
+
+DOUBTED = 0.01
+"""Standard deviations above this are tried out: a spin whose wobble is only noise seems to tell what it doesn't."""
+TRIED = 4.0
+"""So many standard deviations away the fit is tried again, with other starts."""
+LEAST_RISE = 4.0
+"""Of the sum of squares there, where sixteen is expected."""
 
 POKE = "one poke of a known force beside the centre of mass"
 TUMBLE = "a flight that tumbles about several axes"
@@ -64,7 +72,7 @@ class Visibility:
 
     def __init__(self, estimate: Estimate, length: float) -> None:
         """length: by which an error of the centre of mass is called large [m]."""
-        self.unknowns, self.values, self._length = estimate.unknowns.physical, estimate.values, length
+        self.unknowns, self.values = estimate.unknowns.physical, estimate.values
         self.names, self._to_physical = _coordinates(estimate.unknowns, estimate.values, length)
         back = np.linalg.inv(self._to_physical)
         root = estimate.root @ back
@@ -75,6 +83,8 @@ class Visibility:
         self._directions = directions.T
         wide = np.linalg.norm(estimate.root_wide @ back @ self._directions, axis=0)
         self._hidden = (self.roots < 1.0 / MOST_RELATIVE) | (wide < ROUNDING * self.roots)
+        for k in np.flatnonzero(~self._hidden & (self.sds > DOUBTED)):
+            self._hidden[k] = not _withstands(estimate, back @ self._directions[:, k], float(self.sds[k]))
 
     @property
     def sds(self) -> np.ndarray:
@@ -132,18 +142,6 @@ class Visibility:
         """How many of the directions among the first ``count`` coordinates can be seen."""
         return count - int(np.linalg.matrix_rank(self._directions[:count, self._hidden], tol=0.5))
 
-    def errors(self, other: Values) -> np.ndarray:
-        """How far other values are off along the directions that can be seen, each in its standard deviation."""
-        numbers, own = self.unknowns.read(other), self.unknowns.read(self.values)
-        mass = mp.physical_change(self.values.theta, other.theta)
-        mass[mp.COM] /= self._length
-        change = self._to_physical @ (numbers - own)
-        for k, (name, index) in enumerate(self.unknowns.slots):
-            if name in ("theta", "tensor_change"):
-                change[k] = mass[index + (name == "tensor_change")]
-        seen = ~self._hidden
-        return self.roots[seen] * (self._directions[:, seen].T @ change)
-
     def quantity(self, of: Callable[[Values], float]) -> Quantity:
         """A function of the estimate with its standard deviation, or nothing where a direction that can't
         be seen changes it.
@@ -163,6 +161,22 @@ class Visibility:
             return Quantity(None, None)
         seen = ~self._hidden
         return Quantity(float(of(self.values)), float(np.linalg.norm(along[seen] / self.roots[seen])))
+
+
+def _withstands(estimate: Estimate, direction: np.ndarray, sd: float) -> bool:
+    """Whether the flights contradict a body far away along a direction of the physical unknowns, whatever
+    their starts were.
+    """
+    problem = sh.Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical, central=False)
+    best = problem.residuals(problem.first)
+    for side in (1.0, -1.0):
+        tried = sh.Problem(
+            estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical, central=False
+        )
+        there = tried.residuals(tried.first + side * min(TRIED * sd, MOST_RELATIVE) * direction)
+        if there @ there - best @ best < LEAST_RISE:
+            return False
+    return True
 
 
 def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], np.ndarray]:

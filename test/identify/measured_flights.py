@@ -60,3 +60,29 @@ def mocap(
 def tumbling(rate=(0.4, 6.0, 0.3), velocity=(0.3, -0.2, 3.0)) -> np.ndarray:
     """A start (13,)."""
     return np.array([0.1, 0.2, 1.0, 0.0, 0.0, 0.0, 1.0, *velocity, *rate])
+
+
+def without_loads(flight: ms.MeasuredFlight) -> ms.MeasuredFlight:
+    """The same as if nobody had recorded what acted."""
+    return ms.MeasuredFlight(flight.name, flight.series, ms.nothing_acting(), flight.gravity)
+
+
+def with_imu(
+    values, start, rng, seconds=3.0, load=None, offset_s=0.0, place=(0.0, 0.0, 0.0), bias=(0.0, 0.0)
+) -> ms.MeasuredFlight:
+    """The same flight with an IMU as a phone's on it, whose clock is behind by ``offset_s``; bias: of its
+    rates and accelerations.
+    """
+    flight = mocap(values, start, rng, seconds, load=load)
+    times, samples = flown(values, start, np.arange(0.02, seconds - 0.05, 0.005) + offset_s, load)
+    rate = samples[:, 10:13] + bias[0] + 0.005 * rng.standard_normal((len(times), 3))
+    arm = np.asarray(place) - values.theta[7:10]
+    w, angular = samples[:, 10:13], samples[:, 16:19]
+    felt = samples[:, 13:16] + np.cross(angular, arm) + np.cross(w, np.cross(w, arm))
+    felt = felt + bias[1] + 0.05 * rng.standard_normal(felt.shape)
+    stamps = times - round(offset_s * 1e9)
+    imu = (
+        ms.Series("/imu", ms.RATE, stamps, rate, in_body=True, is_imu=True),
+        ms.Series("/imu", ms.ACCELERATION, stamps, felt, in_body=True, is_imu=True),
+    )
+    return ms.MeasuredFlight("flight", (*flight.series, *imu), flight.acting, flight.gravity)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""What a motion can tell is said before any number, and what it can't is never a number."""
+
+from __future__ import annotations
+
+import measured_flights as mf
+import numpy as np
+import pytest
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.identify.identification import Known, identify
+from rigid_proto_ros.identify.report import as_json, as_text, as_urdf
+
+INERTIA = np.diag([2.0, 3.0, 4.0]) * 1e-3
+POKE = (0.5, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.5, 2.0), (0.0, 0.0, 0.01))
+
+
+def _identified(rate, load=None, known=None, seed=1, noise=mf.MOCAP):
+    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA)
+    rng = np.random.default_rng(seed)
+    return identify([mf.mocap(truth, mf.tumbling(rate), rng, 3.0, load=load, noise=noise)], known=known)
+
+
+def _what(found) -> set[str]:
+    return {one.what for one in found.hidden}
+
+
+@pytest.mark.parametrize("noise", [mf.MOCAP, (1e-9, 1e-9)])
+def test_a_free_tumble_tells_the_shape_of_the_tensor_and_not_its_size(noise) -> None:
+    found = _identified((0.4, 6.0, 0.3), noise=noise)
+    assert _what(found) == {"mass", "size of the tensor"}
+    assert found.mass.value is None
+    assert all(one.value is None for one in found.inertia)
+    assert all(one.value is not None for one in (*found.shape, *found.center_of_mass))
+    assert "poke" in next(one.remedy for one in found.hidden if one.what == "size of the tensor")
+
+
+def test_a_flight_without_spin_tells_nothing_of_the_body() -> None:
+    found = _identified((0.0, 0.0, 0.0))
+    assert len(found.hidden) == 10
+    assert found.verdict.startswith("this motion tells nothing")
+    assert not any("±" in line for line in as_text(found))
+
+
+def test_a_spin_about_a_principal_axis_tells_only_the_centre_of_mass_across_it() -> None:
+    found = _identified((0.0, 0.0, 5.0))
+    told = [one.value is not None for one in found.center_of_mass]
+    assert told == [True, True, False]
+    assert all(one.value is None for one in found.shape)
+    assert "centre of mass along z" in _what(found)
+
+
+def test_a_known_mass_fixes_the_mass_and_not_the_tensor_of_a_free_tumble() -> None:
+    found = _identified((0.4, 6.0, 0.3), known=Known(mass=0.5))
+    assert _what(found) == {"size of the tensor"}
+
+
+def test_a_known_poke_fixes_all() -> None:
+    assert not _identified((0.4, 6.0, 0.3), mf.acting(POKE)).hidden
+
+
+def test_what_cannot_be_seen_is_null_and_no_urdf() -> None:
+    found = _identified((0.4, 6.0, 0.3))
+    values = as_json(found)
+    assert values["mass"] is None
+    assert values["inertia"]["ixx"] is None
+    assert values["principal_moments"] == [None] * 3
+    assert values["inertia_over_trace"]["ixx"]["value"] == pytest.approx(2.0 / 9.0, abs=0.01)
+    with pytest.raises(InputError, match="can't tell mass"):
+        as_urdf(found)
+
+
+def test_without_a_clue_of_gravity_a_throw_says_what_it_assumed() -> None:
+    found = _identified((0.4, 6.0, 0.3))
+    assert any(line.startswith("gravity") for line in found.assumed)
