@@ -39,7 +39,7 @@ ALLOWED = {
     "rerun_bindings": ("rerun_view",),
     "pyarrow": ("rerun_view", "sweep.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
-    "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.verdict"),
+    "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.comparison", "identify.residual_checks"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs

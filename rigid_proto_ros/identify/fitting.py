@@ -31,13 +31,17 @@ FIRST_STEP = 1.0
 """In units of the prior: moments by a factor e."""
 LENGTHENING = 4.0
 """Segments become so many times longer from stage to stage, or the root of it where that is too much."""
+COARSE = 0.01
+"""Part of what a series shows, or radians, below which a scan doesn't look."""
+MOST_WORSE = 2
+"""Scans go on for so many steps, of a factor 1.8 each, after the best one."""
 GROWN = 1.5
 """Departures of longer segments so many times those of shorter ones are no noise."""
 HUBER = 1.5
 """Robust fits: departures beyond so many standard deviations count by their size alone (95 % efficient at
 1.345, Huber 1981).
 """
-OFFSET_MARGIN_S = 0.5
+OFFSET_MARGIN_S = 0.05
 """The largest difference of two clocks that is looked for."""
 WIDER = 8.0
 """Of steps of difference quotients: of what is rounding alone so much less is left."""
@@ -182,8 +186,10 @@ def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: 
         if found is None:
             return np.inf
         for piece, departure in zip(segment.pieces, found, strict=True):
-            # Few samples that nothing could bring near must not hide what the others say.
-            scaled = np.minimum(np.abs(departure) / piece.sigma, 1e6)
+            # Few samples that nothing could bring near must not hide what the others say, nor a noise of nothing all of
+            # them.
+            coarse = 1.0 if piece.series.kind == ms.ATTITUDE else float(np.std(piece.series.values))
+            scaled = departure / max(piece.sigma, COARSE * coarse)
             total += float(np.sum(np.log1p(scaled * scaled)))
     return total
 
@@ -201,8 +207,9 @@ def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) ->
     for index, of_mass in ((mp.MASS, True), (mp.SIZE, False)):
         if index not in free:
             continue
-        best, best_cost = values, np.inf
-        for power in range(-24, 25):
+        best, best_cost, worse = values, np.inf, 0
+        # From too heavy to too light, which would be spun up beyond measure: the best one lies before it gets worse.
+        for power in range(24, -25, -1):
             factor = 10.0 ** (0.25 * power)
             # The mass changes alone, then the tensor alone.
             theta = mp.scaled(values.theta, factor if of_mass else 1.0, factor**-0.5 if of_mass else factor**0.5)
@@ -210,8 +217,11 @@ def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) ->
                 theta = mp.scaled(values.theta, factor, 1.0)
             tried = replace(values, theta=theta)
             cost = _sum_of_squares(chosen, theirs, tried)
+            worse = 0 if cost <= 1.001 * best_cost else worse + 1
             if cost < best_cost:
                 best, best_cost = tried, cost
+            if worse > MOST_WORSE:
+                break
         values = best
     return values
 

@@ -41,7 +41,7 @@ def session_flight(
     if not setup.gyroscopic:
         raise InputError("session", f"{name} was flown with gyroscopic: false, which no body does")
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
-    frames = frame_names(scenario.values, session.node_name)
+    frames = frame_names(scenario.parameters, session.node_name)
     acting = _acting(session, setup, frames, name, end_ns)
     series = [_cut(one, round(first_s * 1e9), end_ns) for one in _series(session)]
     series = [one for one in series if len(one.times_ns)]

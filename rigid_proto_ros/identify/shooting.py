@@ -27,7 +27,7 @@ START = 12
 START_STEPS = np.array([0.0] * 3 + [mp.STEP] * 3 + [0.0] * 3 + [mp.STEP] * 3)
 """For difference quotients; how a flight shifts with its position and velocity is known in closed form."""
 OFFSET_STEP_S = 1e-5
-FAILED = 1e8
+FAILED = 1e20
 """Residual of a flight that didn't come through, in standard deviations: the step is then taken back."""
 
 
@@ -73,7 +73,8 @@ def cut(
     segments = []
     for flight in flights:
         count = max(1, round(flight.duration_s / lengths_s))
-        edges = np.linspace(flight.begin_ns, flight.end_ns + 1, count + 1).astype(np.int64)
+        # In integers: a double of the nanoseconds since 1970 is 256 ns off.
+        edges = flight.begin_ns + (flight.end_ns + 1 - flight.begin_ns) * np.arange(count + 1) // count
         for first, last in zip(edges[:-1], edges[1:], strict=True):
             pieces = []
             for series in flight.series:

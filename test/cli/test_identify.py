@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto identify`` on our own sessions: the verdict, numbers as JSON and URDF, given tensors judged, one line for bad input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from rigid_proto_ros.cli.main import main
+
+POKES = "- {t: 0.5, at: {point: [0.0, 0.03, 0.02]}, force: [1.0, 0.5, 2.0], duration: 0.05}\n"
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A T-handle poked in flight, as a session, and what it is."""
+    folder = tmp_path_factory.mktemp("identify")
+    script, bag = folder / "pokes.yaml", folder / "flight.mcap"
+    script.write_text(POKES)
+    assert main(["simulate", "t_handle", "--script", str(script), "--duration", "1.5", "--bag", str(bag)]) == 0
+    return bag, {"mass": 0.1570796, "folder": folder}
+
+
+def _json(capsys: pytest.CaptureFixture, *words: str) -> dict:
+    capsys.readouterr()
+    assert main(["identify", *words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def _inspected(capsys: pytest.CaptureFixture) -> dict:
+    capsys.readouterr()
+    assert main(["inspect", "t_handle", "--density", "7850", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_poked_session_gives_back_the_body_that_was_flown(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    truth, found = _inspected(capsys), _json(capsys, str(flight[0]))
+    assert found["hidden"] == []
+    assert found["mass"]["value"] == pytest.approx(truth["mass"], rel=1e-6)
+    assert found["inertia"]["iyy"]["value"] == pytest.approx(truth["inertia"][1][1], rel=1e-6)
+    assert found["inertia"]["izz"]["value"] == pytest.approx(truth["inertia"][2][2], rel=1e-6)
+
+
+def test_before_the_poke_its_mass_is_no_number(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    found = _json(capsys, str(flight[0]), "--to", "0.5")
+    assert found["mass"] is None
+    assert "it can't tell mass" in found["verdict"]
+
+
+def test_the_solid_agrees_and_the_box_is_contradicted(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    found = _json(capsys, str(flight[0]), "--mesh", "t_handle")
+    judged = {one["name"].rpartition(" ")[2]: one for one in found["compared"]}
+    assert found["compared"][0]["name"].endswith("as solid")
+    assert judged["bounding_box"]["contradicted"]
+    assert judged["shell"]["contradicted"]
+
+
+def test_its_urdf_is_judged_as_true_by_its_own_motion(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    bag, known = flight
+    capsys.readouterr()
+    assert main(["identify", str(bag), "--urdf"]) == 0
+    text = capsys.readouterr().out
+    assert ElementTree.fromstring(text).find("mass") is not None
+    robot = known["folder"] / "robot.urdf"
+    robot.write_text(f'<robot name="r"><link name="handle">{text}</link></robot>')
+    [judged] = _json(capsys, str(bag), "--against", str(robot))["compared"]
+    assert judged["name"] == "robot.urdf, handle"
+    assert judged["log_likelihood"] > -20.0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nowhere.mcap"], "session"),
+        (["FLIGHT", "--from", "2", "--to", "1"], "--from"),
+        (["FLIGHT", "--from", "9"], "--from"),
+        (["FLIGHT", "--mass", "-1"], "--mass"),
+        (["FLIGHT", "--fit", "mass,colour"], "--fit"),
+        (["FLIGHT", "--density", "1000"], "--density"),
+        (["FLIGHT", "--to", "0.5", "--urdf"], "--urdf"),
+        (["FLIGHT", "--pose", "/elsewhere"], "--pose"),
+        (["FLIGHT", "--offset", "pose"], "--offset"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    flight: tuple, capsys: pytest.CaptureFixture, words: list[str], message: str
+) -> None:
+    assert main(["identify", *(str(flight[0]) if word == "FLIGHT" else word for word in words)]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert said[0].startswith("rigid_proto identify: ")
+    assert message in said[0]

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""Bags as other people's robots record them, written by mcap_ros2: their own topic names, rates, gaps,
+jitter and clocks.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap_ros2.writer import Writer
+
+TIME = "builtin_interfaces/Time stamp\nstring frame_id\n"
+SEPARATOR = "=" * 80 + "\n"
+PARTS = {
+    "std_msgs/Header": TIME,
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
+    "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+    "geometry_msgs/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
+    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
+    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
+    "geometry_msgs/TransformStamped": (
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
+    ),
+    "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose\nfloat64[36] covariance\n",
+    "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist\nfloat64[36] covariance\n",
+}
+TYPES = {
+    "geometry_msgs/msg/PoseStamped": "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
+    "geometry_msgs/msg/TwistStamped": "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
+    "geometry_msgs/msg/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
+    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    "nav_msgs/msg/Odometry": (
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
+        "geometry_msgs/TwistWithCovariance twist\n"
+    ),
+    "sensor_msgs/msg/Imu": (
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+        "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+        "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"
+    ),
+}
+EPOCH_NS = 1_760_000_000_000_000_000
+
+
+def definition(message_type: str) -> str:
+    """With every part that it may need behind it."""
+    return TYPES[message_type] + "".join(f"{SEPARATOR}MSG: {name}\n{text}" for name, text in PARTS.items())
+
+
+def xyz(vector: Any) -> dict:
+    return dict(zip("xyz", map(float, vector), strict=True))
+
+
+def xyzw(q: Any) -> dict:
+    return dict(zip("xyzw", map(float, q), strict=True))
+
+
+def header(time_ns: int, frame_id: str) -> dict:
+    seconds, nanoseconds = divmod(EPOCH_NS + int(time_ns), 10**9)
+    return {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": frame_id}
+
+
+def pose(time_ns: int, p: Any, q: Any, frame: str = "map") -> dict:
+    return {"header": header(time_ns, frame), "pose": {"position": xyz(p), "orientation": xyzw(q)}}
+
+
+def transform(time_ns: int, p: Any, q: Any, frame: str, child: str) -> dict:
+    moved = {"translation": xyz(p), "rotation": xyzw(q)}
+    return {"header": header(time_ns, frame), "child_frame_id": child, "transform": moved}
+
+
+def wrench(time_ns: int, force: Any, torque: Any, frame: str) -> dict:
+    return {"header": header(time_ns, frame), "wrench": {"force": xyz(force), "torque": xyz(torque)}}
+
+
+def twist(time_ns: int, v: Any, w: Any, frame: str) -> dict:
+    return {"header": header(time_ns, frame), "twist": {"linear": xyz(v), "angular": xyz(w)}}
+
+
+def odometry(time_ns: int, p: Any, q: Any, v: Any, w: Any) -> dict:
+    return {
+        "header": header(time_ns, "odom"),
+        "child_frame_id": "base_link",
+        "pose": {"pose": {"position": xyz(p), "orientation": xyzw(q)}, "covariance": [0.0] * 36},
+        "twist": {"twist": {"linear": xyz(v), "angular": xyz(w)}, "covariance": [0.0] * 36},
+    }
+
+
+def imu(time_ns: int, rate: Any, acceleration: Any) -> dict:
+    return {
+        "header": header(time_ns, "imu_link"),
+        "orientation": xyzw((0, 0, 0, 1)),
+        "orientation_covariance": [-1.0] + [0.0] * 8,
+        "angular_velocity": xyz(rate),
+        "angular_velocity_covariance": [0.0] * 9,
+        "linear_acceleration": xyz(acceleration),
+        "linear_acceleration_covariance": [0.0] * 9,
+    }
+
+
+def write(path: Path, topics: dict[str, tuple[str, list[tuple[int, dict]]]]) -> Path:
+    """A bag of topics: type, and (time [ns], message) each."""
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        for topic, (message_type, messages) in topics.items():
+            schema = writer.register_msgdef(message_type, definition(message_type))
+            for number, (time_ns, message) in enumerate(messages):
+                stamp = EPOCH_NS + int(time_ns)
+                writer.write_message(topic, schema, message, stamp, stamp, number)
+        writer.finish()
+    return path
+
+
+def keep(count: int, rng: np.random.Generator) -> np.ndarray:
+    """Which samples came through: a fifth is lost, and a gap of a tenth of all."""
+    kept = rng.random(count) > 0.2
+    kept[count // 2 : count // 2 + count // 10] = False
+    return kept

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""Anybody's bags: types, frames, gaps, jitter and clocks; and one line for each that can't be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import foreign_bags as fb
+import measured_flights as mf
+import numpy as np
+import pytest
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.identify import rotations as rot
+from rigid_proto_ros.identify.bag_reading import Choice, bag_flight, given_offsets
+from rigid_proto_ros.identify.identification import identify
+from rigid_proto_ros.identify.report import Identification
+
+INERTIA = np.diag([2.0, 3.0, 4.0]) * 1e-3
+COM = (0.01, -0.02, 0.03)
+EARTH = (0.0, 0.0, -9.81)
+FORCE, TORQUE = (0.3, 0.5, 2.0), (0.01, 0.0, 0.02)
+
+
+def _truth(topics: int = 1):
+    return mf.values_of(0.5, COM, INERTIA, EARTH, topics=topics)
+
+
+def _near(found: Identification, names: int = 10) -> None:
+    told = [found.mass, *found.center_of_mass, *found.inertia]
+    true = [0.5, *COM, 2e-3, 0.0, 0.0, 3e-3, 0.0, 4e-3]
+    errors = [(one.value - x) / one.sd for one, x in zip(told, true, strict=True)]
+    assert np.abs(errors).max() < 4.5
+    assert found.mass.sd < 0.02 * 0.5
+
+
+def _thruster(rng: np.random.Generator, topic_frame: str) -> tuple[list, object]:
+    """A body force from .5 to 1.2 s as 50 Hz messages with jitter, and the load that the messages say."""
+    times = np.sort(0.5 + 0.02 * np.arange(36) + 0.004 * rng.random(36))
+    times_ns = np.round(times * 1e9).astype(np.int64)
+    messages = [(t, fb.wrench(t, FORCE, TORQUE, topic_frame)) for t in times_ns[:-1]]
+    messages.append((times_ns[-1], fb.wrench(times_ns[-1], (0, 0, 0), (0, 0, 0), topic_frame)))
+    begin, end = 1e-9 * times_ns[0], 1e-9 * times_ns[-1]
+    return messages, mf.acting((begin, end - begin, "body", (0.0, 0.0, 0.0), FORCE, TORQUE))
+
+
+def test_odometry_with_gaps_and_jitter_beside_a_thruster_gives_the_body(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    messages, load = _thruster(rng, "base_link")
+    times = np.sort(np.arange(0.0, 3.0, 0.01) + 0.003 * rng.random(300))[fb.keep(300, rng)]
+    times_ns, samples = mf.flown(_truth(), mf.tumbling(), times, load)
+    q, w, com = samples[:, 3:7], samples[:, 10:13], np.array(COM)
+    p = samples[:, :3] - rot.turned(q, com) + 5e-4 * rng.standard_normal((len(times), 3))
+    v = rot.turned_back(q, samples[:, 7:10]) - np.cross(w, com) + 0.01 * rng.standard_normal((len(times), 3))
+    noisy = rot.product(q, rot.exponential(3e-3 * rng.standard_normal((len(times), 3))))
+    w = w + 0.01 * rng.standard_normal((len(times), 3))
+    odom = [(t, fb.odometry(t, *row)) for t, *row in zip(times_ns, p, noisy, v, w, strict=True)]
+    bag = fb.write(
+        tmp_path / "rov.mcap",
+        {
+            "/rov/odometry": ("nav_msgs/msg/Odometry", odom),
+            "/rov/thrust": ("geometry_msgs/msg/WrenchStamped", messages),
+        },
+    )
+    flight = bag_flight(bag, Choice())
+    assert [series.kind for series in flight.series] == ["position", "attitude", "velocity", "rate"]
+    _near(identify([flight]))
+
+
+def test_tf_and_an_imu_with_another_clock_give_the_body_and_the_clocks_offset(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    messages, load = _thruster(rng, "base_link")
+    truth = _truth(2)
+    flight = mf.with_imu(
+        truth, mf.tumbling(), rng, 3.0, load, offset_s=0.013, place=(0.05, 0.0, 0.02), bias=(0.02, 0.1)
+    )
+    position, attitude, rate, acceleration = flight.series
+    tf = []
+    for t, p, q in zip(position.times_ns, position.values, attitude.values, strict=True):
+        other = fb.transform(t, (1, 2, 3), (0, 0, 0, 1), "map", "camera")
+        tf.append((t, {"transforms": [other, fb.transform(t, p, q, "map", "base_link")]}))
+    imu = [(t, fb.imu(t, *row)) for t, *row in zip(rate.times_ns, rate.values, acceleration.values, strict=True)]
+    bag = fb.write(
+        tmp_path / "phone.mcap",
+        {
+            "/tf": ("tf2_msgs/msg/TFMessage", tf),
+            "/phone/imu": ("sensor_msgs/msg/Imu", imu),
+            "/thrust": ("geometry_msgs/msg/WrenchStamped", messages),
+        },
+    )
+    choice = Choice({"pose": "/tf@base_link", "imu": "/phone/imu", "wrench": "/thrust"})
+    fit = ("mass", "com", "inertia", "offset", "gyro_bias", "accel_bias", "imu_place")
+    found = identify([bag_flight(bag, choice)], fit)
+    _near(found)
+    offset = found.others["offset of /phone/imu"]
+    assert abs(offset.value - 0.013) < 4.5 * offset.sd
+    assert offset.sd < 1e-3
+    place = [found.others[f"imu_place.{axis}"] for axis in "xyz"]
+    assert all(abs(one.value - x) < 4.5 * one.sd for one, x in zip(place, (0.05, 0.0, 0.02), strict=True))
+
+
+def test_poses_and_twists_in_either_axes_say_the_same(tmp_path: Path) -> None:
+    times_ns, samples = mf.flown(_truth(), mf.tumbling(), np.arange(0.0, 1.0, 0.01))
+    q, w = samples[:, 3:7], samples[:, 10:13]
+    p = samples[:, :3] - rot.turned(q, np.array(COM))
+    v = samples[:, 7:10] - rot.turned(q, np.cross(w, np.array(COM)))
+    poses = [(t, fb.pose(t, *row)) for t, *row in zip(times_ns, p, q, strict=True)]
+    shapes = []
+    for frame in ("map", "body"):
+        turn = (lambda _, x: x) if frame == "map" else rot.turned_back
+        rates = rot.turned(q, w) if frame == "map" else w
+        twists = [(t, fb.twist(t, *row, frame)) for t, *row in zip(times_ns, turn(q, v), rates, strict=True)]
+        bag = fb.write(
+            tmp_path / f"{frame}.mcap",
+            {
+                "/pose": ("geometry_msgs/msg/PoseStamped", poses),
+                "/twist": ("geometry_msgs/msg/TwistStamped", twists),
+            },
+        )
+        shapes.append([one.value for one in identify([bag_flight(bag, Choice())]).shape])
+    assert shapes[0] == pytest.approx(shapes[1], abs=1e-8)
+    assert shapes[0][3] == pytest.approx(1.0 / 3.0, abs=1e-8)
+
+
+def _poses(tmp_path: Path, count: int = 50, topic: str = "/pose", shift_s: float = 0.0, **others) -> Path:
+    rng = np.random.default_rng(3)
+    series = mf.mocap(_truth(), mf.tumbling(), rng, 0.01 * count).series
+    shift = round(shift_s * 1e9)
+    messages = [
+        (t + shift, fb.pose(t + shift, p, q))
+        for t, p, q in zip(series[0].times_ns, series[0].values, series[1].values, strict=True)
+    ]
+    return fb.write(tmp_path / "bag.mcap", {topic: ("geometry_msgs/msg/PoseStamped", messages), **others})
+
+
+def test_a_bag_without_pose_or_rate_is_refused(tmp_path: Path) -> None:
+    bag = fb.write(
+        tmp_path / "bag.mcap", {"/w": ("geometry_msgs/msg/WrenchStamped", [(0, fb.wrench(0, FORCE, TORQUE, "body"))])}
+    )
+    with pytest.raises(InputError, match="no pose or rate"):
+        bag_flight(bag, Choice())
+
+
+def test_a_number_that_is_not_finite_is_named_with_its_topic_and_time(tmp_path: Path) -> None:
+    bad = [(0, fb.pose(0, (0, 0, 0), (0, 0, 0, 1))), (10**8, fb.pose(10**8, (0, np.nan, 0), (0, 0, 0, 1)))]
+    bag = fb.write(tmp_path / "bag.mcap", {"/p": ("geometry_msgs/msg/PoseStamped", bad)})
+    with pytest.raises(InputError, match=r"/p: the message 0\.1 s after the first"):
+        bag_flight(bag, Choice())
+
+
+def test_clocks_that_have_no_time_in_common_are_refused_unless_an_offset_is_given(tmp_path: Path) -> None:
+    late = [(t, fb.twist(t, (0, 0, 0), (0, 0, 0), "map")) for t in range(100 * 10**9, 101 * 10**9, 10**8)]
+    bag = _poses(tmp_path, **{"/twist": ("geometry_msgs/msg/TwistStamped", late)})
+    with pytest.raises(InputError, match="clocks.*no time in common"):
+        bag_flight(bag, Choice())
+    assert len(bag_flight(bag, Choice(offsets={"/twist": -100.0})).series) == 4
+
+
+@pytest.mark.parametrize(
+    ("topics", "message"),
+    [
+        ({"pose": "/nothing"}, "a topic of the bag: /pose"),
+        ({"twist": "/pose"}, "geometry_msgs/msg/TwistStamped"),
+        ({"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
+    ],
+)
+def test_a_topic_that_does_not_fit_is_named_with_those_that_do(tmp_path: Path, topics: dict, message: str) -> None:
+    thrust = [(0, fb.wrench(0, FORCE, TORQUE, "thruster_7"))]
+    bag = _poses(tmp_path, **{"/w": ("geometry_msgs/msg/WrenchStamped", thrust)})
+    with pytest.raises(InputError, match=message):
+        bag_flight(bag, Choice(topics))
+
+
+def test_offsets_are_topics_and_seconds() -> None:
+    assert given_offsets(["/imu=0.25", "/a=b=-1"]) == {"/imu": 0.25, "/a=b": -1.0}
+    for word in ("/imu", "/imu=x", "=1", "/imu=nan"):
+        with pytest.raises(InputError, match="TOPIC=S"):
+            given_offsets([word])
