@@ -254,7 +254,7 @@ def _acting(topic: _Topic, chosen: dict[str, _Topic]) -> ms.Acting:
         until = times[number + 1] if number + 1 < len(times) else times[number] + WRENCH_TIMEOUT_NS
         force, torque = message.numbers[:3], message.numbers[3:]
         until = min(until, times[number] + WRENCH_TIMEOUT_NS)
-        rows.append((times[number], until, Load(frame.axes, where, force, torque).row))  # type: ignore[arg-type] # three numbers each
+        rows.append((times[number], until, Load(frame.axes, where, force, torque).row))
     return as_acting(rows)
 
 

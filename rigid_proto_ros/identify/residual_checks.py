@@ -131,8 +131,8 @@ def remarks(checks: Sequence[ResidualCheck]) -> list[str]:
         else:
             said.append(
                 f"{where}: the model leaves {check.noise:.3g} {check.unit} where neighbouring samples differ by"
-                f" {check.by_differences:.3g}, and not as noise: a fluid's drag (--fit damping), gravity (--fit gravity),"
-                " clocks"
+                f" {check.by_differences:.3g}, and not as noise: a fluid's drag (--fit damping),"
+                " gravity (--fit gravity), clocks"
                 " (--fit offset), or a wrench that isn't in the bag; the standard deviations"
                 " are too small"
             )

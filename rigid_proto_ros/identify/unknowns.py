@@ -79,8 +79,8 @@ class Unknowns:
         for (name, index), number in zip(self.slots, numbers, strict=True):
             changed[name][index] = number
         if "offsets" in changed:
-            return replace(values, **{**changed, "offsets": tuple(changed["offsets"].tolist())})  # type: ignore[arg-type] # one field is a tuple
-        return replace(values, **changed)  # type: ignore[arg-type] # all fields left are arrays
+            return replace(values, **{**changed, "offsets": tuple(changed["offsets"].tolist())})
+        return replace(values, **changed)
 
     def steps(self, values: Values) -> np.ndarray:
         """Steps for difference quotients."""
