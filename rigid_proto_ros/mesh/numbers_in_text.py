@@ -53,7 +53,7 @@ def token_end(buffer: np.ndarray, i: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _digits(buffer: np.ndarray, i: int, stop: int) -> tuple[int, int, int, int]:
+def _digits(buffer: np.ndarray, i: int, stop: int) -> tuple[int | np.int64, int, int, int]:
     """(digits as an integer, exponent that the decimal point asks for, count of digits, position after them).
 
     A count above MAX_DIGITS, leading zeros apart, says that the integer isn't complete; −1 that there is no digit.
@@ -126,7 +126,7 @@ def read_number(buffer: np.ndarray, i: int) -> tuple[float, int, int]:
 
 
 @njit(cache=True, nogil=True)
-def _scaled(mantissa: int, exponent: int) -> tuple[float, bool]:
+def _scaled(mantissa: int | np.int64, exponent: int) -> tuple[float, bool]:
     """mantissa (below 10¹⁸) times 10^exponent (−22 to 22), and whether it is certain to be the nearest double.
 
     Up to 53 bits one operation rounds once. More are an exact pair of doubles, whose product or quotient with the power

@@ -52,7 +52,7 @@ def _count(buffer: np.ndarray) -> tuple[int, int, int]:
 
 
 @njit(cache=True, nogil=True)
-def _corner(buffer: np.ndarray, i: int, known: int) -> tuple[int, int]:
+def _corner(buffer: np.ndarray, i: int, known: int) -> tuple[int | np.int64, int]:
     """(vertex from 0, position after the token) of a face's corner at i, after ``known`` vertices; −1: no such."""
     end = buffer.shape[0]
     negative = buffer[i] == 45
