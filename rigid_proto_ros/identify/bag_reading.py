@@ -14,7 +14,7 @@ from ..messages.measured_messages import MEASURED_TYPES, Stamped, read_measured
 from ..motion.frames import parse_frame
 from ..motion.loads import Load
 from ..session.bag import read_bag
-from ..session.mcap_file import McapContent
+from ..session.mcap_reading import McapContent
 from . import measurements as ms
 from .session_reading import as_acting
 
