@@ -39,8 +39,8 @@ def address_of(kernel: Callable, taken_as: types.FunctionType) -> int:
     if INTERPRETED:
         found, address = kernel, id(kernel)
     else:
-        kernel.compile(taken_as.signature)  # type: ignore[attr-defined]
-        found = CompileResultWAP(kernel.get_compile_result(taken_as.signature))  # type: ignore[attr-defined]
+        kernel.compile(taken_as.signature)  # type: ignore[attr-defined]  # numba's
+        found = CompileResultWAP(kernel.get_compile_result(taken_as.signature))  # type: ignore[attr-defined]  # numba's
         address = found.__wrapper_address__()
     _kept[address] = found
     return address
@@ -53,8 +53,8 @@ def entry_of(kernel: Callable, signature: Signature) -> Callable:
     """
     if INTERPRETED:
         return kernel
-    kernel.compile(signature)  # type: ignore[attr-defined]
-    return kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]
+    kernel.compile(signature)  # type: ignore[attr-defined]  # numba's
+    return kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]  # numba's
 
 
 def _function_at(taken_as: types.FunctionType) -> Callable:

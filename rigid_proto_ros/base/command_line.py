@@ -34,7 +34,7 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
 def completes(action: argparse.Action, names: Callable[[], Iterable[str]]) -> None:
     """Complete an argument from these names; the shell completes files where none fits."""
-    action.completer = lambda **_: list(names())  # type: ignore[attr-defined]
+    action.completer = lambda **_: list(names())  # type: ignore[attr-defined]  # argcomplete's
 
 
 class Parser(argparse.ArgumentParser):
