@@ -68,6 +68,6 @@ def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path
     environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     node = RosProcess("rigid_body_node", environment=environment, log=tmp_path / "node")
     node.wait_for("compiling kernels")
-    assert node.end(number, within_s=10.0) == 0, node.errors  # measured 0.2 s; 59 s before
+    assert node.end(number, within_s=10.0) == 0, node.errors  # 59 s before
     assert "Traceback" not in node.errors
     assert "is simulating" not in node.output + node.errors
