@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
+from ..base.rotation import vector
 from ..messages.measured_messages import MEASURED_TYPES, Stamped, read_measured
 from ..motion.frames import parse_frame
 from ..motion.loads import Load
@@ -252,7 +253,7 @@ def _acting(topic: _Topic, chosen: dict[str, _Topic]) -> ms.Acting:
         if not any(message.numbers):
             continue
         until = times[number + 1] if number + 1 < len(times) else times[number] + WRENCH_TIMEOUT_NS
-        force, torque = message.numbers[:3], message.numbers[3:]
+        force, torque = vector(message.numbers[:3]), vector(message.numbers[3:])
         until = min(until, times[number] + WRENCH_TIMEOUT_NS)
         rows.append((times[number], until, Load(frame.axes, where, force, torque).row))
     return as_acting(rows)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -78,9 +79,10 @@ class Unknowns:
         changed = {name: np.array(getattr(values, name), dtype=float) for name, _ in self.slots}
         for (name, index), number in zip(self.slots, numbers, strict=True):
             changed[name][index] = number
+        new: dict[str, Any] = dict(changed)
         if "offsets" in changed:
-            return replace(values, **{**changed, "offsets": tuple(changed["offsets"].tolist())})
-        return replace(values, **changed)
+            new["offsets"] = tuple(changed["offsets"].tolist())
+        return replace(values, **new)
 
     def steps(self, values: Values) -> np.ndarray:
         """Steps for difference quotients."""
