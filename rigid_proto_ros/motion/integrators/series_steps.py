@@ -28,7 +28,8 @@ from .error_measure import (
     scales,
 )
 from .first_root import NONE
-from .motion_series import COLUMNS, motion_at, motion_series, stretch_at
+from .motion_series import A_KNOT, COLUMNS, motion_at, motion_series, stretch_at
+from .rough_logarithm import rough_log2
 from .runge_kutta import is_good
 from .string_law import PULLS, SHORTENS, is_one_sided, knot_at, law_of, next_law
 from .taylor_adaptive import MAX_DEGREE, PART, length_for, log2_growth
@@ -73,6 +74,19 @@ def allowed_length(
 
 
 @njit(cache=True, error_model="numpy")
+def known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part: float) -> float:
+    """h [s] after which the series of the knot's place errs as much. It turns with the body, and attitude by half the
+    angle: of the degree N its remainder is up to 2ᴺ times that of the attitude's series.
+    """
+    growth = -math.inf
+    for k in range(degree - 2, degree + 1):
+        a = place * (abs(c[k, A_KNOT]) + abs(c[k, A_KNOT + 1]) + abs(c[k, A_KNOT + 2]))
+        if a > 0.0:
+            growth = max(growth, rough_log2(a) / k)
+    return length_for(growth, accuracy, degree, part)
+
+
+@njit(cache=True, error_model="numpy")
 def _lay_out(
     y: np.ndarray, p: np.ndarray, control: np.ndarray, weights: tuple[float, float, float, float], c: np.ndarray
 ) -> int:
@@ -99,6 +113,9 @@ def _lay_out(
         # better.
         allowance = part if law == PULLS else part / (1.0 + jerk_of_place)
         h = allowed_length(series, degree, weights, accuracy, allowance)
+        if law != PULLS:
+            # The time at which it pulls again is read off that series.
+            h = min(h, known_length(series, degree, weights[2], accuracy, allowance))
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
             return 0
         if not is_one_sided(p) or parts >= _MAX_PARTS:

@@ -39,7 +39,7 @@ from .first_root import NONE
 from .motion_series import COLUMNS, motion_at, motion_series
 from .radau import HALVES, STAGES, radau_step, stage_rates, within
 from .runge_kutta import is_good
-from .series_steps import PART_ON_A_STRING, allowed_length
+from .series_steps import PART_ON_A_STRING, allowed_length, known_length
 from .slack import first_spell, knot_of
 from .string_law import PULLS, SHORTENS, is_one_sided, knot_at, law_of, next_law
 
@@ -319,6 +319,7 @@ def _explicit(
     motion_series(y, p, knot_at(y, p), degree, False, c)
     control[ctl.PENDING] += 1.0
     longest = allowed_length(c, degree, weights, control[ctl.ACCURACY], PART_ON_A_STRING)
+    longest = min(longest, known_length(c, degree, weights[2], control[ctl.ACCURACY], PART_ON_A_STRING))
     switch, after, known = next_law(c, p, degree, min(h, longest), law, control[ctl.ACCURACY])
     return known, switch, after
 
