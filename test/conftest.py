@@ -46,9 +46,11 @@ LONG = (
         "commands_refused",
         "poke_client",
     ),
-    *("node_signals", "sweep_bits", "sweep_runs", "demo", "commands_flood", "stress_auto", "order_of_commands"),
+    *("node_signals", "sweep_bits", "demo", "commands_flood", "stress_auto", "order_of_commands", "string_scenes"),
     *("rerun_live", "rerun_slow_viewers", "snapshot", "packaging", "workbench_script_node", "session_bag"),
-    *("architecture", "sweep_cluster", "simulate_bad_input", "rerun_crash", "node_work", "interface"),
+    *("simulate_bad_input", "rerun_crash", "node_work", "interface", "lockstep", "fitting", "mesh_fuzz"),
+    # They need kernels that test_sweep_bits compiles.
+    *("sweep_runs", "sweep_cluster"),
 )
 """Files that take longest, waiting and computing ones by turns: workers begin with them, so that none has one left at the end."""
 

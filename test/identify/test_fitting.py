@@ -121,6 +121,7 @@ def test_a_poke_that_is_not_in_the_recording_is_said() -> None:
     assert any("wrong" in remark or "isn't in the bag" in remark for remark in found.remarks)
 
 
+@pytest.mark.stress
 def test_drag_that_is_not_in_the_model_is_said_and_found_when_asked_for() -> None:
     truth = _body((0.2, 2e-3))
     flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(6), 3.0, load=mf.acting(POKE))
