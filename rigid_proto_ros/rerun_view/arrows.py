@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.rotation import matrix_from_quaternion
 from ..simulation.observer import ShownLoad
-from .derived import rotation_matrices, to_world
+from .derived import to_world
 
 IMPULSE_SHOWN_NS = 150_000_000
 """[ns of simulated time] An impulse acts at an instant; its arrow stays this long so that it can be seen."""
@@ -96,7 +97,7 @@ class ArrowSamples:
         self.counts.append(np.full(n, k))
         if k == 0:
             return
-        R = rotation_matrices(states[:, 3:7])
+        R = matrix_from_quaternion(states[:, 3:7])
         origins, vectors = np.empty((n, k, 3)), np.empty((n, k, 3))
         for j, arrow in enumerate(arrows):
             vectors[:, j] = to_world(R, arrow.vector) if arrow.axes == "body" else arrow.vector

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.rotation import matrix_from_quaternion
 from ..simulation.observer import BodySnapshot
 
 
@@ -21,22 +22,6 @@ class Derived:
 
     energies: np.ndarray
     angular_momentum: np.ndarray
-
-
-def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """R (n, 3, 3), body to world, of unit quaternions xyzw (n, 4)."""
-    x, y, z, w = quaternions.T
-    R = np.empty((len(quaternions), 3, 3))
-    R[:, 0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    R[:, 0, 1] = 2.0 * (x * y - w * z)
-    R[:, 0, 2] = 2.0 * (x * z + w * y)
-    R[:, 1, 0] = 2.0 * (x * y + w * z)
-    R[:, 1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    R[:, 1, 2] = 2.0 * (y * z - w * x)
-    R[:, 2, 0] = 2.0 * (x * z - w * y)
-    R[:, 2, 1] = 2.0 * (y * z + w * x)
-    R[:, 2, 2] = 1.0 - 2.0 * (x * x + y * y)
-    return R
 
 
 def to_world(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -54,7 +39,7 @@ def derive(rows: np.ndarray, body: BodySnapshot) -> Derived:
     energies = np.column_stack(
         [translational, rotational, potential, translational + rotational + potential],
     )
-    return Derived(energies, to_world(rotation_matrices(quaternion), L_body))
+    return Derived(energies, to_world(matrix_from_quaternion(quaternion), L_body))
 
 
 def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:

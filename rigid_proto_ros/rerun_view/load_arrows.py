@@ -8,6 +8,7 @@ from collections import deque
 import numpy as np
 import rerun as rr
 
+from ..base.rotation import matrix_from_quaternion
 from ..simulation.mailbox import Block
 from ..simulation.observer import ShownLoad
 from . import entities as e
@@ -19,7 +20,7 @@ from .arrows import (
     arrows_of,
 )
 from .columns import Send, time_columns
-from .derived import carried_along, rotation_matrices
+from .derived import carried_along
 
 PARTS = ("force", "torque")
 
@@ -107,7 +108,7 @@ class LoadArrows:
         if not len(times_ns) or self.scale is None:
             return
         if self._not_placed:
-            (R,) = rotation_matrices(rows[:1, 3:7])
+            (R,) = matrix_from_quaternion(rows[:1, 3:7])
             for load_id, load in self._not_placed.items():
                 self._acting[load_id] = (load.kind, *arrows_of(load, self.scale, R))
             self._not_placed.clear()

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from ..base.rotation import matrix_from_quaternion
 from . import entities as e
 from .arrows import arrow_length
 from .columns import Send
-from .derived import rotation_matrices, to_world
+from .derived import to_world
 
 POINTS_PER_PIECE_MAX = 16
 
@@ -39,7 +40,7 @@ class Trail:
 
         The body point (3,) moves between two states on the cubic that has its position and velocity at both.
         """
-        R = rotation_matrices(rows[:, 3:7])
+        R = matrix_from_quaternion(rows[:, 3:7])
         at = rows[:, 0:3] + to_world(R, point)
         velocity = rows[:, 7:10] + to_world(R, np.cross(rows[:, 10:13], point))
         if self._last is None:
@@ -93,7 +94,7 @@ class MotionPicture:
         send: Send,
     ) -> None:
         """States (n, 13) of one body with their angular momenta (n, 3), world axes."""
-        w = to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
+        w = to_world(matrix_from_quaternion(rows[:, 3:7]), rows[:, 10:13])
         spin_of_middling = MIDDLING_SPIN * shown.mean_moment
         for entity, vectors, reference in (
             (e.ANGULAR_VELOCITY, w, MIDDLING_SPIN),

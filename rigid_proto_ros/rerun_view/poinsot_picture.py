@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from ..base.rotation import matrix_from_quaternion
 from ..simulation.observer import BodySnapshot
 from . import entities as e
 from .columns import Send, Ticks, one_time, time_columns
-from .derived import rotation_matrices, to_world
+from .derived import to_world
 from .inertia_shapes import PrincipalFrame
 from .poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
 
@@ -74,7 +75,7 @@ class PoinsotPicture:
         changes = self._changes(times_ns, energy, L)
         if changes:
             self._draw(times_ns[changes], walls[changes], energy[changes], w[changes], L[changes], send)
-        tips = self._scale(energy)[:, np.newaxis] * to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
+        tips = self._scale(energy)[:, np.newaxis] * to_world(matrix_from_quaternion(rows[:, 3:7]), rows[:, 10:13])
         times = time_columns(times_ns, walls)
         send(e.POINSOT_BODY, times, rr.Transform3D.columns(quaternion=rows[:, 3:7]))
         turns = tips.any(axis=1)

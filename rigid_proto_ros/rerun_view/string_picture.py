@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from ..base.rotation import matrix_from_quaternion
 from ..simulation.mailbox import Block
 from ..simulation.observer import ShownString
 from . import appearance
 from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
-from .derived import rotation_matrices, to_world
+from .derived import to_world
 from .plots import Ranges
 
 RATE = 100
@@ -93,8 +94,8 @@ class StringPicture:
         if not len(chosen):
             return
         times_ns, rows = block.times[chosen], block.rows[chosen]
-        arm = to_world(rotation_matrices(rows[:, 3:7]), np.asarray(string.attach, dtype=float))
-        spin = to_world(rotation_matrices(rows[:, 3:7]), rows[:, 10:13])
+        arm = to_world(matrix_from_quaternion(rows[:, 3:7]), np.asarray(string.attach, dtype=float))
+        spin = to_world(matrix_from_quaternion(rows[:, 3:7]), rows[:, 10:13])
         free_end, velocity = _hand(string, times_ns)
         span = rows[:, 0:3] + arm - free_end
         distance = np.linalg.norm(span, axis=1)

@@ -17,7 +17,7 @@ from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError, did_you_mean
 from ..scene.offline import scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
-from ..scene.scene_file import read_scene_file, scene_file, typed_value
+from ..scene.scene_file import scene_file, typed_value
 from ..scene.script import MAX_TIME_S
 
 NODE_NAME = "rigid_body"
@@ -139,20 +139,7 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
     given: dict[str, object] = {}
     for option, text in _ros_options(argv):
         if option == "--params-file":
-            scene = read_scene_file(text, node_name)
-            if warning := scene.warning(text, node_name):
-                warn(warning)
-            for name, value in scene.values.items():
-                if is_ros_parameter(name):
-                    continue
-                try:
-                    parameter_named(name)
-                except InputError as error:
-                    if name not in scene.wildcard:
-                        raise InputError(f"{text}, {name}", error.received, error.accepted) from None
-                    warn(f"{text}: {name} under /** is not a parameter of this node; ignored")
-                    continue
-                given[name] = value
+            given.update(scene_values(text, warn, node_name))
         else:
             given.update(with_mass_of_density(_assignment(text, node_name)))
     return given

@@ -31,10 +31,12 @@ def read_scene(
     return make_scenario({**scene_values(scene_file(name), warn), **with_mass_of_density(settings or {})})
 
 
-def scene_values(path: Path, warn: Callable[[str], None] = print) -> dict[str, object]:
-    """The parameters that a scene file gives this node; unknown names as ``read_scene`` has it."""
-    scene = read_scene_file(path)
-    if warning := scene.warning(path, "rigid_body"):
+def scene_values(
+    path: str | Path, warn: Callable[[str], None] = print, node_name: str = "rigid_body"
+) -> dict[str, object]:
+    """The parameters that a scene file gives a node; unknown names as ``read_scene`` has it."""
+    scene = read_scene_file(path, node_name)
+    if warning := scene.warning(path, node_name):
         warn(warning)
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():

@@ -9,10 +9,10 @@ import rerun_flight as flight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.arrows import ArrowScale, arrow_length
-from rigid_proto_ros.rerun_view.derived import rotation_matrices
 from rigid_proto_ros.rerun_view.inertia_shapes import PrincipalFrame, bounding_box
 from rigid_proto_ros.rerun_view.motion_picture import Trail
 from rigid_proto_ros.rerun_view.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
@@ -59,9 +59,9 @@ def test_a_symmetric_top_has_no_separatrix():
 @settings(deadline=None)
 @given(SPINS)
 def test_the_floor_is_square_to_the_angular_momentum(L):
-    (R,) = rotation_matrices(plane_rotation(L)[np.newaxis])
+    (R,) = matrix_from_quaternion(plane_rotation(L)[np.newaxis])
     assert np.allclose(R @ [0.0, 0.0, 1.0], L / np.linalg.norm(L), atol=1e-6)
-    (back,) = rotation_matrices(inverse(plane_rotation(L))[np.newaxis])
+    (back,) = matrix_from_quaternion(inverse(plane_rotation(L))[np.newaxis])
     assert np.allclose(back @ R, np.eye(3), atol=1e-12)
 
 
@@ -308,7 +308,7 @@ def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends(tmp_pat
         tip, plane = np.array(omegas[time_ns][0]), np.array(centre[0])
         distance = np.linalg.norm(plane)
         assert np.isclose(tip @ plane / distance, distance, rtol=1e-5)
-        (R,) = rotation_matrices(row[np.newaxis, 3:7])
+        (R,) = matrix_from_quaternion(row[np.newaxis, 3:7])
         principal = frame.axes.T @ R.T @ tip
         assert np.isclose(np.sum((principal / sizes[0][0]) ** 2), 1.0, rtol=1e-5)
         # The plane is square to the ellipsoid there: its normal is the gradient I ω.
