@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
@@ -18,6 +20,9 @@ from ..simulation.commands import WrenchCommand
 from ..simulation.observer import BodySnapshot, Observer
 from . import qos
 from .robot_description import RobotDescription
+
+WARNING_S = 1.0
+"""Between two warnings of one reason, wall time."""
 
 
 class EventPublisher(Observer):
@@ -36,6 +41,7 @@ class EventPublisher(Observer):
         self._description = RobotDescription(node, body_frame, mesh_path)
         self._applied = publisher(WrenchStamped, "applied", qos.EVENT)
         self._events = publisher(String, "events", qos.EVENT)
+        self._warned: dict[str, float] = {}
 
     def scene_changed(self, time_ns: int, scene: str) -> None:  # noqa: ARG002 (an observer is told)
         """All parameters, and the mesh's hash in a comment, as a parameter file."""
@@ -62,8 +68,14 @@ class EventPublisher(Observer):
             self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
 
     def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002
-        """A warning, for what is refused when it comes and for what turns out impossible when it is to act."""
-        self._logger.warning(f"refused: {message}", throttle_duration_sec=1.0)
+        """A warning, for what is refused when it comes and for what turns out impossible when it is to act.
+
+        At most one a second for each reason: a flood of one kind doesn't hide what else goes wrong.
+        """
+        now = time.monotonic()
+        if now >= self._warned.get(reason, -math.inf) + WARNING_S:
+            self._warned[reason] = now
+            self._logger.warning(f"refused: {message}")
 
     def event(self, time_ns: int, line: str) -> None:  # noqa: ARG002
         """A line of the event log."""

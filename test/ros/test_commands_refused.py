@@ -208,6 +208,15 @@ def test_refusals_are_warned_of_at_most_once_a_second(rig):
     assert 2 <= log.read_text().count("refused:") - warned <= 1 + elapsed_s
 
 
+def test_a_flood_of_one_refusal_doesnt_hide_the_warning_of_another(rig):
+    log = rig.node_process.log
+    before = log.read_text().count("nan")
+    mars, not_a_number = wrench_message(0, "mars", (1e-3, 0.0, 0.0)), wrench_message(0, "", (NAN, 0.0, 0.0))
+    # At once, so within the second in which only one of the first kind is warned of.
+    rig.publish("poke", *[mars] * 20, not_a_number)
+    rig.until(lambda: log.read_text().count("nan") > before, "warning of the other")
+
+
 def test_what_is_refused_when_it_is_to_act_is_warned_of_too(rig):
     log = rig.node_process.log
     rig.pause(True)
