@@ -115,10 +115,8 @@ class LiveParameters:
             return scenario
 
         def change() -> None:
-            scenario = check()
-            loop.change(scenario)
-            loop.simulation.submit(Change(changes, lambda: scenario.setup))
-            loop.tell_scene()
+            setup = loop.replace(check())
+            loop.simulation.submit(Change(changes, lambda: setup))
 
         recorder = None
         if "record" in changes:
@@ -154,9 +152,8 @@ class LiveParameters:
     def _give_up_recording(self) -> Observer:
         """On the physics thread; returns the recorder, which is still to be closed."""
         loop = self._loop
-        loop.change(loop.scenario.with_changes({"record": ""}))
         recorder = self._watchers.switch_recording(loop, None)
-        loop.tell_scene()
+        loop.change({"record": ""})
         assert recorder is not None
         return recorder
 

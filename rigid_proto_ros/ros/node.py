@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ..scene.offline import tell_start
-from ..scene.scenario import BodyMesh, Scenario, check_inertia, make_scenario
+from ..scene.scenario import BodyMesh, Scenario, make_scenario
 from ..simulation.observer import Observer
 from ..simulation.setup import Setup
 from .arguments import NODE_NAME
@@ -119,18 +119,15 @@ class RigidBodyNode(Node):
 
     def _apply_scheduled(self, changes: Mapping, at_hand: BodyMesh | None) -> Setup:
         """A scheduled ``set`` takes effect: the ROS parameters follow on the executor's thread."""
-        return self._take_on(self.loop.scenario.with_changes(changes, at_hand=at_hand))
+        setup = self.loop.change(changes, at_hand=at_hand)
+        self._live_parameters.changed()
+        return setup
 
     def _apply_inertia(self, content: Mapping) -> Setup:
         """An inertia message takes effect."""
-        return self._take_on(check_inertia(self.loop.scenario, content))
-
-    def _take_on(self, scenario: Scenario) -> Setup:
-        self.loop.check_change(scenario)
-        self.loop.change(scenario)
-        self.loop.tell_scene()
+        setup = self.loop.change_inertia(content)
         self._live_parameters.changed()
-        return scenario.setup
+        return setup
 
     # On the executor's thread
 

@@ -10,10 +10,10 @@ from collections.abc import Callable
 
 from ..base.errors import InputError
 from ..motion.state import State
-from ..scene.ghost import Ghost, ghost_of
 from ..scene.scenario import Scenario
+from ..scene.scenario_run import ScenarioRun
 from ..simulation.observer import Observer
-from ..simulation.simulation import Simulation
+from ..simulation.setup import Setup
 from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Timekeeping, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
@@ -32,7 +32,7 @@ FOLLOW_NS = 1_000_000
 """A followed clock is read this often [ns of wall time]."""
 
 
-class SimulationLoop:
+class SimulationLoop(ScenarioRun):
     """publish(state) is called for every publication; take_commands(wall_ns, all_topics) at every tick, to submit what
     has arrived, on quiet topics too if ``all_topics``; it says whether commands come in these seconds.
 
@@ -53,9 +53,7 @@ class SimulationLoop:
         anybody_listens: Callable[[], bool] = lambda: True,
         is_viewed: Callable[[], bool] = lambda: False,
     ) -> None:
-        self.scenario = scenario
-        self.observer = observer
-        self.simulation = Simulation(scenario.setup, observer)
+        super().__init__(scenario, observer)
         self.timekeeping = Timekeeping(paused=scenario.parameters.start_paused)
         self._publish = publish
         self._take_commands = take_commands
@@ -63,7 +61,6 @@ class SimulationLoop:
         self._anybody_listens = anybody_listens
         self._has_subscribers = self._has_listeners = True
         self._is_viewed = is_viewed
-        self._ghost: Ghost | None = None
         self._budget = WorkBudget()
         self._publications = Publications(scenario.parameters.publish_rate)
         self._pace = Pace(scenario.parameters.real_time_factor, followed_clock)
@@ -91,31 +88,25 @@ class SimulationLoop:
             raise InputError(
                 "publish_clock", True, "false, while simulated time follows the /clock of another (use_sim_time)"
             )
-        self.simulation.check_change(scenario.setup)
+        super().check_change(scenario)
 
-    def change(self, scenario: Scenario) -> None:
-        """Take on another scenario's time settings; its setup reaches the motion by a command."""
-        self.scenario = scenario
-        # One that isn't there would have missed what was commanded so far: it begins at the next reset.
-        if self._ghost is not None:
-            self._ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
+    def replace(self, scenario: Scenario) -> Setup:
+        """Put another scenario in force, its publication rate and real time factor at once."""
+        setup = super().replace(scenario)
         if scenario.parameters.publish_rate != self._publications.rate:
             self._publications.rate = scenario.parameters.publish_rate
             self._publications.find_after(self.simulation.time_ns)
         if scenario.parameters.real_time_factor != self._pace.factor:
             self._pace.factor = scenario.parameters.real_time_factor
             self._anchor()
-
-    def tell_scene(self) -> None:
-        """Tell the observer the parameters in force."""
-        self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
+        return setup
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
         self.observer = observer
         self.simulation.watch(observer)
-        if self._ghost is not None:
-            self._ghost.watch(observer)
+        if self.ghost is not None:
+            self.ghost.watch(observer)
 
     def pause(self, paused: bool) -> None:
         """Stop or resume simulated time; what was sent while it stood is taken before it goes on."""
@@ -170,10 +161,10 @@ class SimulationLoop:
         """Time 0 and the initial state; paused or running stays."""
         # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
         self.simulation.reset(self.scenario.setup)
-        if self._ghost is not None:
-            self._ghost.reset(self.scenario)
+        if self.ghost is not None:
+            self.ghost.reset(self.scenario)
         elif self._is_viewed():
-            self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
+            self.begin_ghost()
         self._publications.restart()
         self._end_steps()
         self._anchor()
@@ -183,7 +174,7 @@ class SimulationLoop:
     def start(self) -> None:
         """Simulated time begins now."""
         if self._is_viewed():
-            self._ghost = ghost_of(self.scenario, self.simulation, self.observer)
+            self.begin_ghost()
         self._anchor()
 
     def tick(self) -> None:
@@ -273,8 +264,8 @@ class SimulationLoop:
         self._publications.made()
         self.observer.state(state.time_ns, state.row)
         self.simulation.tell_status()
-        if self._ghost is not None:
-            self._ghost.advance(state.time_ns)
+        if self.ghost is not None:
+            self.ghost.advance(state.time_ns)
         self._publish(state)
         return True
 

@@ -10,12 +10,11 @@ from pathlib import Path
 from ..base.errors import CommandRefused, InputError
 from ..base.progress import Progress
 from ..simulation.observer import Observer
-from ..simulation.setup import Setup
-from ..simulation.simulation import Simulation, judge
+from ..simulation.simulation import judge
 from .command_codec import ScriptCommand, core_command
-from .ghost import ghost_of
 from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
+from .scenario_run import ScenarioRun
 from .scene_file import read_scene_file, scalar, scene_file
 from .script import with_contacts
 
@@ -70,25 +69,24 @@ def tell_start(observer: Observer, scenario: Scenario) -> None:
         observer.started(scenario.text, mesh.surface.vertices, mesh.surface.triangles, mesh.mesh.sha256)
 
 
-class OfflineRun:
+class OfflineRun(ScenarioRun):
     """A simulation with its script submitted; ``advance`` takes it from publication to publication."""
 
     def __init__(
         self, scenario: Scenario, script: list[ScriptCommand] | None = None, observer: Observer | None = None
     ) -> None:
-        self.scenario = scenario
-        self.observer = observer
-        self.simulation = Simulation(scenario.setup, observer)
+        super().__init__(scenario, observer)
+        self._is_observed = observer is not None
         self._next_publication = 0
         if observer is not None:
             tell_start(observer, scenario)
             self.simulation.announce()
-        self._ghost = ghost_of(scenario, self.simulation, observer)
+            self.begin_ghost()
         script = with_contacts(script or [], scenario.setup.contacts)
         planned = scenario
         for number, command in enumerate(script):
             try:
-                core = core_command(command, command.t_ns, scenario.setup.contacts, self._apply_changes)
+                core = core_command(command, command.t_ns, scenario.setup.contacts, self.change)
                 # A command is judged in the scene that the script has made by then.
                 if command.kind == "set":
                     planned = planned.with_changes(command.changes)
@@ -99,17 +97,9 @@ class OfflineRun:
                     f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
                 ) from None
 
-    def _apply_changes(self, changes: Mapping) -> Setup:
-        self.scenario = self.scenario.with_changes(changes)
-        if self.observer is not None:
-            self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
-        if self._ghost is not None:
-            self._ghost.change(self.simulation.time_ns, self.scenario, self.simulation.listed)
-        return self.scenario.setup
-
     def advance(self, until_ns: int) -> bool:
         """Advance the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
-        if self.observer is not None:
+        if self._is_observed:
             rate = self.scenario.parameters.publish_rate
             while (next_ns := publication_ns(self._next_publication, rate)) <= until_ns:
                 state = self.simulation.advance(next_ns)
@@ -117,8 +107,8 @@ class OfflineRun:
                     return False
                 self.observer.state(next_ns, state.row)
                 self.simulation.tell_status()
-                if self._ghost is not None:
-                    self._ghost.advance(next_ns)
+                if self.ghost is not None:
+                    self.ghost.advance(next_ns)
                 self._next_publication += 1
         self.simulation.advance(until_ns)
         return not self.simulation.failure

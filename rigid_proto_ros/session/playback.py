@@ -9,7 +9,6 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..messages.session_messages import PROJECTIONS
-from ..scene.ghost import ghost_of
 from ..scene.offline import tell_start
 from ..scene.scenario import Scenario
 from ..simulation.observer import BodySnapshot, Observer
@@ -36,7 +35,7 @@ def play(
     again = resimulation(session, observer)
     tell_start(observer, again.scenario)
     again.simulation.announce()
-    again.ghost = ghost_of(again.scenario, again.simulation, observer)
+    again.begin_ghost()
     for count, (time_ns, row) in enumerate(sorted_states(session)):
         progress(count, len(session.times))
         try:

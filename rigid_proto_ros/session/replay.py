@@ -11,14 +11,13 @@ import numpy as np
 from ..base.errors import InputError
 from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import command_of_event, frame_names
-from ..scene.ghost import Ghost
 from ..scene.parameters import Parameters, convert_all
-from ..scene.scenario import Scenario, check_inertia, make_scenario
+from ..scene.scenario import Scenario, make_scenario
+from ..scene.scenario_run import ScenarioRun
 from ..scene.scene_file import read_scene_text
 from ..simulation.commands import Change, Command
 from ..simulation.observer import Observer
 from ..simulation.setup import Setup
-from ..simulation.simulation import Simulation
 from .recorded_session import RecordedSession, find_mesh, scene_sha256
 from .runs import decode_event
 
@@ -61,11 +60,10 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
     return find
 
 
-class Resimulation:
+class Resimulation(ScenarioRun):
     """A session's simulation; its commands are submitted when their time has come, as they were then.
 
-    ``scenario`` is the one in force; ``ghost`` is told of its changes. mesh_of(name) gives the mesh that a change
-    names, or None to load it.
+    mesh_of(name) gives the mesh that a change names, or None to load it.
     """
 
     def __init__(
@@ -76,10 +74,7 @@ class Resimulation:
         mesh_of: Callable[[str], Mesh | None] = lambda _: None,
         node_name: str = "rigid_body",
     ) -> None:
-        self.scenario = scenario
-        self.simulation = Simulation(scenario.setup, observer)
-        self._observer = observer or Observer()
-        self.ghost: Ghost | None = None
+        super().__init__(scenario, observer)
         self._mesh_of = mesh_of
         self._changes_ns = -1
         self.node_name = node_name
@@ -121,25 +116,14 @@ class Resimulation:
             if kind == "set":
                 convert_all(content)
             return command_of_event(
-                kind, content, self.scenario.setup.contacts, frames, self._change, self._change_inertia
+                kind, content, self.scenario.setup.contacts, frames, self._change, self.change_inertia
             )
         except InputError as error:
             raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
 
-    def _change_inertia(self, content: Mapping) -> Setup:
-        return self._take_on(check_inertia(self.scenario, content))
-
     def _change(self, changes: Mapping) -> Setup:
         mesh = self._mesh_of(changes["mesh"]) if changes.get("mesh") else None
-        return self._take_on(self.scenario.with_changes(changes, mesh))
-
-    def _take_on(self, scenario: Scenario) -> Setup:
-        self.simulation.check_change(scenario.setup)
-        self.scenario = scenario
-        self._observer.scene_changed(self.simulation.time_ns, scenario.text)
-        if self.ghost is not None:
-            self.ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
-        return scenario.setup
+        return self.change(changes, mesh)
 
 
 def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:

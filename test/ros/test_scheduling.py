@@ -63,8 +63,7 @@ class Rig:
         return self.topics.setdefault(topic.removeprefix("~/"), Subscription())
 
     def change(self, changes: dict, at_hand):
-        self.loop.change(self.loop.scenario.with_changes(changes, at_hand=at_hand))
-        return self.loop.scenario.setup
+        return self.loop.change(changes, at_hand=at_hand)
 
     def schedule(self, text: str) -> None:
         self.topics["schedule"].queue.append(cdr.string(text))

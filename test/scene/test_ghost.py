@@ -87,7 +87,7 @@ def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
     flight.start()
     while flight.simulation.time_ns < SECOND:
         flight.tick()
-    flight.change(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
+    flight.change({"ghost.inertia_model": "bounding_box"})
     while flight.simulation.time_ns < 2 * SECOND:
         flight.tick()
     assert not watcher.began and not watcher.ghost
