@@ -25,6 +25,8 @@ ROS = [
 ]
 MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
+# Motion for other tools: tables, glTF, USD, films.
+EXPORT = ["pyarrow>=15"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
@@ -77,13 +79,14 @@ setup(
     python_requires=">=3.11",
     install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0"],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *EXPORT, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
         "rerun": RERUN,
         "mcap": MCAP,
         "workbench": WORKBENCH,
         "sweep": SWEEP,
+        "export": EXPORT,
         "terminal": TERMINAL,
         "test": TEST,
     },

@@ -19,10 +19,14 @@ MODULES = {
 }
 ORDER = (
     *("base", "mesh", "mass", "motion", "simulation", "messages", "scene", "session"),
-    *("rerun_view", "ros", "workbench", "sweep", "identify", "cli"),
+    *("rerun_view", "ros", "workbench", "sweep", "identify", "export", "cli"),
 )
 """Folders in the order of imports: each knows only those before it."""
-STRANGERS = {"sweep": ("rerun_view", "ros", "workbench"), "identify": ("rerun_view", "ros", "workbench", "sweep")}
+STRANGERS = {
+    "sweep": ("rerun_view", "ros", "workbench"),
+    "identify": ("rerun_view", "ros", "workbench", "sweep"),
+    "export": ("ros", "workbench", "sweep", "identify"),
+}
 """Folders that stand before one in the order but that it doesn't know all the same."""
 ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
 # Which folders or modules may import a package that is neither ours nor Python's.
@@ -37,7 +41,7 @@ ALLOWED = {
     "manifold3d": ("mesh.union", "bodies.surfaces"),
     "rerun": ("rerun_view",),
     "rerun_bindings": ("rerun_view",),
-    "pyarrow": ("rerun_view", "sweep.table"),  # comes with rerun, as PIL does
+    "pyarrow": ("rerun_view", "sweep.table", "export.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
     "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.comparison", "identify.residual_checks"),
     "distributed": ("sweep.cluster",),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError
 from ..base.output_file import output_file
 from ..base.progress import Progress
+from .exports import add_exports, asked, check_exports, write_exports
 from .options import add_session
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="write the scene that begins at --at")
     parser.add_argument("--publish", choices=("states", "commands"), help="publish it over ROS")
     parser.add_argument("--speed", type=float, metavar="X", help="speed factor of --publish states (default 1)")
+    add_exports(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
 
         with Progress(f"recording {args.record}") as progress:
             record(runs, args.record, given_scene(args.scene), progress.fraction)
+    if asked(args):
+        _export(runs, args)
     _say_how_to_see_it(args)
     if args.as_scene:
         _branch(runs[-1], args)
@@ -85,6 +89,7 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("--speed", args.speed, "it with --publish states; a running node has real_time_factor")
     if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
         raise InputError("--record", args.record, "another file than the session")
+    check_exports(args)
 
 
 def _tell(name: str, session: RecordedSession) -> None:
@@ -132,6 +137,18 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
         verified += 1
     print("  verified: every command and state is reproduced bit for bit")
     return 0
+
+
+def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
+    from ..export.flight_record import FlightRecord
+    from ..session.playback import play
+
+    session, record = runs[-1], FlightRecord()
+    with Progress("reading the motion") as progress:
+        play(session, record, given_scene(args.scene), progress.fraction)
+    if len(runs) > 1:
+        print(f"  exported is run {len(runs)}, the last")
+    write_exports(args, record, lambda text: print(f"  {text}"))
 
 
 def given_scene(path: str | None) -> Scenario | None:

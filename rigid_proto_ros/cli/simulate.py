@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 from ..base.command_line import completes
 from ..base.errors import InputError
 from ..base.output_file import output_file
+from .exports import add_exports, asked, check_exports, write_exports
 from .options import add_json, add_scene
 from .terminal import line, table
 
 if TYPE_CHECKING:
+    from ..export.flight_record import FlightRecord
     from ..scene.parameters import Parameters
     from ..simulation.observer import Observer, Observers
 
@@ -45,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
     parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
     add_json(parser)
+    add_exports(parser)
 
 
 def _settings() -> list[str]:
@@ -79,7 +82,9 @@ def run(args: argparse.Namespace) -> int:
         # Whatever is refused is refused here, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
         _check_places(recordings)
-    observer = _recorder(recordings, scenario.parameters)
+    check_exports(args)
+    record = _record() if asked(args) else None
+    observer = _observer(recordings, scenario.parameters, record)
     try:
         flight = OfflineRun(scenario, script, observer)
         wall_time = run_with_progress(flight, nanoseconds(args.duration))
@@ -93,6 +98,8 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(result))
     else:
         _print_summary(result, recordings)
+    if record is not None:
+        write_exports(args, record, _warn if args.json else line)
     if floor := flight.simulation.accuracy_floor:
         _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held at the end: {floor}")
     if slow := flight.simulation.too_slow:
@@ -110,15 +117,21 @@ def _check_places(files: list[str]) -> None:
         raise InputError("--bag", files[-1], "another file than that of --record")
 
 
-def _recorder(files: list[str], parameters: Parameters) -> Observers | None:
-    """One observer that records to all of these files; None without any."""
-    if not files:
+def _record() -> FlightRecord:
+    from ..export.flight_record import FlightRecord
+
+    return FlightRecord()
+
+
+def _observer(files: list[str], parameters: Parameters, record: FlightRecord | None) -> Observers | None:
+    """One observer that records to all of these files, and to a record for exports; None without any."""
+    if not files and record is None:
         return None
     from ..rerun_view.recorder import make_recorder
     from ..scene.ghost import GhostRefusals
     from ..simulation.observer import Observers
 
-    opened: list[Observer] = []
+    opened: list[Observer] = [] if record is None else [record]
     try:
         for file in files:
             opened.append(make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True))

@@ -103,10 +103,10 @@ def test_lists_act_first_by_their_bytes_then_single_messages_by_kind_whatever_ar
 def test_a_ghost_takes_a_change_at_its_place_among_the_entries_of_its_list() -> None:
     scenario = make_scenario({**SCENE, "ghost.integrator": "rk4"})
     run = OfflineRun(scenario, expand_script([{"t": 1.0, **entry} for entry in DONE]), Observer())
-    assert isinstance(run._ghost, Ghost)
+    assert isinstance(run.ghost, Ghost)
     run.advance(2 * SECOND)
     # The same tensor and integrator: the same motion, if all acts in the same order.
-    assert run._ghost.simulation.state.sha256() == run.simulation.state.sha256()
+    assert run.ghost.simulation.state.sha256() == run.simulation.state.sha256()
 
 
 def test_loads_are_summed_in_the_order_in_which_they_began_to_act() -> None:

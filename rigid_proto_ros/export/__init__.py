@@ -1,0 +1,5 @@
+# SPDX-License-Identifier: MIT
+"""Motion as other tools read it: tables, glTF, USD, films.
+
+The libraries that write them are imported where they are used.
+"""

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""What an export needs of a flight: an observer that keeps its states, bodies, meshes, ghost and string."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
+
+
+@dataclass(frozen=True)
+class DrawnBody:
+    """The body from ``time_ns`` on, drawn as mesh number ``mesh`` of the record; −1 without a mesh."""
+
+    time_ns: int
+    mesh: int
+    body: BodySnapshot
+
+
+@dataclass(frozen=True)
+class DrawnMesh:
+    """vertices (n, 3) [mesh coordinates] and triangles (m, 3), wound outward."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+
+class FlightRecord(Observer):
+    """One run as arrays, kept while it is told.
+
+    bodies and ghosts: each DrawnBody in the order of time. strings: (time_ns, ShownString or None). breaks: times [ns]
+    at which a load begins or ends, where velocities may jump.
+    """
+
+    def __init__(self) -> None:
+        self.bodies: list[DrawnBody] = []
+        self.ghosts: list[DrawnBody] = []
+        self.meshes: list[DrawnMesh] = []
+        self.strings: list[tuple[int, ShownString | None]] = []
+        self.breaks: list[int] = []
+        self._mesh = -1
+        self._times: list[int] = []
+        self._rows: list[np.ndarray] = []
+
+    @property
+    def times_ns(self) -> np.ndarray:
+        """Times (n,) int64 [ns] of the states; raises InputError where there are none."""
+        if not self._times:
+            raise InputError("session", "it holds no state, so that there is no motion to export")
+        return np.array(self._times, dtype=np.int64)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The states (n, 13) in STATE_FIELDS order."""
+        return np.array(self._rows).reshape(-1, 13)
+
+    def started(
+        self,
+        scene: str,  # noqa: ARG002
+        vertices: np.ndarray | None,
+        triangles: np.ndarray | None,
+        mesh_sha256: str,  # noqa: ARG002
+    ) -> None:
+        """A run begins."""
+        self._take_mesh(vertices, triangles)
+
+    def mesh_changed(
+        self,
+        time_ns: int,  # noqa: ARG002
+        vertices: np.ndarray | None,
+        triangles: np.ndarray | None,
+        mesh_sha256: str,  # noqa: ARG002
+    ) -> None:
+        """The body is drawn as this mesh from now on."""
+        self._take_mesh(vertices, triangles)
+
+    def _take_mesh(self, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
+        self._mesh = -1
+        if vertices is not None and triangles is not None and len(triangles):
+            self._mesh = len(self.meshes)
+            self.meshes.append(DrawnMesh(np.array(vertices, dtype=float), np.array(triangles)))
+
+    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
+        """The body is this one from ``time_ns`` on."""
+        self.bodies.append(DrawnBody(time_ns, self._mesh, body))
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        """The ghost is this one from ``time_ns`` on."""
+        self.ghosts.append(DrawnBody(time_ns, self._mesh, ghost))
+
+    def state(self, time_ns: int, row: np.ndarray) -> None:
+        """A published state. Of two at one time, as a bag may hold them, the first is kept."""
+        if not self._times or time_ns > self._times[-1]:
+            self._times.append(time_ns)
+            self._rows.append(np.array(row, dtype=float))
+
+    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:  # noqa: ARG002
+        """A load begins to act."""
+        self.breaks.append(time_ns)
+
+    def load_ended(self, time_ns: int, load_id: int) -> None:  # noqa: ARG002
+        """A load acts no longer."""
+        self.breaks.append(time_ns)
+
+    def string_changed(self, time_ns: int, string: ShownString | None) -> None:
+        """The string is tied like this from ``time_ns`` on, or not at all."""
+        self.strings.append((time_ns, string))

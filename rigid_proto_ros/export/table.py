@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""States as a table, .csv or .parquet: columns named as a sweep's, and every number as it was simulated, to the bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.output_file import whole_file
+from ..base.provenance import cpu, versions
+from ..simulation.quantities import QUANTITIES
+from .flight_record import FlightRecord
+
+STATE_COLUMNS = dict(list(QUANTITIES.items())[:13])
+"""Units by name: COM position and velocity in world axes, attitude xyzw from body to world, spin in body axes."""
+UNITS = {"time": "s", **STATE_COLUMNS}
+
+KEY = b"rigid_proto_ros"
+"""Of a Parquet file's metadata: a JSON object."""
+
+ROWS_AT_ONCE = 10_000
+
+
+def state_columns(record: FlightRecord) -> dict[str, np.ndarray]:
+    """The columns (n,) float64 by name."""
+    columns = {"time": record.times_ns / 1e9}
+    columns.update({name: record.rows[:, k] for k, name in enumerate(STATE_COLUMNS)})
+    return columns
+
+
+def write_csv(
+    file: str, columns: dict[str, np.ndarray], progress: Callable[[float, float], None] = lambda *_: None
+) -> None:
+    """Write a .csv: a line of names, then a line a state; numbers are read back as they were, to the last bit."""
+    table = np.column_stack(list(columns.values()))
+    with whole_file("--csv", file) as path, open(path, "w", encoding="utf-8") as stream:
+        stream.write(",".join(columns) + "\n")
+        for begin in range(0, len(table), ROWS_AT_ONCE):
+            part = table[begin : begin + ROWS_AT_ONCE].tolist()
+            stream.write("".join(",".join(map(repr, row)) + "\n" for row in part))
+            progress(begin + len(part), len(table))
+
+
+def check_parquet() -> None:
+    """Raise InputError where pyarrow isn't installed."""
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        raise InputError("--parquet", "pyarrow is missing: pip install 'rigid_proto_ros[export]'") from None
+
+
+def write_parquet(file: str, columns: dict[str, np.ndarray]) -> None:
+    """Write a .parquet; its metadata hold the units, the processor and the versions."""
+    check_parquet()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    metadata = {"units": UNITS, "cpu": cpu(), **versions()}
+    table = pa.table(columns).replace_schema_metadata({KEY: json.dumps(metadata).encode()})
+    with whole_file("--parquet", file) as path:
+        pq.write_table(table, path)

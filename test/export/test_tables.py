@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""States as tables: what is read back is what was simulated, to the last bit."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.export.flight_record import FlightRecord
+from rigid_proto_ros.export.table import STATE_COLUMNS, UNITS
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.sweep.table import read_columns
+
+ENDING = ["--duration", "0.5", "--set", "gravity=[0, 0, -9.81]"]
+
+
+def read_csv(path) -> tuple[list[str], np.ndarray]:
+    head, *lines = path.read_text("utf-8").splitlines()
+    return head.split(","), np.array([[float(x) for x in line.split(",")] for line in lines])
+
+
+@pytest.fixture
+def session(tmp_path):
+    pytest.importorskip("mcap")
+    path = tmp_path / "flight.mcap"
+    assert main(["simulate", "t_handle", *ENDING, "--bag", str(path)]) == 0
+    return path
+
+
+def test_a_csv_of_a_session_holds_every_state_to_the_bit(session, tmp_path):
+    out = tmp_path / "new folder" / "states.csv"
+    assert main(["replay", str(session), "--csv", str(out)]) == 0
+    names, table = read_csv(out)
+    assert names == ["time", *STATE_COLUMNS]
+    (run,) = read_runs(session)
+    assert np.array_equal(table[:, 0], run.times / 1e9)
+    recorded = np.column_stack([run.rows[:, :7], run.rows[:, 7:10]])
+    assert np.array_equal(table[:, 1:11], recorded)
+    # A bag holds the twist in world axes; the table has the spin in body axes that it was made of.
+    assert np.abs(table[:, 11:] - run.rows[:, 10:]).max() < 1e-14 * np.abs(run.rows[:, 10:]).max()
+    assert [path.name for path in out.parent.iterdir()] == ["states.csv"]
+
+
+def test_simulate_writes_the_same_table_as_replay_in_both_kinds(session, tmp_path):
+    pytest.importorskip("pyarrow")
+    csv, parquet, replayed = (tmp_path / name for name in ("a.csv", "a.parquet", "b.csv"))
+    assert main(["simulate", "t_handle", *ENDING, "--csv", str(csv), "--parquet", str(parquet)]) == 0
+    assert main(["replay", str(session), "--csv", str(replayed)]) == 0
+    names, table = read_csv(csv)
+    columns = read_columns(parquet, names)
+    assert np.array_equal(np.column_stack([columns[name] for name in names]), table)
+    assert csv.read_bytes() == replayed.read_bytes()
+
+
+def test_a_parquet_says_its_units(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet")
+    out = tmp_path / "a.parquet"
+    assert main(["simulate", "book", "--duration", "0", "--parquet", str(out)]) == 0
+    metadata = json.loads(pq.read_metadata(out).metadata[b"rigid_proto_ros"])
+    assert metadata["units"] == UNITS and metadata["numpy"]
+
+
+def test_one_json_object_is_all_that_json_prints_beside_an_export(tmp_path, capsys):
+    assert main(["simulate", "book", "--duration", "0.1", "--json", "--csv", str(tmp_path / "a.csv")]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["time_ns"] == 100_000_000 and "11 states" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--csv", "a.txt"], ("--csv", "a.txt", ".csv")),
+        (["--parquet", "a.csv"], ("--parquet", ".parquet")),
+        (["--csv", "{tmp}/file/a.csv"], ("--csv", "folder that can be made")),
+        (["--csv", "{tmp}/folder.csv"], ("--csv", "this is a folder")),
+    ],
+)
+def test_what_cannot_be_written_is_refused_in_one_line_before_the_flight(arguments, words, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder.csv").mkdir()
+    arguments = [word.replace("{tmp}", str(tmp_path)) for word in arguments]
+    assert main(["simulate", "book", "--duration", "0.1", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and all(word in err for word in words)
+
+
+def test_a_flight_without_a_state_is_refused():
+    with pytest.raises(ValueError, match="holds no state"):
+        _ = FlightRecord().times_ns
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_no_half(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "a.csv"
+    out.write_text("before")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rigid_proto_ros.base.progress.Progress.fraction", stop)
+    monkeypatch.setattr("rigid_proto_ros.scene.offline.run_with_progress", lambda run, end: run.advance(end) and 0.0)
+    assert main(["simulate", "book", "--duration", "0.1", "--csv", str(out)]) == 0
+    assert capsys.readouterr().err == "rigid_proto simulate: stopped\n"
+    assert out.read_text() == "before" and [path.name for path in tmp_path.iterdir()] == ["a.csv"]
