@@ -82,6 +82,11 @@ class CommandIntake:
         self._active_until_ns = [0] * len(self._sources)
 
     @property
+    def in_progress(self) -> bool:
+        """Whether a message of the schedule is still worked out in the background."""
+        return not self._background.is_empty
+
+    @property
     def queue_full(self) -> int:
         """How often a queue was found full."""
         return sum(queue.queue_full for _, queue, _ in self._sources)

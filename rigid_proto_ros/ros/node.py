@@ -76,7 +76,7 @@ class RigidBodyNode(Node):
         )
         self._watchers.record_to(self._watchers.open_recorder(scenario))
         self.loop.watch(self._watchers.observer)
-        Services(self.loop, self.call, self.intake.received).offer(self)
+        Services(self.loop, self.call, self.intake).offer(self)
         offer_simulation_interfaces(self, self.loop, self.call)
         self.diagnostics = Diagnostics(self, self.loop, self.intake, self._watchers)
         tell_start(self._watchers.observer, scenario)

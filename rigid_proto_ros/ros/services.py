@@ -5,7 +5,7 @@ says what it did.
 
 from __future__ import annotations
 
-from collections import Counter
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,19 +14,21 @@ from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
 from ..simulation.commands import ClearWrench, ReleaseString
+from .command_intake import CommandIntake
 from .physics_thread import Call, step_over
 from .simulation_loop import SimulationLoop
 
+WAIT_S = 5.0
+"""[s] That time stands still for a list sent before, until what it needs is loaded and compiled."""
+
 
 class Services:
-    """Reset, step, pause and the ends of wrench and string, for one loop; call ``offer`` once. received: the commands
-    taken by topic.
-    """
+    """Reset, step, pause and the ends of wrench and string, for one loop; call ``offer`` once."""
 
-    def __init__(self, loop: SimulationLoop, call: Call, received: Counter[str]) -> None:
+    def __init__(self, loop: SimulationLoop, call: Call, intake: CommandIntake) -> None:
         self._loop = loop
         self._call = call
-        self._received = received
+        self._intake = intake
 
     def offer(self, node: Node) -> None:
         """Create the services, private to the node."""
@@ -47,10 +49,23 @@ class Services:
     def _step(self, _: Any) -> str:
         if not self._loop.timekeeping.paused:
             raise InputError("step", "the simulation is running; pause it first")
+        self._take_all()
         reached_ns = step_over(self._call, self._loop, self._loop.scenario.parameters.step_periods)
-        return f"simulated time is {reached_ns / 1e9:.9g} s; {self._received.total()} commands received"
+        return f"simulated time is {reached_ns / 1e9:.9g} s; {self._intake.received.total()} commands received"
+
+    def _take_all(self) -> None:
+        """Before time goes on: a list sent while it stood acts then, though it has a mesh to be loaded."""
+        deadline = time.monotonic() + WAIT_S
+        self._call(self._loop.take_commands)
+        while self._intake.in_progress:
+            if time.monotonic() > deadline:
+                raise InputError("schedule", f"a list that is still worked out after {WAIT_S:g} s: try again")
+            time.sleep(0.002)
+            self._call(self._loop.take_commands)
 
     def _pause(self, request: Any) -> str:
+        if self._loop.timekeeping.paused and not request.data:
+            self._take_all()
         self._call(lambda: self._loop.pause(request.data))
         return "paused" if request.data else "running"
 

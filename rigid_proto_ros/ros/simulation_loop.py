@@ -112,12 +112,16 @@ class SimulationLoop(ScenarioRun):
         """Stop or resume simulated time; what was sent while it stood is taken before it goes on."""
         if paused != self.timekeeping.paused:
             if not paused:
-                self._take_commands(time.monotonic_ns(), True)
+                self.take_commands()
             self.timekeeping.paused = paused
             self._end_steps()
             self.simulation.log("pause", {"data": paused})
             self.simulation.tell_status(paused)
             self._anchor()
+
+    def take_commands(self) -> None:
+        """Take all commands that have arrived."""
+        self._take_commands(time.monotonic_ns(), True)
 
     def catch_up(self) -> None:
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
@@ -132,7 +136,7 @@ class SimulationLoop(ScenarioRun):
         they are made already, else ``stepping`` says.
         """
         requested = self._steps_requested
-        self._take_commands(time.monotonic_ns(), True)
+        self.take_commands()
         # This very step follows what was taken now.
         self._steps_requested = requested
         self.simulation.log("step", {"periods": periods} if periods > 1 else {})

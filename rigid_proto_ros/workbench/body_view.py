@@ -16,7 +16,6 @@ from ..rerun_view.appearance import AXES_COLOURS, BODY_COLOUR, GHOST_COLOUR, MOM
 from ..rerun_view.surface_normals import shaded_surface
 from ..scene.scenario import Scenario
 from .poke_mark import UNWRITTEN
-from .trails import farthest_point
 
 BOUNDS_COLOUR = (90, 90, 90)
 
@@ -80,7 +79,7 @@ class BodyView:
         self._shape: tuple[Any, ...] = ()
         self._scale, self._center_of_mass = np.ones(3), np.zeros(3)
         self._middle = np.zeros(3)
-        self._tip = np.zeros(3)
+        self._name_points: tuple[tuple[Any, ...], np.ndarray] = ((), np.zeros((2, 3)))
         self._look_due_s, self._look_odd = 0.0, False
         self._frame = scene.add_frame("/body", show_axes=False)
         self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
@@ -125,7 +124,6 @@ class BodyView:
         shape = (body.inertia.tobytes(), body.center_of_mass.tobytes(), *scale)
         if replaced or shape != self._shape:
             self._shape = shape
-            self._tip = farthest_point(surface, body) if surface is not None else np.zeros(3)
             self._draw_inertia(scenario, box, ellipsoid, corners)
         self._place_contacts(str(scenario.parameters.mesh))
 
@@ -259,19 +257,38 @@ class BodyView:
         self, at: np.ndarray, quaternion_xyzw: np.ndarray, center_of_mass: np.ndarray, names: tuple[str, str]
     ) -> None:
         """The ghost's COM at a point of the picture (3,), in this attitude; its COM (3,) in scaled mesh coordinates.
-        names: of body and ghost, which are written at the point of each that is farthest from the body's COM.
+        names: of body and ghost, each written at a point of its own on them, away from the contacts' names.
         """
         self._ghost_frame.position = at
         self._ghost_frame.wxyz = wxyz(quaternion_xyzw)
         if self._surface is not None:
             self._ghost.position = (self._middle * self._scale - center_of_mass) / self._unit
-        tip = self._tip * self._scale
-        for label, com, name in zip(self._names, (self._center_of_mass, center_of_mass), names, strict=True):
-            label.position = (tip - com) / self._unit
+        points, apart = self._named_points(), center_of_mass - self._center_of_mass
+        for label, point, name in zip(self._names, (points[0], points[1] - apart), names, strict=True):
+            label.position = point / self._unit
             if label.text != name:
                 label.text = name
         for node in (self._ghost_frame, *self._names):
             set_visible(node, True)
+
+    def _named_points(self) -> np.ndarray:
+        """Where the names of body and ghost stand, (2, 3) [m, from the body's COM]: vertices far from the contacts,
+        where other names stand, from the COM and from each other; found anew where one of these has moved.
+        """
+        written = self._contacts.values() if self._mesh_name == self._contacts_mesh else ()
+        of = (self._shape, *written)
+        if self._name_points[0] != of:
+            if self._surface is None:
+                points = self.radius * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+            else:
+                vertices = self._surface.vertices * self._scale - self._center_of_mass
+                taken = [np.zeros(3), *(np.array(point) * self._scale - self._center_of_mass for point in written)]
+                for _ in self._names:
+                    nearest = np.min([np.einsum("ij,ij->i", vertices - p, vertices - p) for p in taken], axis=0)
+                    taken.append(vertices[int(np.argmax(nearest))])
+                points = np.array(taken[-2:])
+            self._name_points = of, points
+        return self._name_points[1]
 
 
 def body_corners(scenario: Scenario) -> np.ndarray:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..ros.scheduling import SLOW
 from ..scene.command_codec import ScriptCommand, outgoing
 from ..scene.declaration import LIVE
 from ..scene.parameters import parameter_named
@@ -40,10 +39,7 @@ class HandCommands:
             self.go_on()
 
     def set_parameters(self, changes: dict[str, object], done: Callable[[bool, str], None]) -> None:
-        """As RosLink.set_parameters, in the order of what is done by hand. A change of mesh, tensor or integrator
-        isn't: a list that has one waits until it is worked out, and with it what is done by hand; it acts after the
-        list.
-        """
+        """As RosLink.set_parameters, in the order of what is done by hand."""
         if not self.paused or not all(map(_is_ordered, changes)):
             self._link.set_parameters(changes, done)
             return
@@ -79,7 +75,7 @@ class HandCommands:
 
 
 def _is_ordered(name: str) -> bool:
-    return parameter_named(name).changes == LIVE and name not in SLOW | KEPT
+    return parameter_named(name).changes == LIVE and name not in KEPT
 
 
 def _same_names(first: ScriptCommand, second: ScriptCommand) -> bool:

@@ -252,8 +252,8 @@ class Page:
                 self.view.origin = np.zeros(3)
         elif kind == "pause":
             self._set_paused(bool(content.get("data")))
-        elif kind == "string_attach":
-            self.pointer.knot_moved()
+        elif kind.startswith("string_"):
+            self.pointer.string_event(kind, content)
         self.lessons.acted(kind)
 
     def _on_begin(self) -> None:
@@ -297,8 +297,9 @@ class Page:
             view.show_hit(None if looking else acting.hit(setup, state))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
             scales = view.show_motion(state.position, momentum, spin)
-            view.show_ghost(ghost, com, names(scenario, left)[:2])
-            self.side_by_side.show(now_s, scenario, state, ghost, left)
+            view.show_ghost(ghost, com, names(scenario, left))
+            began_ns = None if left else self.follower.ghost.began_ns
+            self.side_by_side.show(now_s, scenario, state, ghost, began_ns)
         self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else acting.string_energy(setup, state)
         self._readouts.show(now_s, scenario, state, stretched, scales, self.side_by_side.angle)

@@ -44,6 +44,11 @@ class PageGhost:
         self._number = 0
 
     @property
+    def began_ns(self) -> int:
+        """The node's time at which it was where the body was."""
+        return self._offset_ns
+
+    @property
     def center_of_mass(self) -> np.ndarray | None:
         """Of its own tensor (3,) [m, scaled mesh coordinates]; None while there is none."""
         return None if self._ghost is None else self._ghost.simulation.setup.body.center_of_mass

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,9 +23,10 @@ HOLD_S = 0.2
 is short.
 """
 
-SAME_TICK_S = 0.03
-"""Messages this far apart aren't taken in the same tick, where single ones act by kind: a release would act before the
-target sent last, and that would tie the string again. While time stands still they go as one list.
+SAME_TICK_S = 0.012
+"""[s] Between the last target and the release. The node takes messages at least every 10 ms, and those that it takes
+together act by kind: the release would act first, and the target would tie the string again. Where that happens all the
+same, the release is sent again. While time stands still they go as one list.
 """
 
 POKE_TRAVEL = 0.3
@@ -72,6 +73,8 @@ class Pointer:
         self._tools = tools
         self._drag: _Drag | None = None
         self._knot_by_message = False
+        self._loose_after = np.zeros(0)
+        self._release_heard = False
 
     @property
     def dragging(self) -> bool:
@@ -94,11 +97,15 @@ class Pointer:
         for modifier in MODIFIERS:
             node.on_click(modifier=modifier)(clicked)
 
-    def knot_moved(self) -> None:
-        """Somebody published ~/string/attach: the parameter ``string.attach`` doesn't say any more where
-        the knot is.
-        """
-        self._knot_by_message = True
+    def string_event(self, kind: str, content: Mapping[str, Any]) -> None:
+        """An event of the string, whoever caused it."""
+        if kind == "string_attach":
+            # The parameter ``string.attach`` doesn't say any more where the knot is.
+            self._knot_by_message = True
+        elif kind == "string_release":
+            self._release_heard = True
+        elif self._release_heard and np.array_equal(content.get("point", 0.0), self._loose_after):
+            self._hand.do(ScriptCommand(0, "string_release"))  # our last target acted after the release
 
     # Click
 
@@ -169,6 +176,7 @@ class Pointer:
             commands.append(ScriptCommand(0, "string_attach", MESH_FRAME, point=_three(point)))
             self._knot_by_message = True
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
+        self._loose_after = np.zeros(0)
         self._hand.do(*commands, _target(self._drag))
 
     def _tie_to(self, point: np.ndarray, aside: np.ndarray) -> list[ScriptCommand]:
@@ -205,6 +213,7 @@ class Pointer:
         if self._hand.paused:
             self._release(drag)
             return
+        self._loose_after, self._release_heard = drag.target, False
         wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
         asyncio.get_running_loop().call_later(wait_s, self._release, drag)
 

@@ -50,8 +50,12 @@ class SideBySide:
         """Both begin anew."""
         self._most = self._due_s = 0.0
 
-    def show(self, now_s: float, scenario: Scenario, state: State, ghost: np.ndarray | None, left: bool) -> None:
-        """The body's state and its ghost's (13,), None for none; ``left``: the ghost is a future that a rewind left."""
+    def show(
+        self, now_s: float, scenario: Scenario, state: State, ghost: np.ndarray | None, began_ns: int | None
+    ) -> None:
+        """The body's state and its ghost's (13,), None for none, which began where the body was at ``began_ns``; that
+        is None for a future that a rewind left.
+        """
         shown = ghost is not None
         for handle in (self._legend, self._sentence):
             if handle.visible != shown:
@@ -65,29 +69,39 @@ class SideBySide:
         if now_s < self._due_s:
             return
         self._due_s = now_s + SHOWN_S
-        body_name, ghost_name, what = names(scenario, left)
+        body_name, ghost_name = names(scenario, began_ns is None)
         legend = f"{_mark(BODY_COLOUR)} {body_name} &emsp; {_mark(GHOST_COLOUR)} {ghost_name}"
         self._legend.content = f'<div style="padding:0.3em 0.9em 0;font-size:0.9em">{legend}</div>'
         now, most = math.degrees(self.angle), math.degrees(self._most)
-        self._sentence.content = (
-            f"{what} After {state.time_ns * 1e-9:.1f} s: **{now:.0f}° apart**, at most {most:.0f}° so far."
-        )
+        what = compared(scenario, state.time_ns, began_ns)
+        self._sentence.content = f"{what}: **{now:.0f}° apart**, at most {most:.0f}° so far."
 
 
-def names(scenario: Scenario, left: bool) -> tuple[str, str, str]:
-    """What body and ghost are called, and in what alone they differ."""
+def names(scenario: Scenario, left: bool) -> tuple[str, str]:
+    """What body and ghost are called; ``left``: the ghost is a future that a rewind left."""
     if left:
-        return "now", "previous motion", "The same body from the same state, under different commands."
+        return "now", "previous motion"
     own, other = str(scenario.parameters.inertia_model), str(scenario.parameters.ghost.inertia_model)
     integrator = str(scenario.parameters.ghost.integrator)
     if integrator and not other:
-        return str(scenario.parameters.integrator), integrator, "Released alike; only the integrator differs."
-    alike = "only the tensor differs" if scenario.parameters.inertia_model_com == "solid" else "tensor and COM differ"
-    return (
-        f"body: {TITLES.get(own, own)}",
-        f"ghost: {TITLES.get(other, other)}",
-        f"Released alike, with one mass; {alike}.",
-    )
+        return str(scenario.parameters.integrator), integrator
+    return f"body: {TITLES.get(own, own)}", f"ghost: {TITLES.get(other, other)}"
+
+
+def compared(scenario: Scenario, time_ns: int, began_ns: int | None) -> str:
+    """In what alone body and ghost differ, and for how long; began_ns as SideBySide.show has it."""
+    if began_ns is None:
+        return f"The same body from the same state, under different commands. At {time_ns * 1e-9:.1f} s"
+    ghost = scenario.parameters.ghost
+    if ghost.integrator and not ghost.inertia_model:
+        differs = "only the integrator differs"
+    elif scenario.parameters.inertia_model_com == "solid":
+        differs = "with one mass; only the tensor differs"
+    else:
+        differs = "with one mass; tensor and COM differ"
+    if began_ns == 0:
+        return f"Released alike, {differs}. After {time_ns * 1e-9:.1f} s"
+    return f"Alike at {began_ns * 1e-9:.1f} s, {differs}. {(time_ns - began_ns) * 1e-9:.1f} s later"
 
 
 def _mark(colour: tuple[int, int, int]) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ pytest.importorskip("rclpy")
 
 from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.ros import command_intake, command_queue, warm_up
+from rigid_proto_ros.ros.services import Services
 from rigid_proto_ros.ros.simulation_loop import SimulationLoop
 from rigid_proto_ros.scene import scenario
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -123,3 +125,30 @@ def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_b
     rig.tick_until(lambda: rig.loop.scenario.parameters.gravity == (0.0, 0.0, -1.0))
     assert rig.loop.scenario.parameters.integrator == "rk4"
     assert compiled_by == [("schedule", "rk4")]
+
+
+@pytest.mark.parametrize("service", ["_pause", "_step"])
+def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on(monkeypatch, service) -> None:
+    rig = Rig(monkeypatch)
+    load = scenario.mesh_body
+
+    def slow(*arguments, **named):
+        time.sleep(0.2)
+        return load(*arguments, **named)
+
+    changed_ns: list[int] = []
+
+    class Changes(Observer):
+        def body_changed(self, time_ns, body) -> None:
+            changed_ns.append(time_ns)
+
+    monkeypatch.setattr(scenario, "mesh_body", slow)
+    rig.loop.watch(Changes())
+    services = Services(rig.loop, lambda function: function(), rig.intake)
+    services._pause(SimpleNamespace(data=True))
+    at_ns = rig.loop.simulation.time_ns
+    rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
+    getattr(services, service)(SimpleNamespace(data=False))
+    assert rig.intake.received["schedule"] == 1
+    rig.tick_until(lambda: rig.loop.scenario.parameters.mesh == "book")
+    assert changed_ns == [at_ns]

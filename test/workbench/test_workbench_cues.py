@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -230,8 +231,17 @@ def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_o
     labels = [scene.nodes[f"/{whose}/name"] for whose in ("body", "ghost")]
     view.show_ghost(row, com, ("true", "its box"))
     assert [label.text for label in labels] == ["true", "its box"] and all(label.visible for label in labels)
-    # At one and the same point of the mesh, each from its own COM.
-    apart = (labels[0].position - labels[1].position) * view.unit
-    assert apart == pytest.approx(com - scenario.setup.body.center_of_mass, abs=1e-12)
+    # Each at a point of its own, away from the contacts' names, on the body and the ghost as they lie.
+    contacts = [np.array(point) for point in scenario.parameters.contacts.values()]
+    view.body.label_contacts(scenario.parameters.contacts, "l_bracket")
+    view.show_ghost(row, com, ("true", "its box"))
+    own = scenario.setup.body.center_of_mass
+    places = [label.position * view.unit + c for label, c in zip(labels, (own, com), strict=True)]
+    vertices = scenario.setup.surface.vertices
+    for place in places:
+        assert np.abs(vertices - place).max(axis=1).min() < 1e-12
+    for one, other in combinations((*contacts, *places), 2):
+        if not (one is contacts[0] and other is contacts[1]):
+            assert np.linalg.norm(one - other) > 0.4 * view.radius  # measured 0.65 at the least
     view.show_ghost(None, com, ("true", "its box"))
     assert not any(label.visible for label in labels)

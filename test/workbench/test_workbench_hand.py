@@ -73,6 +73,26 @@ def test_a_drag_while_paused_acts_in_the_order_in_which_it_was_done_and_its_stri
     )
 
 
+def test_a_release_taken_together_with_the_last_target_is_sent_again_and_nobody_holds_the_string() -> None:
+    hand = Hand(paused=False)
+
+    async def dragging() -> None:
+        hand.pointer.grab(1, np.array([0.0, 0.0, 0.07]), np.array([0.0, 0.0, 0.1]))
+        hand.link.fly(0.05)
+        hand.pointer.pull(np.array([0.1, 0.0, 0.2]))
+        hand.pointer.let_go()
+        await asyncio.sleep(0.1)
+
+    asyncio.run(dragging())
+    hand.link.fly(0.01)
+    assert hand.kinds()[-2:] == ["string_release", "string_target"] and hand.link.simulation.string is not None
+    for line in hand.link._log.lines:
+        hand.pointer.string_event(*decode_event(line, 1)[1:])
+    hand.link.fly(0.01)
+    assert hand.kinds()[-1] == "string_release" and hand.link.simulation.string is None
+    assert not hand.pointer.dragging
+
+
 def test_what_is_done_together_in_flight_is_one_message_and_waits_for_nothing() -> None:
     hand = Hand(paused=False)
 
@@ -80,7 +100,7 @@ def test_what_is_done_together_in_flight_is_one_message_and_waits_for_nothing() 
         hand.pointer.grab(1, np.array([0.0, 0.0, 0.07]), np.array([0.0, 0.0, 0.1]))
 
     hand.pointer._tools.at_com = True
-    hand.pointer.knot_moved()
+    hand.pointer.string_event("string_attach", {})
     asyncio.run(grab())
     assert hand.link.received == 4
     hand.link.fly(0.01)
@@ -124,6 +144,20 @@ def test_parameters_set_while_paused_act_between_what_is_done_by_hand_before_and
     received = hand.link.received
     hand.hand.go_on()
     assert hand.link.received == received and hand.link.scenario.parameters.mass == 4.0
+
+
+def test_another_tensor_set_while_paused_acts_in_its_place_among_what_is_done_by_hand() -> None:
+    hand = Hand(paused=True)
+    eye, direction = np.array([1.0, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+    for model in ("shell", "bounding_box"):
+        assert hand.pointer.click(eye, direction, hand.seen, push=False)
+        hand.hand.set_parameters({"inertia_model": model}, lambda successful, reason: None)
+    assert hand.link.scenario.parameters.inertia_model == "bounding_box" and not hand.kinds()
+    hand.hand.go_on()
+    hand.link.fly(0.001)
+    acted = [decode_event(line, 1)[1:] for line in hand.link._log.lines]
+    in_order = [("poke", None), ("set", "shell"), ("poke", None), ("set", "bounding_box")]
+    assert [(kind, content.get("inertia_model")) for kind, content in acted][:4] == in_order
 
 
 def test_what_was_done_before_a_reset_is_forgotten_with_it() -> None:
