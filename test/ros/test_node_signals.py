@@ -14,7 +14,7 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 
 
 @needs_rerun
-@BOTH
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
     flight = ("rigid_proto", "demo", "--duration", 60, "--out", tmp_path)
     demo = RosProcess(*flight, environment=ros_environment, log=tmp_path / "demo")

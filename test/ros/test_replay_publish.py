@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import ENDINGS, MISSING
+from conftest import ENDINGS, MISSING, needs_rerun
 
 pytest.importorskip("rclpy")
 pytest.importorskip("mcap")
@@ -16,27 +16,18 @@ from bag_recorder import BagRecorder
 from command_rig import RosClient, wrench_message
 from flights import SECOND
 from ros_process import run, running_node
+from scripts import EVERY_KIND
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.messages.session_messages import read_state
 from rigid_proto_ros.rerun_view.session_files import read_runs
 
-SCRIPT = """
-- {t: 0.1, at: tip, force: [0.0, 0.01, 0.0], duration: 0.3}
-- {t: 0.2, at: {vertex: 3}, impulse: [0.0, 0.0, 0.002]}
-- {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-5, 0.0], axes: body, duration: 0.5}}
-- {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5]}}
-- {t: 0.6, string: {attach: tip, target: [0.1, 0.0, 0.2]}}
-- {t: 0.9, string: release}
-- {t: 1.0, service: clear_wrench}
-"""
-
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flown")
-    (folder / "script.yaml").write_text(SCRIPT)
+    (folder / "script.yaml").write_text(EVERY_KIND)
     bag = folder / "s.mcap"
     arguments = ["simulate", "t_handle", "--script", str(folder / "script.yaml"), "--duration", "2"]
     recorded = [] if "rerun" in MISSING else ["--record", str(folder / "s.rrd")]
@@ -63,7 +54,7 @@ def flown_to(messages) -> int:
     return min(max(states_of(run, name)[0], default=0) for name in ("pose", "twist"))
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", [".mcap", pytest.param(".rrd", marks=[needs_rerun, pytest.mark.stress])])
 def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tmp_path, ending):
     recorder = BagRecorder(ros_environment)
     done = run(
@@ -157,36 +148,45 @@ def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_
     assert any("flyer@com" in line for line in runs[0].lines)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
-    ros_environment, tmp_path, ending
-):
-    path = tmp_path / f"session{ending}"
-    arguments = ["--params-file", scene_path("hammer")]
+@pytest.fixture(scope="module")
+def hammer(ros_environment, tmp_path_factory):
+    """A client of a node that flies a hammer and records nothing."""
+    arguments = ["--params-file", scene_path("hammer"), "-r", "__node:=hammer"]
+    log = tmp_path_factory.mktemp("hammer") / "node"
     with (
-        RosClient(ros_environment) as client,
-        running_node("--ros-args", *arguments, environment=ros_environment, log=tmp_path / "node"),
+        RosClient(ros_environment, "/hammer") as client,
+        running_node("--ros-args", *arguments, environment=ros_environment, log=log),
     ):
         client.meet()
-        client.publish("poke", wrench_message(0, "body@com;impulse", (0.0, 0.3, 0.0)))
-        client.set(record=str(path))
-        client.forget("pose")
-        client.until(lambda: client.heard_count("pose") > 50, "half a second of states")
-        assert client.diagnostics()["recording"] == str(path)
-        client.set(record="")
-        assert client.diagnostics()["recording"] == ""
-        late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
-        assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
-        assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
-        # A change that is refused leaves the file of that name as it is.
-        before = path.read_bytes()
-        client.set(wrench_timeout=0.0)
-        client.publish("wrench", wrench_message(0, "body@point/0.0,0.1,0.0", (0.0, 0.0, 1e-3)))
-        client.until_received(1, "wrench")
-        ((accepted, reason),) = client.set(record=str(path), integrator="free_body", atomically=True)
-        assert not accepted and "free_body" in reason
-        assert path.read_bytes() == before
-        client.set(record=str(path))
-        client.reset()
-        client.fly_until(SECOND // 2)
+        yield client
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
+    hammer, ros_environment, tmp_path, ending
+):
+    path, client = tmp_path / f"session{ending}", hammer
+    client.publish("poke", wrench_message(0, "body@com;impulse", (0.0, 0.3, 0.0)))
+    client.set(record=str(path))
+    client.forget("pose")
+    client.until(lambda: client.heard_count("pose") > 50, "half a second of states")
+    assert client.diagnostics()["recording"] == str(path)
+    client.set(record="")
+    assert client.diagnostics()["recording"] == ""
+    late = run("rigid_proto", "replay", path, "--verify", environment=ros_environment)
+    assert late.returncode == 2 and "begins at" in late.stderr, late.stderr
+    assert read_runs(path)[-1].complete and len(read_runs(path)[-1].times) > 10
+    # A change that is refused leaves the file of that name as it is.
+    before = path.read_bytes()
+    client.set(wrench_timeout=0.0)
+    taken = int(client.diagnostics()["wrench_received"])
+    client.publish("wrench", wrench_message(0, "body@point/0.0,0.1,0.0", (0.0, 0.0, 1e-3)))
+    client.until_received(taken + 1, "wrench")
+    ((accepted, reason),) = client.set(record=str(path), integrator="free_body", atomically=True)
+    assert not accepted and "free_body" in reason
+    assert path.read_bytes() == before
+    client.set(record=str(path))
+    client.reset()
+    client.fly_until(SECOND // 2)
+    client.set(record="")
     assert main(["replay", str(path), "--verify"]) == 0

@@ -12,8 +12,12 @@ import pytest
 
 pytest.importorskip("mcap")
 
+from conftest import needs_rerun
+from scripts import EVERY_KIND
+
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
@@ -24,16 +28,7 @@ from rigid_proto_ros.simulation.event_log import EventLog
 
 SECOND = 10**9
 
-SCRIPT = """
-- {t: 0.1, at: tip, force: [0.0, 0.01, 0.0], duration: 0.3}
-- {t: 0.2, at: {vertex: 3}, impulse: [0.0, 0.0, 0.002]}
-- {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-5, 0.0], axes: body, duration: 0.5}}
-- {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5]}}
-- {t: 0.6, string: {attach: tip, target: [0.1, 0.0, 0.2]}}
-- {t: 0.9, string: release}
-- {t: 1.0, service: clear_wrench}
-- {t: 1.1, set: {publish_clock: true}}
-"""
+SCRIPT = EVERY_KIND + "- {t: 1.1, set: {publish_clock: true}}\n"
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +152,21 @@ def test_one_bit_of_a_state_is_found(session, topic):
         difference = verify(replace(session, published=published))
         assert f"{topic} differs" in str(difference)
         assert difference.time_ns == session.published[topic].times[k]
+
+
+@needs_rerun
+def test_a_changed_event_of_a_file_is_one_line_and_exit_1(tmp_path, capsys):
+    path = tmp_path / "session.rrd"
+    arguments = ["simulate", "t_handle", "--script", str(example_path("flip_and_poke")), "--duration", "2"]
+    assert main([*arguments, "--record", str(path)]) == 0
+    assert main(["replay", str(path), "--verify"]) == 0
+    data = path.read_bytes()
+    assert b"0.004" in data
+    path.write_bytes(data.replace(b"0.004", b"0.005"))
+    capsys.readouterr()
+    assert main(["replay", str(path), "--verify"]) == 1
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1 and "command 1 " in said
 
 
 @pytest.mark.parametrize(
