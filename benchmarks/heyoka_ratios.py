@@ -128,12 +128,12 @@ def sweep_runs(problem: Problem, accuracy: float):
     times, constants = np.zeros((1, bb.TIMES), np.int64), np.zeros(bb.CONSTANTS)
     times[0, bb.STEP_NS], times[0, bb.POKE_NS], times[0, bb.DEGREE] = 1_000_000, 50_000_000, degree_for(accuracy)
     constants[bb.GYROSCOPIC] = 1.0
-    commands = np.zeros((1, len(problem.wrenches), 3), np.int64)
+    commands = np.zeros((1, len(problem.wrenches), fl.COMMAND), np.int64)
     rows = np.zeros((1, len(problem.wrenches), ld.LOAD))
     for command, row, w in zip(commands[0], rows[0], problem.wrenches, strict=True):
         kind = fl.IMPULSE if w.impulse else fl.HELD_WRENCH if w.end is None else fl.PULSE
         lasts = -1 if w.end is None else round(w.end * 1e9) - round(w.begin * 1e9)
-        command[:] = round(w.begin * 1e9), lasts, kind
+        command[:] = round(w.begin * 1e9), lasts, kind, fl.UNNAMED_SLOT if kind == fl.HELD_WRENCH else fl.NO_SLOT
         row[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
         row[ld.HAS_POINT], row[ld.POINT : ld.POINT + 3] = 1.0, w.point
         row[ld.FORCE : ld.FORCE + 3], row[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque

@@ -81,7 +81,7 @@ def _cut(series: Series, first_ns: int, last_ns: int) -> Series:
 def _acting(session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int) -> Acting:
     """Loads of the event log up to a time, as intervals."""
     rows: list[tuple[int, int, np.ndarray]] = []
-    held: tuple[int, np.ndarray] | None = None
+    held: dict[int, tuple[int, np.ndarray]] = {}
     for number, line in enumerate(session.lines, 1):
         time_ns, kind, content = decode_event(line, number)
         if time_ns > end_ns:
@@ -91,22 +91,26 @@ def _acting(session: RecordedSession, setup: Setup, frames: tuple[str, str], nam
             continue
         if isinstance(command, ClearWrench):
             rows = [(begin, min(end, max(time_ns, begin)), row) for begin, end, row in rows]
-            _let_go(rows, held, time_ns, setup)
-            held = None
+            for wrench in held.values():
+                _let_go(rows, wrench, time_ns, setup)
+            held = {}
             continue
         if not isinstance(command, WrenchCommand):
             reason = f"at {1e-9 * time_ns:g} s {name} has a {kind} event"
             raise InputError("session", f"{reason}: only wrenches and pokes are taken; end before it with --to")
         row = _tracked(command, setup, name, time_ns)
         if command.held:
-            _let_go(rows, held, time_ns, setup)
-            held = (time_ns, row) if np.any(row[5:11]) else None
+            if command.slot in held:
+                _let_go(rows, held.pop(command.slot), time_ns, setup)
+            if np.any(row[5:11]):
+                held[command.slot] = (time_ns, row)
         elif command.frame.impulse:
             rows.append((time_ns, time_ns, row))
         else:
             duration = command.duration_ns if command.duration_ns >= 0 else setup.poke_duration_ns
             rows.append((time_ns, time_ns + duration, row))
-    _let_go(rows, held, end_ns, setup)
+    for wrench in held.values():
+        _let_go(rows, wrench, end_ns, setup)
     return as_acting(rows)
 
 
@@ -116,17 +120,17 @@ def as_acting(rows: Sequence[tuple[int, int, np.ndarray]]) -> Acting:
     return Acting(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
 
 
-def _let_go(
-    rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray] | None, time_ns: int, setup: Setup
-) -> None:
+def _let_go(rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray], time_ns: int, setup: Setup) -> None:
     """End a held wrench at a time, or when its timeout came before."""
-    if held is not None and time_ns > held[0]:
+    if time_ns > held[0]:
         timeout = held[0] + setup.wrench_timeout_ns if setup.wrench_timeout_ns else time_ns
         rows.append((held[0], min(time_ns, timeout), held[1]))
 
 
 def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> np.ndarray:
     """The load with its point in the tracked frame."""
+    if command.frame.slot and not command.held:
+        raise InputError("session", f"at {1e-9 * time_ns:g} s {name} has a poke in a slot; end before it with --to")
     if command.frame.point[0] == "ray":
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
         raise InputError("session", f"{where}: where it hit is not in the log; end before it with --to")

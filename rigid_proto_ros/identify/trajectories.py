@@ -138,7 +138,7 @@ def _fly_all(
             continue
         f[: fl.ROOM] = 0.0
         n[:] = 0
-        n[fl.HELD], n[fl.METHOD], n[fl.CHOOSES] = fl.NONE_HELD, -1, 1
+        n[fl.METHOD], n[fl.CHOOSES] = -1, 1
         n[fl.STEP_NS] = 1_000_000
         row = f[fl.ROW : fl.ROW + 13]
         row[:] = own[START : START + 13]

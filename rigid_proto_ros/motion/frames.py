@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The frame of a wrench: which axes its numbers are in, and which point of the body it attacks.
 
-A frame is written ``axes@point[;duration=<s>|;impulse]``; README and docs list the forms. This module only reads the
-text; where the point lies on the body is settled by motion/loads.py.
+A frame is written ``axes@point[;duration=<s>|;impulse][;slot=<name>]``; README and docs list the forms. This module
+only reads the text; where the point lies on the body is settled by motion/loads.py.
 """
 
 from __future__ import annotations
@@ -27,24 +27,31 @@ MAX_FRAME_LENGTH = 1024
 MAX_DURATION_S = 1e9
 """A pulse's end must stay well inside the 292 years that int64 nanoseconds hold."""
 
+SLOT_NAME = re.compile(r"[a-z][a-z0-9_]{0,11}\Z")
+"""Twelve characters fit into one integer, by which compiled flights know a slot."""
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
 
 @dataclass(frozen=True)
 class Frame:
-    """axes: ``world``, ``body`` or ``normal``; point: a form of POINT_FORMS as a tuple, its word first."""
+    """axes: ``world``, ``body`` or ``normal``; point: a form of POINT_FORMS as a tuple, its word first. slot: which of
+    several held wrenches it replaces, empty for the unnamed one.
+    """
 
     axes: str
     point: tuple
     duration_s: float | None = None
     impulse: bool = False
+    slot: str = ""
 
     @property
     def options(self) -> str:
         """What stands behind the point."""
+        slot = f";slot={self.slot}" if self.slot else ""
         if self.duration_s is not None:
-            return f";duration={self.duration_s!r}"
-        return ";impulse" if self.impulse else ""
+            return f";duration={self.duration_s!r}{slot}"
+        return ";impulse" if self.impulse else slot
 
     @property
     def text(self) -> str:
@@ -87,8 +94,7 @@ def parse_frame(text: str, contacts: Collection[str] = (), world: str = "world",
         axes, point = "body", _parse_point(place, text, contacts, axes_words)
     if axes == "normal" and point == ("com",):
         raise CommandRefused("frame", "frame_id", text, "normal with a point of the surface, such as normal@vertex/0")
-    duration_s, impulse = _parse_options(options, text)
-    return Frame(axes, point, duration_s, impulse)
+    return Frame(axes, point, *_parse_options(options, text))
 
 
 def _parse_point(part: str, text: str, contacts: Collection[str], axes_words: Iterable[str] = ()) -> tuple:
@@ -122,8 +128,8 @@ def _parse_triple(part: str, text: str) -> Vector:
     return values
 
 
-def _parse_options(options: list[str], text: str) -> tuple[float | None, bool]:
-    duration_s, impulse = None, False
+def _parse_options(options: list[str], text: str) -> tuple[float | None, bool, str]:
+    duration_s, impulse, slot = None, False, ""
     for option in options:
         if option == "impulse" and not impulse:
             impulse = True
@@ -131,11 +137,16 @@ def _parse_options(options: list[str], text: str) -> tuple[float | None, bool]:
             duration_s = float(option[9:])
             if not 1e-9 <= duration_s <= MAX_DURATION_S:
                 raise CommandRefused("frame", "frame_id", text, f"a duration of 1e-9 to {MAX_DURATION_S:g} s")
+        elif option.startswith("slot=") and not slot:
+            slot = option[5:]
+            if not SLOT_NAME.match(slot):
+                raise CommandRefused("frame", "frame_id", text, "a slot's name of [a-z][a-z0-9_]*, up to 12 characters")
         else:
-            raise CommandRefused("frame", "frame_id", text, "after the point only ;duration=<seconds> or ;impulse")
-    if impulse and duration_s is not None:
-        raise CommandRefused("frame", "frame_id", text, ";duration=<seconds> or ;impulse, not both")
-    return duration_s, impulse
+            accepted = "after the point only ;duration=<seconds>, ;impulse or ;slot=<name>"
+            raise CommandRefused("frame", "frame_id", text, accepted)
+    if impulse and (duration_s is not None or slot):
+        raise CommandRefused("frame", "frame_id", text, ";impulse alone: it neither lasts nor is replaced")
+    return duration_s, impulse, slot
 
 
 def check_contact_name(name: str) -> None:

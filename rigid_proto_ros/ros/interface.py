@@ -37,7 +37,8 @@ INTERFACES = (
         SUBSCRIBED,
         "~/wrench",
         "geometry_msgs/WrenchStamped",
-        "held wrench: each message replaces the one before; it ends `wrench_timeout` after the last",
+        "held wrench: each message replaces the one before of the same `;slot=<name>`, or without one; it ends "
+        "`wrench_timeout` after the last",
     ),
     _topic(
         SUBSCRIBED,

@@ -89,6 +89,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--torque", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m")
     line.add_argument("--angular-impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m s (poke only)")
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
+    line.add_argument("--slot", metavar="NAME", help="replace what acts in this slot, and nothing else")
     line.add_argument("--for", dest="duration", type=float, metavar="S", help="duration in seconds")
     complete(parser)
     args = parser.parse_args(argv)
@@ -110,7 +111,7 @@ def _script(args: argparse.Namespace, wrench_timeout: float) -> list[ScriptComma
 
     given = {
         key: value
-        for key in ("force", "push", "impulse", "torque", "angular_impulse", "axes", "duration")
+        for key in ("force", "push", "impulse", "torque", "angular_impulse", "axes", "duration", "slot")
         if (value := getattr(args, key)) is not None
     }
     given["at"] = _point(args.at)

@@ -44,7 +44,7 @@ Changing = Callable[[Mapping], Setup]
 MESH_FRAME = "body/mesh"
 """Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
 
-MARKS = ("reset", "pause", "step")
+MARKS = ("reset", "pause", "step", "timeout")
 """Events that stand in the log and don't act on the body."""
 
 KINDS = (
@@ -356,6 +356,8 @@ def _load_entry(command: ScriptCommand, frames: tuple[str, str]) -> dict:
             entry["axes"] = "body"
     if frame.duration_s is not None:
         entry["duration"] = frame.duration_s
+    if frame.slot:
+        entry["slot"] = frame.slot
     return entry
 
 

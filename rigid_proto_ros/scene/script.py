@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base.errors import InputError, did_you_mean
-from ..motion.frames import CONTACT_NAME, FIXED_POINTS, parse_frame, point_text
+from ..motion.frames import CONTACT_NAME, FIXED_POINTS, SLOT_NAME, parse_frame, point_text
 from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
 from .parameters import ZERO, Vector
 from .scenario import nanoseconds
@@ -34,9 +34,9 @@ body would wait.
 """
 
 _FORCES = ("force", "push", "impulse")
-_POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration"}
+_POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration", "slot"}
 _TIMING_KEYS = {"t", "repeat", "every", "jitter", "seed"}
-_WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration"}
+_WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration", "slot"}
 _STRING_KEYS = {"attach", "target"}
 ENTRY_KEYS: Mapping[str, set[str]] = {
     "timing": _TIMING_KEYS,
@@ -187,11 +187,12 @@ def _expand(
 def _poke(entry: dict, t_ns: int, where: str) -> ScriptCommand:
     impulsive = "impulse" in entry or "angular_impulse" in entry
     lasting = "force" in entry or "push" in entry or "torque" in entry
-    if impulsive and (lasting or "duration" in entry):
-        raise InputError(where, sorted(entry), "impulses alone, or force, push and torque with a duration")
+    if impulsive and (lasting or "duration" in entry or "slot" in entry):
+        raise InputError(where, sorted(entry), "impulses alone, or force, push and torque with a duration or slot")
     option = ";impulse" if impulsive else ""
     if "duration" in entry:
         option = f";duration={_number(entry['duration'], f'{where}, duration', 1e-9, MAX_TIME_S)!r}"
+    option += _slot(entry, where)
     frame, force, torque = _wrench_fields(entry, where)
     return ScriptCommand(t_ns, "poke", _checked_frame(frame + option, where), force, torque)
 
@@ -201,7 +202,8 @@ def _expand_wrench(entry: Any, t_ns: int, where: str, wrench_timeout: float, max
         raise InputError(where, entry, "{at, force or push, torque, axes, duration}")
     _check_keys(entry, _WRENCH_KEYS, where)
     frame, force, torque = _wrench_fields(entry, where)
-    first = ScriptCommand(t_ns, "wrench", _checked_frame(frame, where), force, torque)
+    slot = _slot(entry, where)
+    first = ScriptCommand(t_ns, "wrench", _checked_frame(frame + slot, where), force, torque)
     if "duration" not in entry:
         return [first]
     duration_ns = nanoseconds(_number(entry["duration"], f"{where}, duration", 1e-9, MAX_TIME_S))
@@ -213,7 +215,7 @@ def _expand_wrench(entry: Any, t_ns: int, where: str, wrench_timeout: float, max
         times = range(t_ns + every_ns, t_ns + duration_ns, every_ns)
         repeats += [ScriptCommand(t, "wrench", first.frame_id, force, torque) for t in times]
     # The last message holds no axes to misread: no wrench at all.
-    return [*repeats, ScriptCommand(t_ns + duration_ns, "wrench", "world@com")]
+    return [*repeats, ScriptCommand(t_ns + duration_ns, "wrench", f"world@com{slot}")]
 
 
 def _expand_string(entry: Any, t_ns: int, where: str) -> list[ScriptCommand]:
@@ -286,6 +288,14 @@ def _at(at: object, where: str) -> str:
         if word == "ray" and isinstance(value, dict) and set(value) == {"origin", "direction"}:
             return point_text(("ray", *(_vector(value[k], f"{field}, ray, {k}") for k in ("origin", "direction"))))
     raise InputError(field, at, accepted)
+
+
+def _slot(entry: dict, where: str) -> str:
+    if "slot" not in entry:
+        return ""
+    if not isinstance(entry["slot"], str) or not SLOT_NAME.match(entry["slot"]):
+        raise InputError(f"{where}, slot", entry["slot"], "a name of [a-z][a-z0-9_]*, up to 12 characters")
+    return f";slot={entry['slot']}"
 
 
 def _checked_frame(frame: str, where: str) -> str:

@@ -135,6 +135,8 @@ def _load_entry(acting: _Acting, scenario: Scenario, now_ns: int) -> dict | None
         "torque": acting.torque,
         "axes": frame.axes,
     }
+    if frame.slot:
+        entry["slot"] = frame.slot
     if end_ns is not None:
         entry["duration"] = (end_ns - now_ns) / 1e9
     return {"t": 0.0, "wrench": entry} if acting.kind == "wrench" else {"t": 0.0, **entry}

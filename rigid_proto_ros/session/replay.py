@@ -75,6 +75,8 @@ class Resimulation(ScenarioRun):
         node_name: str = "rigid_body",
     ) -> None:
         super().__init__(scenario, observer)
+        # Its own are recorded like all events, and those of recordings from before there were such ones aren't.
+        self.simulation.logs_timeouts = False
         self._mesh_of = mesh_of
         self._changes_ns = -1
         self.node_name = node_name

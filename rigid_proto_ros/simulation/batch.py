@@ -27,7 +27,7 @@ from .quantities import CONTEXT, STATE, begin, which_is_met
 @dataclass
 class Variants:
     """Many variations of one scene. settings (n, SETTINGS), times (n, TIMES), ballast (n, k, 4), constants
-    (CONSTANTS,): simulation/batch_body.py. commands (n, c, 3), loads (n, c, LOAD): simulation/flight.py and
+    (CONSTANTS,): simulation/batch_body.py. commands (n, c, COMMAND), loads (n, c, LOAD): simulation/flight.py and
     motion/loads.py. Those alike in all have one row only.
     """
 
@@ -105,9 +105,9 @@ def _fly(  # noqa: PLR0913
     """One flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
 
     settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods:
-    motion/integrators/stepping.py. commands (c, 3) in the order in which they act and loads (c, LOAD). stops (k, 3):
-    the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled here. tables:
-    arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop held or −1; 0
+    motion/integrators/stepping.py. commands (c, COMMAND) in the order in which they act and loads (c, LOAD).
+    stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
+    here. tables: arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop held or −1; 0
     samples: the simulation must say what is wrong.
     """
     f, n, rows_ns, rows, events = tables
@@ -116,7 +116,6 @@ def _fly(  # noqa: PLR0913
         if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
             return 0, -1
     n[:] = 0
-    n[fl.HELD] = fl.NONE_HELD
     row = f[fl.ROW : fl.ROW + 13]
     if not b.initial_row(settings, row):
         return 0, -1
@@ -131,7 +130,7 @@ def _fly(  # noqa: PLR0913
     n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
     n[fl.CHOOSES] = 1 if chooses else 0
     for c in range(count):
-        rows_ns[c, :3] = commands[c]
+        rows_ns[c, : fl.COMMAND] = commands[c]
         rows[c, :LOAD] = loads[c]
     n[fl.DUE_END] = count
     fl.begin_segment(f, n, rows, methods)

@@ -15,7 +15,7 @@ from enum import IntEnum
 from ..base.errors import CommandRefused
 from ..motion.frames import Frame
 from ..motion.loads import Load, load_of_bytes
-from .flight import CLEAR, HELD_WRENCH, IMPULSE, PULSE
+from .flight import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
 from .setup import Setup
 
 FARTHEST = 1e100
@@ -73,6 +73,18 @@ class WrenchCommand:
         """Of a poke that says how long it lasts, else −1."""
         seconds = self.frame.duration_s
         return -1 if seconds is None else round(seconds * 1e9)
+
+    @property
+    def flight_kind(self) -> int:
+        """What it is to a flight."""
+        return HELD_WRENCH if self.held else IMPULSE if self.frame.impulse else PULSE
+
+    @property
+    def slot(self) -> int:
+        """By which a flight knows what it replaces."""
+        if self.frame.slot:
+            return slot_number(self.frame.slot)
+        return UNNAMED_SLOT if self.held else NO_SLOT
 
     def __post_init__(self) -> None:
         if self.held and (self.frame.impulse or self.frame.duration_s is not None):
@@ -170,6 +182,26 @@ class ReleaseString:
         return {}
 
 
+_SLOT_CHARACTERS = "abcdefghijklmnopqrstuvwxyz0123456789_"
+
+
+def slot_number(name: str) -> int:
+    """A slot's name as an integer: digits of base 38, above the number of the unnamed slot."""
+    number = 0
+    for character in name:
+        number = 38 * number + _SLOT_CHARACTERS.index(character) + 1
+    return number + UNNAMED_SLOT
+
+
+def slot_name(number: int) -> str:
+    """The name of the slot with this number, empty for the unnamed one."""
+    name, number = "", number - UNNAMED_SLOT
+    while number:
+        number, digit = divmod(number, 38)
+        name = _SLOT_CHARACTERS[digit - 1] + name
+    return name
+
+
 def _check_point(field: str, point: Sequence[float]) -> None:
     if not all(math.isfinite(x) for x in point):
         raise CommandRefused("nonfinite", field, list(point), "three finite numbers")
@@ -192,8 +224,8 @@ Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | Releas
 
 @dataclass(slots=True)
 class Pending:
-    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns and row as the
-    flight's tables hold them, the row empty until its load is settled, and the setup under which that was.
+    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns, slot and row as
+    the flight's tables hold them, the row empty until its load is settled, and the setup under which that was.
     """
 
     time_ns: int
@@ -202,6 +234,7 @@ class Pending:
     settled_for: Setup | None = None
     kind: int = CLEAR
     duration_ns: int = -1
+    slot: int = NO_SLOT
     row: bytes = b""
 
     @property
@@ -212,9 +245,4 @@ class Pending:
     def settle(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
         """The load of the command, a wrench or poke, was settled under this setup."""
         self.settled_for, self.row = setup, row
-        if command.held:
-            self.kind = HELD_WRENCH
-        elif command.frame.impulse:
-            self.kind = IMPULSE
-        else:
-            self.kind, self.duration_ns = PULSE, command.duration_ns
+        self.kind, self.duration_ns, self.slot = command.flight_kind, command.duration_ns, command.slot

@@ -48,7 +48,7 @@ METHOD, CHOOSES, SEGMENTS = range(6, 9)  # CHOOSES: by what the segment holds, a
 TAKEN = 9  # steps of the segment, but for those that an adaptive kernel counts
 STEPS_BEFORE, EVALUATIONS_BEFORE = 10, 11
 ACTING = 12  # the loads that act are rows 0 to ACTING − 1, in the order in which they began
-HELD = 13  # which of them is held
+TIMEOUTS = 13  # held wrenches that timed out so far in this call
 DUE, DUE_END = 14, 15  # rows of the commands that are to act next, in their order
 LOAD_IDS = 16  # given so far
 EVENTS = 17  # written so far in this call
@@ -56,11 +56,11 @@ TIED, STRING_BEGIN_NS, STRING_END_NS = 18, 19, 20
 WAITS = 21  # for a kernel, in the middle of a call
 INTEGERS = 22
 
-NONE_HELD = -1
-"""HELD, when no held wrench acts."""
-
 # A row of times. AT_NS: when a command acts, or a load began. DURATION_NS of a pulse: −1 as the setting for pokes says.
-AT_NS, DURATION_NS, KIND, END_NS, ID, TIMES = range(6)
+# SLOT: what acts in the same one is replaced; NO_SLOT replaces nothing.
+AT_NS, DURATION_NS, KIND, SLOT, END_NS, ID, TIMES = range(7)
+COMMAND = 4  # of these say what a command is: AT_NS to SLOT
+NO_SLOT, UNNAMED_SLOT = 0, 1
 HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
 """Kinds of commands."""
 
@@ -70,8 +70,10 @@ LOAD_ROW = LOAD + LOADS_SIZE
 
 # A row of events: something became of a load. ROW_OF: the command's row in the tables.
 EVENT_NS, WHAT, LOAD_ID, ROW_OF, EVENT = range(5)
-APPLIED, BEGAN, ENDED, DONE = range(4)
-"""APPLIED: a command acts, before what it ends and begins. DONE: after that."""
+APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
+"""APPLIED: a command acts, before what it ends and begins. DONE: after that. TIMED_OUT: a held wrench has ended so, and
+ROW_OF is its slot.
+"""
 
 NEVER = 1 << 62
 """Later than any simulated time [ns]."""
@@ -265,12 +267,10 @@ def _write(n: np.ndarray, events: np.ndarray, what: int, load_id: int, row: int)
 
 
 @njit(cache=True, error_model="numpy")
-def _keep(n: np.ndarray, times: np.ndarray, loads: np.ndarray, kept: int, row: int) -> None:
+def _keep(times: np.ndarray, loads: np.ndarray, kept: int, row: int) -> None:
     """Let the load of a row that acts go on as row ``kept``, which is not after it."""
     if kept != row:
         times[kept], loads[kept] = times[row], loads[row]
-        if n[HELD] == row:
-            n[HELD] = kept
 
 
 @njit(cache=True, error_model="numpy")
@@ -279,28 +279,31 @@ def end_due(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndar
     kept = 0
     for row in range(n[ACTING]):
         if times[row, END_NS] > n[NOW_NS]:
-            _keep(n, times, loads, kept, row)
+            _keep(times, loads, kept, row)
             kept += 1
             continue
-        _write(n, events, ENDED, times[row, ID], row)
-        if n[HELD] == row:
-            n[HELD] = NONE_HELD
+        if times[row, KIND] == HELD_WRENCH:
+            _write(n, events, TIMED_OUT, times[row, ID], times[row, SLOT])
+            n[TIMEOUTS] += 1
+        else:
+            _write(n, events, ENDED, times[row, ID], row)
     ended = kept != n[ACTING]
     n[ACTING] = kept
     return ended
 
 
 @njit(cache=True, error_model="numpy")
-def end_held(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray) -> None:
-    """End the held wrench, if there is one."""
-    held = n[HELD]
-    if held == NONE_HELD:
-        return
-    _write(n, events, ENDED, times[held, ID], held)
-    n[HELD] = NONE_HELD
-    for row in range(held + 1, n[ACTING]):
-        _keep(n, times, loads, row - 1, row)
-    n[ACTING] -= 1
+def end_slot(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray, slot: int) -> None:
+    """End what acts in a slot, if anything does."""
+    ended = False
+    for row in range(n[ACTING]):
+        if ended:
+            _keep(times, loads, row - 1, row)
+        elif times[row, SLOT] == slot:
+            _write(n, events, ENDED, times[row, ID], row)
+            ended = True
+    if ended:
+        n[ACTING] -= 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -308,7 +311,7 @@ def end_all(n: np.ndarray, times: np.ndarray, events: np.ndarray) -> None:
     """End everything that acts."""
     for row in range(n[ACTING]):
         _write(n, events, ENDED, times[row, ID], row)
-    n[ACTING], n[HELD] = 0, NONE_HELD
+    n[ACTING] = 0
 
 
 @njit(cache=True, error_model="numpy")
@@ -341,14 +344,14 @@ def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, ev
     elif kind == IMPULSE:
         apply_impulse(loads[row, :LOAD], body, f[ROW : ROW + 13])
         _write(n, events, BEGAN, load_id, row)
-    elif kind == PULSE:
-        duration_ns = times[row, DURATION_NS]
-        _begin(n, times, loads, body, row, n[NOW_NS] + (n[POKE_NS] if duration_ns < 0 else duration_ns))
-        _write(n, events, BEGAN, load_id, row)
     else:
-        end_held(n, times, loads, events)
-        if not is_zero(loads[row, :LOAD]):
-            n[HELD] = n[ACTING]
+        if times[row, SLOT] != NO_SLOT:
+            end_slot(n, times, loads, events, times[row, SLOT])
+        duration_ns = times[row, DURATION_NS]
+        if kind == PULSE:
+            _begin(n, times, loads, body, row, n[NOW_NS] + (n[POKE_NS] if duration_ns < 0 else duration_ns))
+            _write(n, events, BEGAN, load_id, row)
+        elif not is_zero(loads[row, :LOAD]):
             _begin(n, times, loads, body, row, end_of_held(n, n[NOW_NS]))
             _write(n, events, BEGAN, load_id, row)
     _write(n, events, DONE, load_id, row)
@@ -380,7 +383,7 @@ def fly(
     Returns REACHED, FAILED (ROW is the last good state), or NO_KERNEL: then call again with a kernel for METHOD.
     """
     if n[WAITS] == 0:
-        n[EVENTS] = 0
+        n[EVENTS], n[TIMEOUTS] = 0, 0
     while True:
         # 1. Until the next event: full steps, then one shorter step that ends exactly there.
         event_ns = min(next_event_ns(n, times), until_ns)

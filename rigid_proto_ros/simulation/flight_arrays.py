@@ -27,7 +27,7 @@ from .setup import FlightStart, Setup
 FIRST_ROWS = 8
 """Of the tables at first; they double as needed."""
 
-_TIMES = struct.Struct("=5q")
+_TIMES = struct.Struct(f"={fl.TIMES}q")
 _LOAD_BYTES = 8 * fl.LOAD_ROW
 
 # Behind the integers of a flight: how many doubles there are, and where the tables are and of what size.
@@ -44,7 +44,7 @@ def _sizes(rows: int) -> tuple[int, int, int]:
 
 
 class Acting(NamedTuple):
-    """A load that acts from begin_ns until end_ns; held: it is the held wrench."""
+    """A load that acts from begin_ns until end_ns; held: it has a slot, from which it is replaced."""
 
     load: Load
     begin_ns: int
@@ -87,8 +87,8 @@ def _share_anew(at: int) -> int:
     f, n, times, loads, _, _ = _arrays(at)
     for row in range(n[fl.ACTING]):
         share_of(loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], loads[row, fl.SHARE :])
-    if n[fl.HELD] != fl.NONE_HELD:
-        times[n[fl.HELD], fl.END_NS] = fl.end_of_held(n, times[n[fl.HELD], fl.AT_NS])
+        if times[row, fl.KIND] == fl.HELD_WRENCH:
+            times[row, fl.END_NS] = fl.end_of_held(n, times[row, fl.AT_NS])
     return 0
 
 
@@ -164,7 +164,7 @@ class FlightArrays:
         at = 8 * fl.TIMES * head[TABLE_ROWS] + _LOAD_BYTES * first
         for row, pending in enumerate(due, first):
             bytes_of_load = pending.row
-            pack(tables, _TIMES.size * row, pending.time_ns, pending.duration_ns, pending.kind, 0, 0)
+            pack(tables, _TIMES.size * row, pending.time_ns, pending.duration_ns, pending.kind, pending.slot, 0, 0)
             tables[at : at + len(bytes_of_load)] = bytes_of_load
             at += _LOAD_BYTES
         head[fl.DUE], head[fl.DUE_END] = first, last
@@ -183,20 +183,25 @@ class FlightArrays:
     def apply(self) -> None:
         """Apply the command due next, at the time of the flight."""
         n = self.n
-        n[fl.EVENTS] = 0
+        n[fl.EVENTS], n[fl.TIMEOUTS] = 0, 0
         fl.apply(self.f, n, self.times, self.loads, self.events, int(n[fl.DUE]))
         n[fl.DUE] += 1
 
     def end_due(self) -> bool:
         """End what ends at the time of the flight; whether anything did."""
-        self.n[fl.EVENTS] = 0
+        self.n[fl.EVENTS], self.n[fl.TIMEOUTS] = 0, 0
         return fl.end_due(self.n, self.times, self.loads, self.events)
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
-        self._head[fl.EVENTS] = 0
+        self._head[fl.EVENTS] = self._head[fl.TIMEOUTS] = 0
         if self._head[fl.ACTING]:
             fl.end_all(self.n, self.times, self.events)
+
+    @property
+    def has_timeouts(self) -> bool:
+        """Whether held wrenches timed out in the last call."""
+        return self._head[fl.TIMEOUTS] > 0
 
     def last_events(self) -> list[list[int]]:
         """What the last call began and ended: rows (EVENT,)."""
@@ -237,8 +242,8 @@ class FlightArrays:
     def acting(self) -> Iterator[Acting]:
         """The loads that act, in the order in which they began."""
         for row in range(self.n[fl.ACTING]):
-            begin_ns, _, _, end_ns, load_id = self.times[row].tolist()
-            yield Acting(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, row == self.n[fl.HELD])
+            begin_ns, _, _, slot, end_ns, load_id = self.times[row].tolist()
+            yield Acting(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, slot != fl.NO_SLOT)
 
     @property
     def sums(self) -> np.ndarray:

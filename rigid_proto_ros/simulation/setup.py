@@ -89,7 +89,7 @@ class Setup:
         f[fl.COMMON : fl.COMMON + SIZE] = self.problem
         f[fl.ACCURACY], f[fl.DEGREE] = self.accuracy, degree
         n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = self.step_ns, self.wrench_timeout_ns, self.poke_duration_ns
-        n[fl.CHOOSES], n[fl.HELD] = self.integrator.chooses, fl.NONE_HELD
+        n[fl.CHOOSES] = self.integrator.chooses
         # None yet: the first that adapts its steps gets a clean workspace, as every other does.
         n[fl.METHOD] = -1
         methods = method_table(self.integrator, degree)

@@ -36,6 +36,7 @@ from .commands import (
     TieString,
     WrenchCommand,
     order_key,
+    slot_name,
 )
 from .event_log import EventLog, Noted
 from .flight_arrays import FlightArrays
@@ -58,7 +59,8 @@ class Simulation(Readings):
 
     Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
     ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place
-    of the command that acts at this moment in its list, if it is an entry of one.
+    of the command that acts at this moment in its list, if it is an entry of one. ``logs_timeouts``: a held wrench that
+    times out is an event.
     """
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
@@ -70,6 +72,7 @@ class Simulation(Readings):
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
         self.listed: Listed | None = None
+        self.logs_timeouts = True
         check_supported(setup.integrator, needs_of(setup, (), setup.string.attached))
         self._arrays = FlightArrays(setup)
         self._start_over()
@@ -221,7 +224,7 @@ class Simulation(Readings):
             for pending in due[waiting:]:
                 self._push(pending)
             del due[waiting:]
-        if due or self._notifier.wants_loads:
+        if due or self._notifier.wants_loads or arrays.has_timeouts:
             self._tell(due)
         self.time_ns = until_ns if reached else arrays.time_ns
         self.state = State(self.time_ns, arrays.row.copy())
@@ -230,14 +233,16 @@ class Simulation(Readings):
     def _tell(self, due: list[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier = self.observer, self._notifier
-        if not (notifier.wants_loads or observer.wants_events()):
+        if not (notifier.wants_loads or observer.wants_events() or self._arrays.has_timeouts):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
         for now_ns, what, load_id, row in self._arrays.last_events():
             self.time_ns = now_ns
-            if what == fl.ENDED:
+            if what in (fl.ENDED, fl.TIMED_OUT):
                 observer.load_ended(now_ns, load_id)
+                if what == fl.TIMED_OUT and self.logs_timeouts:
+                    self.log("timeout", {"slot": slot_name(row)})
                 continue
             pending = due[row - first]
             command = pending.command

@@ -136,8 +136,8 @@ class Group:
                 scripts.append(None)
                 good[i] = False
         longest = max((len(s.commands) for s in scripts if s), default=0)
-        commands = np.zeros((count, longest, 3), np.int64)
-        commands[:, :] = fl.NEVER, -1, fl.CLEAR
+        commands = np.zeros((count, longest, fl.COMMAND), np.int64)
+        commands[:, :] = fl.NEVER, -1, fl.CLEAR, fl.NO_SLOT
         loads = np.zeros((count, longest, ld.LOAD))
         for i, script in enumerate(scripts):
             if script:

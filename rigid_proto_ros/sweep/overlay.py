@@ -52,11 +52,11 @@ class Overlay:
     commands: list[ScriptCommand]
 
     def rows(self, targets: list[tuple[Target, np.ndarray]], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Commands (n, c, 3) and loads (n, c, LOAD) of ``count`` rows in order of time, and which rows
+        """Commands (n, c, COMMAND) and loads (n, c, LOAD) of ``count`` rows in order of time, and which rows
         have good values (n,).
         """
         size = len(self.commands)
-        commands = np.broadcast_to(self.base.commands, (count, size, 3)).copy()
+        commands = np.broadcast_to(self.base.commands, (count, size, fl.COMMAND)).copy()
         loads = np.broadcast_to(self.base.loads, (count, size, ld.LOAD)).copy()
         good = np.ones(count, bool)
         for target, values in targets:

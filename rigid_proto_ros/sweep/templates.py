@@ -58,7 +58,7 @@ class NotBatchable(Exception):
 
 @dataclass(frozen=True)
 class Script:
-    """Commands in the order in which they act: numbers (n, 3) and loads (n, LOAD) of simulation/flight.py
+    """Commands in the order in which they act: numbers (n, COMMAND) and loads (n, LOAD) of simulation/flight.py
     and motion/loads.py.
     """
 
@@ -156,16 +156,16 @@ class Settler:
     def numbers(self, command: ScriptCommand) -> tuple[list[int], np.ndarray, Load | None]:
         """A command's integers, its load's numbers, and what the integrator has to support of it."""
         if command.kind == "clear_wrench":
-            return [command.t_ns, -1, fl.CLEAR], np.zeros(LOAD), None
+            return [command.t_ns, -1, fl.CLEAR, fl.NO_SLOT], np.zeros(LOAD), None
         if command.kind not in ("wrench", "poke"):
             raise NotBatchable
         frame, settled = self.frame(command.frame_id)
-        held = command.kind == "wrench"
-        WrenchCommand(held, frame, command.force, command.torque, command.t_ns, command.frame_id, b"")
+        own = WrenchCommand(
+            command.kind == "wrench", frame, command.force, command.torque, command.t_ns, command.frame_id, b""
+        )
         load = Load(settled.axes, settled.mesh_point, command.force, command.torque, settled.mesh_normal)
-        kind = fl.HELD_WRENCH if held else fl.IMPULSE if frame.impulse else fl.PULSE
-        duration_ns = -1 if frame.duration_s is None else round(frame.duration_s * 1e9)
-        return [command.t_ns, duration_ns, kind], load.row, None if frame.impulse else load
+        integers = [command.t_ns, own.duration_ns, own.flight_kind, own.slot]
+        return integers, load.row, None if frame.impulse else load
 
 
 def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
@@ -175,6 +175,6 @@ def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, 
     if len(commands) > MAX_COMMANDS:
         raise NotBatchable
     ordered = [settler.numbers(command) for command in commands]
-    integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, 3)
+    integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, fl.COMMAND)
     loads = np.array([row for _, row, _ in ordered]).reshape(-1, LOAD)
     return Script(integers, loads), [load for _, _, load in ordered if load is not None]

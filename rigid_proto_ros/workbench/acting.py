@@ -20,6 +20,7 @@ from ..simulation.commands import (
     TieString,
     WrenchCommand,
 )
+from ..simulation.flight import NO_SLOT
 from ..simulation.setup import Setup
 from ..simulation.string_control import StringControl
 
@@ -47,6 +48,7 @@ class Hit:
 @dataclass(frozen=True)
 class _Acting:
     held: bool
+    slot: int
     load: Load
     text: str
     began_ns: int
@@ -94,8 +96,9 @@ class Acting:
     def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:
         setup, frame, held = scenario.setup, command.frame, command.held
         load = settle(frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), state)
+        if command.slot != NO_SLOT:
+            self._acting = [acting for acting in self._acting if acting.slot != command.slot]
         if held:
-            self._acting = [acting for acting in self._acting if not acting.held]
             lasting_ns = setup.wrench_timeout_ns or 1 << 62
         elif frame.duration_s is None:
             lasting_ns = 0 if frame.impulse else setup.poke_duration_ns
@@ -106,7 +109,7 @@ class Acting:
             seen_ns = round(SHOWN_AT_LEAST_NS * (scenario.parameters.real_time_factor or 1.0))
             until_ns = time_ns + (lasting_ns if held else max(lasting_ns, seen_ns))
             text = _strength_text(command.force, frame.impulse)
-            self._acting.append(_Acting(held, load, text, time_ns, until_ns))
+            self._acting.append(_Acting(held, command.slot, load, text, time_ns, until_ns))
 
     def string_ends(self, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray] | None:
         """Knot and free end (3,) in the world, or None."""

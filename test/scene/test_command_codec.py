@@ -39,7 +39,9 @@ points = st.one_of(
     st.tuples(st.just("point"), triples),
     st.tuples(st.just("ray"), triples, triples.filter(any)),
 )
-options = st.one_of(st.just({}), st.just({"impulse": True}), st.floats(1e-9, 1e9).map(lambda s: {"duration_s": s}))
+slots = st.sampled_from([{}, {"slot": "left"}, {"slot": "a_1"}])
+lasting = st.floats(1e-9, 1e9).map(lambda s: {"duration_s": s})
+options = st.one_of(slots, st.just({"impulse": True}), st.builds(lambda a, b: a | b, lasting, slots))
 values = st.one_of(numbers, st.booleans(), st.integers(-(10**9), 10**9), st.sampled_from(["rk4", "on", "1e3", ""]))
 changes = st.dictionaries(
     st.sampled_from(["mass", "gravity", "string.target", "integrator", "ballast.nut"]),
@@ -57,7 +59,7 @@ def loads(draw) -> ScriptCommand:
     force, torque = draw(triples), draw(triples)
     if axes == "normal":
         force, torque = (force[0], 0.0, 0.0), (0.0, 0.0, 0.0)
-    frame = Frame(axes, point, **({} if held else draw(options)))
+    frame = Frame(axes, point, **draw(slots if held else options))
     return ScriptCommand(draw(times), "wrench" if held else "poke", frame.text, force, torque)
 
 

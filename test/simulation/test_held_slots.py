@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""Several held wrenches: each slot is replaced and timed out by itself, offline and recorded."""
+
+import json
+
+import pytest
+from flights import SECOND
+
+from rigid_proto_ros.base.errors import CommandRefused, InputError
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.scene.command_codec import entry_of
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.session.replay import Resimulation
+from rigid_proto_ros.simulation.commands import slot_name, slot_number
+from rigid_proto_ros.simulation.observer import Observer
+
+SCENE = {"mesh": "t_handle", "mass": 1.0, "publish_rate": 10.0}
+SCRIPT = """
+- {t: 0.0, wrench: {force: [1, 0, 0], slot: left}}
+- {t: 0.0, wrench: {force: [0, 2, 0], slot: right}}
+- {t: 0.0, wrench: {force: [0, 0, 4]}}
+- {t: 1.0, wrench: {force: [3, 0, 0], slot: left}}
+- {t: 1.0, wrench: {force: [0, 0, 0]}}
+"""
+
+
+class Lines(Observer):
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def event(self, _time_ns: int, line: str) -> None:
+        self.lines.append(line)
+
+
+def flown(script: str = SCRIPT, until_s: float = 4.0, **scene) -> tuple[OfflineRun, Lines]:
+    lines = Lines()
+    run = OfflineRun(make_scenario({**SCENE, **scene}), parse_script(script), lines)
+    run.advance(round(until_s * 1e9))
+    return run, lines
+
+
+def test_each_slot_is_replaced_and_timed_out_by_itself() -> None:
+    run, _ = flown()
+    # left: 1 N for 1 s, then 3 N for the timeout of 1.5 s; right: 2 N for 1.5 s; the unnamed one 4 N for 1 s.
+    assert run.simulation.state.linear_velocity == pytest.approx([1.0 + 4.5, 3.0, 4.0], rel=1e-12)
+
+
+def test_a_held_wrench_that_times_out_is_an_event_and_one_that_is_replaced_is_none() -> None:
+    _, told = flown()
+    timeouts = [(e["time_ns"], e["content"]) for e in map(json.loads, told.lines) if e["kind"] == "timeout"]
+    assert timeouts == [(1_500_000_000, {"slot": "right"}), (2_500_000_000, {"slot": "left"})]
+
+
+def test_the_chain_of_events_is_the_same_whether_anybody_listens() -> None:
+    _, told = flown()
+    alone = OfflineRun(make_scenario(SCENE), parse_script(SCRIPT))
+    alone.advance(4 * SECOND)
+    assert alone.simulation.events.sha256 == json.loads(told.lines[-1])["sha256"]
+
+
+@pytest.mark.parametrize("timeouts_recorded", [True, False])
+def test_slots_replay_to_the_bit_also_from_recordings_without_timeouts(timeouts_recorded: bool) -> None:
+    run, told = flown()
+    recorded = [line for line in told.lines if timeouts_recorded or '"timeout"' not in line]
+    again_told = Lines()
+    again = Resimulation(make_scenario(SCENE), recorded, again_told)
+    row = again.advance(4 * SECOND)
+    assert row.tobytes() == run.simulation.state.row.tobytes()
+    assert len(again_told.lines) == len(recorded)
+    assert not timeouts_recorded or again_told.lines == told.lines
+
+
+def test_clear_wrench_ends_all_slots() -> None:
+    run, told = flown(SCRIPT + "- {t: 1.25, service: clear_wrench}\n")
+    assert run.simulation.state.linear_velocity == pytest.approx([1.0 + 0.75, 2.5, 4.0], rel=1e-12)
+    assert not any('"timeout"' in line for line in told.lines)
+
+
+def test_a_poke_in_a_slot_replaces_what_acts_there() -> None:
+    poke = "- {t: 0.5, force: [0, 8, 0], duration: 0.25, slot: right}\n"
+    run, _ = flown(SCRIPT + poke)
+    assert run.simulation.state.linear_velocity[1] == pytest.approx(1.0 + 2.0, rel=1e-12)
+
+
+def test_slots_have_a_number_each() -> None:
+    names = ["a", "z", "a_b", "a0", "left", "z" * 12, "a" * 12, "z___________"]
+    assert [slot_name(slot_number(name)) for name in names] == names
+    assert slot_name(slot_number("")) == ""
+    assert max(map(slot_number, names)) < 2**63
+
+
+@pytest.mark.parametrize(
+    "frame", ["body;slot=", "body;slot=Left", "body;slot=a;slot=b", "body;impulse;slot=a", f"body;slot={'a' * 13}"]
+)
+def test_what_is_no_slot_is_refused(frame: str) -> None:
+    with pytest.raises(CommandRefused, match="slot"):
+        parse_frame(frame)
+
+
+def test_an_entry_keeps_its_slot_and_a_wrong_one_is_named() -> None:
+    (command,) = parse_script("[{t: 0, wrench: {force: [0, 0, 1], slot: left}}]")
+    assert command.frame_id == "world@com;slot=left"
+    assert entry_of(command) == {"wrench": {"at": "com", "force": [0.0, 0.0, 1.0], "slot": "left"}}
+    with pytest.raises(InputError, match="slot"):
+        parse_script("[{t: 0, wrench: {force: [0, 0, 1], slot: 3}}]")
+
+
+def test_a_wrench_that_ends_by_its_duration_ends_its_own_slot() -> None:
+    run, _ = flown("- {t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}\n- {t: 0, wrench: {force: [0, 1, 0]}}\n")
+    assert run.simulation.state.linear_velocity == pytest.approx([2.0, 1.5, 0.0], rel=1e-12)
