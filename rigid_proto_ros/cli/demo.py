@@ -59,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
     if not 3.0 <= args.duration <= 3600.0:
         raise InputError("--duration", args.duration, "seconds from 3 to 3600")
+    node_executable, client_executable = own_executable("rigid_body_node"), own_executable("poke_client")
     args.out.mkdir(parents=True, exist_ok=True)
     session = args.out / "session.rrd"
     if args.mesh:
@@ -72,11 +73,11 @@ def run(args: argparse.Namespace) -> int:
     until_s = max(args.duration, read_script(script)[-1].t_ns * 1e-9 + CONFIRM_S)
     with Processes() as processes:
         node = processes.start(
-            [*own_executable("rigid_body_node"), "--until", repr(until_s), "--ros-args", "--params-file", str(scene)]
+            [*node_executable, "--until", repr(until_s), "--ros-args", "--params-file", str(scene)]
             + [*text_parameter("record", str(session.resolve())), "-p", "start_paused:=true"]
         )
         print(f"2. poke_client --reset {script}", flush=True)
-        client = processes.start([*own_executable("poke_client"), str(script), "--reset", "--timeout", "0"])
+        client = processes.start([*client_executable, str(script), "--reset", "--timeout", "0"])
         status = _wait_for_flight(node, client, until_s)
         if status != 0:
             print(f"rigid_proto demo: poke_client ended with status {status}", file=sys.stderr)

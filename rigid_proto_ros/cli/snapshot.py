@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import tempfile
 from pathlib import Path
 
@@ -49,6 +50,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]) -> None:
+    for module, package in (("rerun", "rerun-sdk"), ("PIL", "pillow")):
+        if importlib.util.find_spec(module) is None:
+            raise InputError("snapshot", f"the package {package} is missing: pip install {package}")
     from ..rerun_view.snapshot import take_picture
 
     with Progress("drawing") as progress:

@@ -27,7 +27,9 @@ def run(args: argparse.Namespace) -> int:
     """Become the node: signals reach it directly."""
     from ..scene.offline import read_scene
     from ..scene.scene_file import scene_file
-    from .processes import text_parameter
+    from .processes import own_executable, text_parameter
+
+    own_executable("rigid_body_node")
 
     overrides = text_parameter("mesh", args.mesh) if args.mesh else []
     scenario = read_scene(args.scene, {"mesh": args.mesh} if args.mesh else {})

@@ -107,8 +107,8 @@ def _fly(  # noqa: PLR0913
     settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods:
     motion/integrators/stepping.py. commands (c, COMMAND) in the order in which they act and loads (c, LOAD).
     stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
-    here. tables: arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop held or −1; 0
-    samples: the simulation must say what is wrong.
+    here. tables: arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop
+    held or −1; 0 samples: the simulation must say what is wrong.
     """
     f, n, rows_ns, rows, events = tables
     count = commands.shape[0]

@@ -8,6 +8,7 @@ import importlib.util
 import pytest
 
 from rigid_proto_ros.cli import executables
+from rigid_proto_ros.cli.main import main
 
 START = {name: getattr(executables, name) for name in ("rigid_proto", "rigid_body_node", "poke_client")}
 
@@ -32,3 +33,21 @@ def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(pro
     assert START[program]() == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "/opt/ros/" in line and "rigid_proto_ros[ros]" in line
+
+
+@pytest.mark.parametrize(
+    ("command", "package", "named"),
+    [
+        (["up"], "rclpy", "rigid_proto_ros[ros]"),
+        (["demo"], "rclpy", "rigid_proto_ros[ros]"),
+        (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "PIL", "pip install pillow"),
+        (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "rerun", "pip install rerun-sdk"),
+    ],
+)
+def test_a_command_without_its_package_names_it_in_one_line_and_does_nothing(
+    command, package, named, monkeypatch, capsys
+) -> None:
+    without(monkeypatch, package)
+    assert main(command) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and len(told.err.splitlines()) == 1 and named in told.err
