@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import MeshError
+from ..mesh.crossing import self_crossings
 from ..mesh.nesting import Nesting, component_nesting
 from ..mesh.planarity import polygon_planarity
-from ..mesh.self_crossing import self_crossings
 from ..mesh.topology import Components, Topology, component_sums, joined_sets, mesh_topology, referenced_extent
 from ..mesh.union import can_unite, counted_once, united_volume
 from .moments import solid_moments

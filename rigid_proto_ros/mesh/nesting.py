@@ -15,12 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
+from .crossing import crossing_components
 from .tree import LEAF, triangle_tree
 
 WORK_LIMIT = 100_000_000
-"""Boxes and triangles visited after which nesting or crossing is left undecided and said to be so: about
-a second of work.
-"""
+"""Boxes and triangles visited after which nesting is left undecided and said to be so: about a second of work."""
 SAMPLES = 24
 """Points of a component, inside evenly picked triangles, of which it is asked whether they lie inside another one."""
 NEAR = 1e-9
@@ -201,84 +200,6 @@ def _sides(  # noqa: PLR0913 - a kernel
     return outside, inside, undecided
 
 
-@njit(cache=True, nogil=True)
-def _segment_crosses(p: np.ndarray, q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
-    """Whether segment p q passes properly through triangle a b c; touching and coplanar cases don't count."""
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    span = abs(ux) + abs(uy) + abs(uz) + abs(wx) + abs(wy) + abs(wz)
-    margin = 1e-9 * size * span
-    dp = (p[0] - a[0]) * nx + (p[1] - a[1]) * ny + (p[2] - a[2]) * nz
-    dq = (q[0] - a[0]) * nx + (q[1] - a[1]) * ny + (q[2] - a[2]) * nz
-    if not ((dp > margin and dq < -margin) or (dp < -margin and dq > margin)):
-        return False
-    s = dp / (dp - dq)
-    x, y, z = p[0] + s * (q[0] - p[0]) - a[0], p[1] + s * (q[1] - p[1]) - a[1], p[2] + s * (q[2] - p[2]) - a[2]
-    # Barycentric coordinates from the areas against the normal.
-    n2 = size * size
-    beta = ((y * wz - z * wy) * nx + (z * wx - x * wz) * ny + (x * wy - y * wx) * nz) / n2
-    gamma = ((uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz) / n2
-    return beta > 1e-9 and gamma > 1e-9 and beta + gamma < 1.0 - 1e-9
-
-
-@njit(cache=True, nogil=True)
-def triangles_cross(vertices: np.ndarray, s: np.ndarray, t: np.ndarray) -> bool:
-    """Whether two triangles (3,) pass properly through each other; touching and coplanar ones don't."""
-    for k in range(3):
-        if _segment_crosses(vertices[s[k]], vertices[s[(k + 1) % 3]], vertices[t[0]], vertices[t[1]], vertices[t[2]]):
-            return True
-        if _segment_crosses(vertices[t[k]], vertices[t[(k + 1) % 3]], vertices[s[0]], vertices[s[1]], vertices[s[2]]):
-            return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _crossing_pairs(
-    vertices: np.ndarray,
-    triangles: np.ndarray,
-    component: np.ndarray,
-    order: np.ndarray,
-    boxes: np.ndarray,
-    near: np.ndarray,
-    found: np.ndarray,
-    limit: int,
-) -> bool:
-    """Mark pairs of components whose triangles cross in found (k, k); False when ``limit`` visits didn't suffice."""
-    leaves = (len(boxes) + 1) // 2
-    stack = np.empty(64, np.int64)
-    box = np.empty(6)
-    visits = 0
-    for i in range(len(order)):
-        s, own = triangles[order[i]], component[order[i]]
-        for k in range(3):
-            x, y, z = vertices[s[0], k], vertices[s[1], k], vertices[s[2], k]
-            box[k], box[3 + k] = min(x, y, z), max(x, y, z)
-        stack[0], top = 0, 1
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            visits += 1
-            if visits > limit:
-                return False
-            apart = False
-            for k in range(3):
-                apart = apart or boxes[node, k] > box[3 + k] or boxes[node, 3 + k] < box[k]
-            if apart:
-                continue
-            if node < leaves - 1:
-                stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
-                top += 2
-                continue
-            first = (node - leaves + 1) * LEAF
-            for j in range(max(first, i + 1), min(first + LEAF, len(order))):
-                other = component[order[j]]
-                if near[own, other] and not found[own, other] and triangles_cross(vertices, s, triangles[order[j]]):
-                    found[own, other] = found[other, own] = True
-    return True
-
-
 @dataclass(frozen=True)
 class Nesting:
     """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. decided (k,)
@@ -319,7 +240,8 @@ def component_nesting(
     )
     found = (outside > 0) & (within > 0)
     found |= found.T
-    complete = bool(_crossing_pairs(vertices, triangles, component, leaf_order, boxes, near, found, WORK_LIMIT))
+    crossing, complete = crossing_components(vertices, triangles, component, leaf_order, boxes, near & ~found)
+    found |= crossing
     inside = (within > 0) & (outside == 0) & ~found & ~undecided[:, None]
-    crossing = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))
-    return Nesting(inside, crossing, ~undecided, complete and not undecided.any())
+    pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))
+    return Nesting(inside, pairs, ~undecided, bool(complete and not undecided.any()))

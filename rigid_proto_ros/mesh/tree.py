@@ -16,31 +16,57 @@ LEAF = 4
 """Triangles in a leaf: fewer cost more boxes, more cost tests in vain."""
 
 
-@njit(cache=True, nogil=True)
-def _spread(value: np.uint64) -> np.uint64:
-    """The 21 low bits of a number with two zeros between each."""
-    x = (value | (value << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
-    x = (x | (x << np.uint64(16))) & np.uint64(0x1F0000FF0000FF)
-    x = (x | (x << np.uint64(8))) & np.uint64(0x100F00F00F00F00F)
-    x = (x | (x << np.uint64(4))) & np.uint64(0x10C30C30C30C30C3)
-    return (x | (x << np.uint64(2))) & np.uint64(0x1249249249249249)
+_CELLS_BITS = 11
+"""Bits of a centre's place along each axis: 2048 cells."""
 
 
 @njit(cache=True, nogil=True)
-def _codes(
-    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray, low: np.ndarray, size: np.ndarray
-) -> np.ndarray:
-    codes = np.empty(len(chosen), np.uint64)
+def _spread(cell: int) -> int:
+    """The 11 low bits of a number with two zeros between each."""
+    x = (cell | (cell << 16)) & 0x70000FF
+    x = (x | (x << 8)) & 0x700F00F
+    x = (x | (x << 4)) & 0x430C30C3
+    return (x | (x << 2)) & 0x49249249
+
+
+@njit(cache=True, nogil=True)
+def _along_curve(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The numbers ``chosen`` (k,) of triangles by the place of their centres on the curve, sorted digit by digit."""
+    cells = 1 << _CELLS_BITS
+    low, size = np.full(3, np.inf), np.full(3, -np.inf)
     for i in range(len(chosen)):
-        code = np.uint64(0)
+        for corner in range(3):
+            for k in range(3):
+                x = vertices[triangles[chosen[i], corner], k]
+                low[k], size[k] = min(low[k], x), max(size[k], x)
+    size -= low
+    codes = np.empty(len(chosen), np.int64)
+    counts = np.zeros((3, cells), np.int64)
+    for i in range(len(chosen)):
+        code = 0
         for k in range(3):
             centre = 0.0
             for corner in range(3):
                 centre += (vertices[triangles[chosen[i], corner], k] - low[k]) / 3.0
-            cell = centre / size[k] * 2097151.0 if size[k] > 0.0 else 0.0
-            code |= _spread(np.uint64(min(max(cell, 0.0), 2097151.0))) << np.uint64(k)
+            cell = centre / size[k] * cells if size[k] > 0.0 else 0.0
+            code |= _spread(min(max(int(cell), 0), cells - 1)) << k
         codes[i] = code
-    return codes
+        for digit in range(3):
+            counts[digit, (code >> (_CELLS_BITS * digit)) & (cells - 1)] += 1
+    order, sorted_codes = chosen.astype(np.int64), np.empty_like(codes)
+    other = np.empty_like(order)
+    for digit in range(3):
+        start = 0
+        for cell in range(cells):
+            start, counts[digit, cell] = start + counts[digit, cell], start
+        for i in range(len(order)):
+            place = (codes[i] >> (_CELLS_BITS * digit)) & (cells - 1)
+            to = counts[digit, place]
+            counts[digit, place] += 1
+            other[to], sorted_codes[to] = order[i], codes[i]
+        order, other = other, order
+        codes, sorted_codes = sorted_codes, codes
+    return order
 
 
 @njit(cache=True, nogil=True)
@@ -67,10 +93,7 @@ def triangle_tree(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarra
     """(order, boxes) of the triangles numbered ``chosen`` (k,): their order (k,) along the curve, leaf after leaf, and
     the nodes' boxes (2·leaves − 1, 6), lower and upper corner; leaf l is node leaves − 1 + l.
     """
-    points = vertices[triangles[chosen].ravel()]
-    low = points.min(axis=0)
-    codes = _codes(vertices, triangles, chosen, low, points.max(axis=0) - low)
-    order = chosen[np.argsort(codes, kind="stable")]
+    order = _along_curve(vertices, triangles, chosen)
     leaves = 1
     while leaves * LEAF < len(order):
         leaves *= 2

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""The search for triangles that pass through each other finds those that exact arithmetic finds."""
+
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+
+from rigid_proto_ros.mesh.crossing import crossing_components, self_crossings
+from rigid_proto_ros.mesh.tree import triangle_tree
+
+
+def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether a side of one triangle (3, 3) passes through the inside of the other, in rational arithmetic."""
+    if np.any(first.min(axis=0) > second.max(axis=0)) or np.any(second.min(axis=0) > first.max(axis=0)):
+        return False
+    p, q = ([[Fraction(x) for x in corner] for corner in triangle.tolist()] for triangle in (first, second))
+
+    def volume(a, b, c, d):
+        (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = ([x - y for x, y in zip(e, a, strict=True)] for e in (b, c, d))
+        return ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx)
+
+    def pierces(a, b, t):
+        if volume(*t, a) * volume(*t, b) >= 0:
+            return False
+        sides = [volume(a, b, t[k], t[(k + 1) % 3]) > 0 for k in range(3)]
+        return all(sides) or not any(sides)
+
+    return any(pierces(s[k], s[(k + 1) % 3], t) for s, t in ((p, q), (q, p)) for k in range(3))
+
+
+def soup(count: int, seed: int) -> np.ndarray:
+    """Corners (3 count, 3) of triangles of all sizes, some long and thin, in a unit cube."""
+    random = np.random.default_rng(seed)
+    size = (
+        10.0 ** random.uniform(-1.2, -0.2, (count, 1, 1)) * np.array([[[1.0]], [[0.05]]])[random.integers(0, 2, count)]
+    )
+    return (random.uniform(size=(count, 1, 3)) + size * random.normal(size=(count, 3, 3))).reshape(-1, 3)
+
+
+def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
+    count = 100
+    points = soup(count, 3)
+    corners = np.arange(3 * count).reshape(-1, 3)
+    pairs = [pair for pair in combinations(range(count), 2) if exactly_cross(*points[corners[list(pair)]])]
+    assert len(pairs) > 50
+    assert self_crossings(points, corners, np.zeros(count, np.int64)) == len(pairs)
+    # Between components only whether any two cross is asked, and only of those marked.
+    component = np.random.default_rng(4).integers(0, 40, count)
+    asked = np.triu(np.random.default_rng(5).uniform(size=(40, 40)) < 0.5, 1)
+    asked |= asked.T
+    expected = np.zeros((40, 40), dtype=bool)
+    for i, j in pairs:
+        expected[component[i], component[j]] = expected[component[j], component[i]] = True
+    found, complete = crossing_components(
+        points, corners, component, *triangle_tree(points, corners, np.arange(count)), asked
+    )
+    assert complete and np.array_equal(found, expected & asked)
+    assert found.any() and not found.all()
+
+
+def test_triangles_that_share_a_corner_do_not_cross():
+    # The second passes through the first from their common corner's other side: a fold, no crossing.
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0.2, 1.0], [0.4, 0.3, -1.0]], dtype=float)
+    corners = np.array([[0, 1, 2], [0, 3, 4]])
+    assert self_crossings(points, corners, np.zeros(2, np.int64)) == 0
+    apart = np.array([[0, 1, 2], [5, 3, 4]])
+    points = np.concatenate([points, [[0.05, 0.05, 0.0]]])
+    assert self_crossings(points, apart, np.zeros(2, np.int64)) == 1
+
+
+def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
+    points = soup(1000, 7)
+    corners = np.arange(3000).reshape(-1, 3)
+    chosen = np.arange(0, 1000, 3)
+    order, boxes = triangle_tree(points, corners, chosen)
+    assert sorted(order.tolist()) == chosen.tolist()
+    leaves = (len(boxes) + 1) // 2
+    for place, triangle in enumerate(order.tolist()):
+        node = leaves - 1 + place // 4
+        while True:
+            assert np.all(boxes[node, :3] <= points[corners[triangle]]) and np.all(
+                points[corners[triangle]] <= boxes[node, 3:]
+            )
+            if node == 0:
+                break
+            node = (node - 1) // 2
