@@ -2,7 +2,7 @@
 """Lessons: the bundled scenes, each with a title, three sentences of what to try and what to see, and why.
 
 All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the three
-sentences, the reason, and how to fly it. Pages and documents take it from there.
+sentences, the reason, and how to run it. Pages and documents take it from there.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SENTENCES = 3
 
 @dataclass(frozen=True)
 class Lesson:
-    """name: of the scene. sentences: what to try and what to see. reason: why, in a paragraph. commands: how to fly it.
+    """name: of the scene. sentences: what to try and what to see. reason: why, in a paragraph. commands: how to run it.
     script: name of the bundled example that goes with it, or empty.
     """
 
@@ -52,7 +52,7 @@ def read_lesson(path: Path) -> Lesson:
         head.append(line.removeprefix("#").strip())
     paragraphs = [" ".join(part.split("\n")) for part in "\n".join(head).split("\n\n")]
     if len(paragraphs) < 5:
-        accepted = "a comment of five paragraphs: licence, title, three sentences, reason, how to fly it"
+        accepted = "a comment of five paragraphs: licence, title, three sentences, reason, how to run it"
         raise InputError(str(path), f"{len(paragraphs)} paragraphs", accepted)
     _, title, trials, *reasons, commands = paragraphs
     sentences = tuple(re.split(r"(?<=[.!?]) (?=[A-Z])", trials))

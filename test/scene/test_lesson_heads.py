@@ -27,7 +27,7 @@ def test_a_scene_without_a_lessons_head_is_told_what_is_missing(tmp_path) -> Non
     with pytest.raises(InputError, match="scene"):
         lesson("no_such")
     path = tmp_path / "x.yaml"
-    path.write_text("# SPDX\n#\n# Title\n#\n# One. Two.\n#\n# Why.\n#\n# Fly it.\nrigid_body: {}\n")
+    path.write_text("# SPDX\n#\n# Title\n#\n# One. Two.\n#\n# Why.\n#\n# Run it.\nrigid_body: {}\n")
     with pytest.raises(InputError, match="2 sentences"):
         read_lesson(path)
     path.write_text("# Title\nrigid_body: {}\n")
