@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any, NoReturn
 
-from .errors import did_you_mean
+from .errors import did_you_mean, one_of
 
 NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
 """argparse knows no exponents and takes -2e-4 for an option."""
@@ -78,7 +78,6 @@ class Parser(argparse.ArgumentParser):
         if action.choices is None or value in action.choices:
             return
         known = [str(choice) for choice in action.choices]
-        hint = did_you_mean(str(value), known)
-        raise argparse.ArgumentError(
-            action, " ".join(filter(None, [f"no {value!r};", hint, f"one of {', '.join(known)}"]))
-        )
+        if action.metavar == "COMMAND":
+            raise argparse.ArgumentError(None, f"there is no command {value!r}; {one_of(str(value), known)}")
+        raise argparse.ArgumentError(action, f"there is no {value!r}; {one_of(str(value), known)}")

@@ -45,6 +45,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def one_of(name: str, known: Iterable[str]) -> str:
-    """What is accepted instead of ``name``: the nearest known name first, then all of them."""
+    """What is accepted instead of ``name``: all known names, and the nearest one again."""
     known = list(known)
-    return " ".join(filter(None, [did_you_mean(name, known), f"one of {', '.join(known)}"]))
+    return "; ".join(filter(None, [f"one of {', '.join(known)}", did_you_mean(name, known)]))

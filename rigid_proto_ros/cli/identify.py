@@ -123,7 +123,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
     for name in names:
         path = Path(name)
         if not path.exists():
-            raise InputError("session", name, "a recording (.rrd or .mcap) or the folder of a bag")
+            raise InputError("session", f"there is no file and no folder {name!r}")
         runs = []
         if not choice.topics and (not is_bag(path) or has_scene(path)):
             runs = [run for run in read_runs(path) if is_own_session(run)]

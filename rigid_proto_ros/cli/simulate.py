@@ -165,4 +165,6 @@ def _print_summary(result: dict, recordings: list[str]) -> None:
     ]
     table(rows)
     for file in recordings:
-        line(("recorded", "bold"), f" {file}; show it with: rigid_proto replay {file}")
+        bag = Path(file).suffix == ".mcap"
+        show = f"rigid_proto replay {file} --record {Path(file).with_suffix('.rrd')}" if bag else f"rerun {file}"
+        line(("recorded", "bold"), f" {file}; {'for Rerun' if bag else 'show it with'}: {show}")

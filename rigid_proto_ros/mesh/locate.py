@@ -89,6 +89,8 @@ def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
     """
     try:
         return _found_mesh(name, search)
+    except MeshError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         # a name too long or with a NUL, a folder that may not be read, a user's home unknown
         reason = getattr(error, "strerror", None) or str(error).rstrip(".")

@@ -12,7 +12,7 @@ import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from ..base.errors import CommandRefused
+from ..base.errors import CommandRefused, did_you_mean
 from ..base.rotation import Vector, vector
 
 AXES = ("world", "body", "normal")
@@ -115,6 +115,7 @@ def _parse_point(part: str, text: str, contacts: Collection[str], axes_words: It
     accepted = f"{', '.join(axes_words)}{', ' if axes_words else ''}{POINT_FORMS}"
     if contacts:
         accepted += f" (contacts: {_names(contacts)})"
+        accepted = "; ".join(filter(None, [accepted, did_you_mean(part, contacts)]))
     raise CommandRefused("frame", "frame_id", text, accepted)
 
 

@@ -23,7 +23,7 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
     """
     path = Path(path)
     if not path.exists():
-        raise InputError("session", str(path), "an .rrd or .mcap recording, or the folder of a bag")
+        raise InputError("session", f"there is no file and no folder {str(path)!r}")
     if not is_bag(path):
         return [_rerun_reader(path).read_session(path)]
     bags = _bag_reader(path)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from ..base.errors import InputError
+from ..base.errors import InputError, one_of
 from ..base.output_file import output_file
 from ..session.recorded_session import RecordedSession
 from . import entities as e
@@ -205,7 +205,7 @@ def bring_to_front(client: Any, name: str) -> str | None:
     wanted = FORMER_NAMES.get(wanted, wanted)
     path = next((path for path, called in found if called.lower() == wanted), None)
     if path is None:
-        raise InputError("--view", name, "one of " + ", ".join(sorted({called for _, called in found})))
+        raise InputError("--view", name, one_of(name, sorted({called for _, called in found})))
     for parent, child in zip(path[:-1], path[1:], strict=True):
         container = blueprint["/" + parent]["ContainerBlueprint"]
         if container["container_kind"] == "Tabs":

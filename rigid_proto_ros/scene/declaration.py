@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, did_you_mean
 
 LIVE, AT_RESET, READ_ONLY = "live", "at the next reset", "read-only"
 
@@ -72,7 +72,8 @@ class Parameter:
         """
         converted = _CONVERSIONS[self.type](value)
         if converted is None or not self._within_bounds(converted):
-            raise InputError(self.name, _shown(value), self.accepted)
+            hint = did_you_mean(str(value), filter(None, self.choices))
+            raise InputError(self.name, _shown(value), "; ".join(filter(None, [self.accepted, hint])))
         return converted
 
     def _within_bounds(self, value: Value) -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..base.bundled import example_names, example_path, study_names, study_path
-from ..base.errors import InputError
+from ..base.errors import InputError, did_you_mean
 from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_values
 from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
@@ -135,7 +135,11 @@ def study_file(name: str) -> Path:
     if not path.is_file() and "/" not in name and name.removesuffix(".yaml") in study_names():
         return study_path(name.removesuffix(".yaml"))
     if not path.is_file():
-        raise InputError("study", name, f"a study file, or one of the bundled {', '.join(study_names()) or 'none'}")
+        hint = did_you_mean(path.stem, study_names())
+        known = f"the bundled studies are {', '.join(study_names()) or 'none'}"
+        raise InputError(
+            "study", f"there is no file and no bundled study {name!r}; {' '.join(filter(None, [hint, known]))}"
+        )
     return path
 
 
