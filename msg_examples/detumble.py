@@ -11,17 +11,16 @@ import argparse
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.client import Client
 from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool, Trigger
 
-# Torques along the corners of a tetrahedron: one-sided thrusters reach every direction, and all alike give none.
-CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]).T
+# thrusters.a to d of config/t_handle.yaml: their torques are along the corners of a tetrahedron, so that one-sided
+# thrusters reach every direction.
 POINTS = np.array([[0, -1, 1], [0, 1, -1], [0, 1, 1], [0, -1, -1]]).T * 0.05  # m from the COM, body axes
-FORCES = np.cross(CORNERS, POINTS, axis=0)
-FORCES = FORCES / np.linalg.norm(FORCES, axis=0)  # directions, body axes
+FORCES = np.array([[2, -1, -1], [2, 1, 1], [2, 1, -1], [2, -1, 1]]).T / 6**0.5  # directions, body axes
 TORQUES = np.cross(POINTS, FORCES, axis=0)  # N m per newton of thrust
 MAX_THRUST = 0.1  # N
 STIFFNESS, DAMPING = 1.5e-3, 1e-3  # N m, N m s: about 3 rad/s and well damped for moments of 1e-4 kg m²
@@ -38,16 +37,16 @@ def thrusts(odometry: Odometry) -> np.ndarray:
 
 
 class Controller(Node):
-    """Answers states of a rigid_body node with the wrench of the thrusters."""
+    """Answers states of a rigid_body node with what the thrusters are to push with."""
 
     def __init__(self, target: str) -> None:
         super().__init__("detumble")
         self.state: Odometry | None = None
         self.create_subscription(Odometry, f"{target}/odom", self.on_state, 10)
-        self.wrench = self.create_publisher(WrenchStamped, f"{target}/wrench", 10)
+        self.thrusters = self.create_publisher(Float64MultiArray, f"{target}/thrusters", 10)
         self.reset, self.step = (self.create_client(Trigger, f"{target}/{name}") for name in ("reset", "step"))
         self.pause = self.create_client(SetBool, f"{target}/pause")
-        while not self.wrench.get_subscription_count():
+        while not self.thrusters.get_subscription_count():
             rclpy.spin_once(self, timeout_sec=0.1)
 
     def on_state(self, state: Odometry) -> None:
@@ -69,13 +68,8 @@ class Controller(Node):
             raise SystemExit(f"{client.srv_name}: {future.result().message}")
 
     def answer(self) -> None:
-        """Publish the wrench that answers the newest state."""
-        thrust, message = thrusts(self.state), WrenchStamped()
-        message.header.frame_id = "body"
-        force, torque = message.wrench.force, message.wrench.torque
-        force.x, force.y, force.z = (FORCES @ thrust).tolist()
-        torque.x, torque.y, torque.z = (TORQUES @ thrust).tolist()
-        self.wrench.publish(message)
+        """Publish the forces that answer the newest state."""
+        self.thrusters.publish(Float64MultiArray(data=thrusts(self.state).tolist()))
 
     def run(self, until_s: float, lockstep: bool) -> None:
         """From a reset on, until this simulated time."""

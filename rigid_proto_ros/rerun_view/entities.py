@@ -95,7 +95,7 @@ REFUSAL_LOG = "log/refusals"
 SLACK_COLOUR = (150, 150, 150)
 GHOST_ALPHA = 110
 
-LOAD_COLOURS = {"wrench": ORANGE, "poke": FORCE_COLOUR, "impulse": (255, 70, 200)}
+LOAD_COLOURS = {"wrench": ORANGE, "poke": FORCE_COLOUR, "impulse": (255, 70, 200), "thruster": (90, 220, 255)}
 TORQUE_COLOUR = (255, 210, 120)
 
 SERIES = {

@@ -11,20 +11,20 @@ from typing import Any
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, String
 
 from ..base.errors import CommandRefused
 from ..messages import cdr
 from ..motion.frames import Frame, parse_frame
 from ..scene.command_codec import ScriptCommand, core_command, of_message, whole_stamp
 from ..scene.scenario import BodyMesh, check_inertia, nanoseconds
-from ..simulation.commands import WrenchCommand
+from ..simulation.commands import ThrusterCommand, WrenchCommand
 from ..simulation.setup import Setup
 from .command_queue import CommandQueue, Unserved
 from .scheduling import LONG_TEXT, BackgroundThread, ScheduleMessage
 from .simulation_loop import SimulationLoop
 
-TOPICS = ("wrench", "poke", "string", "inertia", "schedule")
+TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
 
 QUIET_NS = 4_000_000
@@ -79,6 +79,9 @@ class CommandIntake:
             ("inertia", CommandQueue(node, InertiaStamped, "inertia/set", group), self._inertia),
             ("schedule", CommandQueue(node, String, "schedule", group), self._schedule),
         )
+        if loop.scenario.parameters.thrusters:
+            queue = CommandQueue(node, Float64MultiArray, "thrusters", group)
+            self._sources = (*self._sources, ("thrusters", queue, self._thrusters))
         self._active_until_ns = [0] * len(self._sources)
 
     @property
@@ -147,6 +150,12 @@ class CommandIntake:
         simulation.submit(command, self._when(stamp_ns))
         if held:
             self._loop.request_step()
+        return 1
+
+    def _thrusters(self, data: bytes) -> int:
+        forces = tuple(read_message(data, Float64MultiArray).data)
+        self._loop.simulation.submit(ThrusterCommand(forces, bytes(data)))
+        self._loop.request_step()
         return 1
 
     def _string_target(self, data: bytes) -> int:

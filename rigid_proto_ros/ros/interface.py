@@ -13,7 +13,8 @@ SUBSCRIBED, PUBLISHED, SERVED = "subscribed", "published", "served"
 @dataclass(frozen=True)
 class Interface:
     """name: as ROS resolves it, ``~/`` standing for the node's own name. direction: SUBSCRIBED, PUBLISHED or SERVED.
-    type: ``package/msg/Type``. on_request: the parameter that switches it on; empty when it is always there.
+    type: ``package/msg/Type``. on_request: the parameter, or their group, that switches it on; empty when it is
+    always there.
     """
 
     name: str
@@ -39,6 +40,14 @@ INTERFACES = (
         "geometry_msgs/WrenchStamped",
         "held wrench: each message replaces the one before of the same `;slot=<name>`, or without one; it ends "
         "`wrench_timeout` after the last",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/thrusters",
+        "std_msgs/Float64MultiArray",
+        "forces [N] of the thrusters, in the order of their names as `~/scene` lists them; until the next message, or "
+        "`wrench_timeout` after the last",
+        "thrusters",
     ),
     _topic(
         SUBSCRIBED,

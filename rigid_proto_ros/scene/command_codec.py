@@ -30,6 +30,7 @@ from ..simulation.commands import (
     MoveString,
     Rank,
     ReleaseString,
+    ThrusterCommand,
     TieString,
     WrenchCommand,
 )
@@ -49,7 +50,7 @@ MARKS = ("reset", "pause", "step", "timeout")
 
 KINDS = (
     *("wrench", "poke", "string_target", "string_attach", "string_release"),
-    *("inertia", "set", "clear_wrench", *MARKS),
+    *("thrusters", "inertia", "set", "clear_wrench", *MARKS),
 )
 """Kinds of events."""
 
@@ -79,7 +80,7 @@ class ScriptCommand:
 
     kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and
     point (3,), or the name of a contact to attach to. ``inertia``: frame_id, inertia (10,): mass, com, ixx ixy ixz iyy
-    iyz izz. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
+    iyz izz. ``thrusters``: forces. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
     """
 
     t_ns: int
@@ -91,6 +92,7 @@ class ScriptCommand:
     point: Vector = ZERO
     contact: str = ""
     inertia: tuple[float, ...] = ()
+    forces: tuple[float, ...] = ()
     entry: int = field(default=0, compare=False)
 
     @property
@@ -150,6 +152,8 @@ def of_event(time_ns: int, kind: str, content: Mapping) -> ScriptCommand:
         if kind == "inertia":
             numbers = _numbers((content["mass"], *_numbers(content["com"], 3), *_numbers(content["tensor"], 6)), 10)
             return ScriptCommand(time_ns, kind, _text(content["frame_id"]), inertia=numbers)
+        if kind == "thrusters":
+            return ScriptCommand(time_ns, kind, forces=tuple(map(float, content["forces"])))
         if kind == "set":
             return ScriptCommand(time_ns, kind, changes={_text(name): value for name, value in content.items()})
     except (KeyError, TypeError, ValueError, AttributeError):
@@ -224,6 +228,8 @@ def core_command(
     if kind == "set":
         changes = dict(command.changes)
         return Change(changes, _applying(change, changes), message or b"")
+    if kind == "thrusters":
+        return ThrusterCommand(command.forces, command.message(stamp_ns) if message is None else message)
     return ClearWrench(message or b"") if kind == "clear_wrench" else ReleaseString(message or b"")
 
 
@@ -320,6 +326,8 @@ def entry_of(command: ScriptCommand, frames: tuple[str, str] = _WORDS) -> dict:
     kind = command.kind
     if kind == "set":
         return {"set": command.changes}
+    if kind == "thrusters":
+        return {kind: list(command.forces)}
     if kind == "clear_wrench":
         return {"service": kind}
     if kind == "string_release":

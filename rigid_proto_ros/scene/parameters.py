@@ -32,6 +32,7 @@ from .declaration import (
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 PointMass = tuple[float, float, float, float]
+ThrusterNumbers = tuple[float, ...]
 Tensor = tuple[float, float, float, float, float, float]
 
 ZERO = (0.0, 0.0, 0.0)
@@ -120,7 +121,8 @@ class Parameters:
     ``parameters.string.stiffness`` here.
 
     ``replaced`` makes one from values by name, with all checks; ``named`` gives those back. contacts: named points of
-    the body. ballast: point masses by name; both in mesh coordinates.
+    the body. ballast: point masses by name. thrusters: point, direction, limit and lag by name. All in mesh
+    coordinates.
     """
 
     mesh: str = text(
@@ -228,6 +230,7 @@ class Parameters:
     workbench_port: int = port(8080, "Port of the interactive page, on this machine only.")
     contacts: Mapping[str, Vector] = field(default_factory=dict)
     ballast: Mapping[str, PointMass] = field(default_factory=dict)
+    thrusters: Mapping[str, ThrusterNumbers] = field(default_factory=dict)
 
     def replaced(self, changes: Mapping[str, object]) -> Parameters:
         """With these changed, by name, each converted and checked by its declaration; raises InputError.
@@ -283,6 +286,18 @@ PATTERNS: dict[str, Parameter] = {
         -HUGE,
         HUGE,
         lengths=(4,),
+    ),
+    "thrusters.": Parameter(
+        "thrusters.<name>",
+        "doubles",
+        None,
+        "A thruster on the body, commanded by ~/thrusters: x, y, z and the direction of its force in mesh coordinates; "
+        "behind them, where wanted, the largest force (0 for any) and the time constant of its lag.",
+        "mesh units, N, s",
+        -HUGE,
+        HUGE,
+        lengths=(6, 7, 8),
+        changes=READ_ONLY,
     ),
 }
 """Parameters with a name of the user's choice."""

@@ -25,6 +25,7 @@ from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from ..simulation.setup import Setup
 from ..simulation.simulation import needs_of
+from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
 from .parameters import Parameters, convert_all, parameter_named
 
@@ -208,6 +209,7 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
         accuracy=parameters.accuracy,
         initial=row,
         initial_string_mass=initial.string_mass,
+        thrusters={name: make_thruster(name, numbers) for name, numbers in sorted(parameters.thrusters.items())},
     )
     return setup, tuple(properties.warnings)
 

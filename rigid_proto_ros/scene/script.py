@@ -43,7 +43,7 @@ ENTRY_KEYS: Mapping[str, set[str]] = {
     "poke": _POKE_KEYS,
     "wrench": _WRENCH_KEYS,
     "string": _STRING_KEYS | {"release"},
-    "other": {"wrench", "string", "set", "service", "script"},
+    "other": {"wrench", "thrusters", "string", "set", "service", "script"},
 }
 """The keys that a script may hold, by the kind of entry."""
 
@@ -161,6 +161,9 @@ def _expand(
     if "wrench" in entry:
         _check_keys(entry, _TIMING_KEYS | {"wrench"}, where)
         return _expand_wrench(entry["wrench"], t_ns, f"{where}, wrench", wrench_timeout, max_commands)
+    if "thrusters" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"thrusters"}, where)
+        return [ScriptCommand(t_ns, "thrusters", forces=_forces(entry["thrusters"], f"{where}, thrusters"))]
     if "string" in entry:
         _check_keys(entry, _TIMING_KEYS | {"string"}, where)
         return _expand_string(entry["string"], t_ns, f"{where}, string")
@@ -327,6 +330,12 @@ def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not lower <= value <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
     return float(value)
+
+
+def _forces(value: Any, field: str) -> tuple[float, ...]:
+    if not isinstance(value, list) or not value:
+        raise InputError(field, value, "a list of forces [N], one a thruster in the order of their names")
+    return tuple(_number(force, field) for force in value)
 
 
 def _vector(value: Any, field: str) -> Vector:

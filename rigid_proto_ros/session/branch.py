@@ -43,8 +43,8 @@ class ActingLoads(Observer):
         self._latest = _Acting(time_ns, frame_id, command.kind, [float(f) for f in force], list(load.torque))
 
     def load_began(self, _time_ns: int, load_id: int, load: ShownLoad) -> None:
-        """The command applied last begins to act; an impulse has acted."""
-        if self._latest is not None and load.kind != "impulse":
+        """The command applied last begins to act; an impulse has acted, and thrusters go by themselves."""
+        if self._latest is not None and load.kind in ("wrench", "poke"):
             self.acting[load_id] = self._latest
 
     def load_ended(self, _time_ns: int, load_id: int) -> None:
@@ -84,6 +84,12 @@ def branch_at(session: RecordedSession, time_ns: int) -> Branch:
     ]
     notes: list[str] = []
     string, changes = _string(again, time_ns, notes)
+    thrusters = again.simulation.thrusters
+    if any(thrusters.targets):
+        pokes.append({"t": 0.0, "thrusters": thrusters.targets})
+        notes.append("thrusters time out as if they had been commanded then")
+    if thrusters.lags:
+        notes.append("thrusters with a lag begin at no force")
     return Branch(_scene(again.scenario, row, changes).text, [*string, *pokes], notes)
 
 

@@ -94,6 +94,21 @@ class WrenchCommand:
 
 
 @dataclass(frozen=True)
+class ThrusterCommand:
+    """What the thrusters push with [N], in the order of their names."""
+
+    forces: tuple[float, ...]
+    message: bytes = b""
+    kind = "thrusters"
+    rank = Rank.WRENCH
+
+    @property
+    def content(self) -> dict:
+        """What an event line holds of it."""
+        return {"forces": list(self.forces)}
+
+
+@dataclass(frozen=True)
 class ClearWrench:
     """End the held wrench and the running pulses; scheduled commands stay."""
 
@@ -219,7 +234,7 @@ def order_key(command: Command, listed: Listed | None) -> tuple:
 Listed = tuple[bytes, int]
 """The bytes of the list that a command is an entry of, and its number there."""
 
-Command = WrenchCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
+Command = WrenchCommand | ThrusterCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
 @dataclass(slots=True)

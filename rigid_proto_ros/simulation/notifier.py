@@ -70,7 +70,7 @@ class EventNotifier:
             self.observer.effort(readings.time_ns, readings.steps, readings.force_evaluations)
 
     def load_began(self, readings: Readings, load_id: int, kind: str, load: Load) -> None:
-        """A load begins to act; ``kind`` is wrench, poke or impulse."""
+        """A load begins to act; ``kind`` is wrench, poke, impulse or thruster."""
         if self.shows_loads:
             shown = _shown_load(kind, load, readings.setup)
             self.observer.load_began(readings.time_ns, load_id, shown)

@@ -49,7 +49,7 @@ class BodySnapshot:
 
 @dataclass(frozen=True)
 class ShownLoad:
-    """One command as it acts: ``kind`` is ``wrench``, ``poke`` or ``impulse``.
+    """One command as it acts: ``kind`` is ``wrench``, ``poke``, ``impulse`` or ``thruster``.
 
     point (3,) [m, body axes from the COM] is where the force attacks; force [N or N s] and torque about that point
     [N m or N m s] are in ``axes``, ``world`` or ``body``.

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from ..motion.problem import SIZE, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from . import flight as fl
+from .thrusters import Thruster
 
 
 class FlightStart(NamedTuple):
@@ -40,7 +41,7 @@ class Setup:
     mesh. contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m
     s]. wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps.
     initial (13,): the state row at time 0. initial_string_mass [kg]: what settles a string that is tied at time 0; 0
-    for the effective mass of the body as it is then.
+    for the effective mass of the body as it is then. thrusters: by name, in its order.
     """
 
     body: Body
@@ -62,6 +63,7 @@ class Setup:
     accuracy: float = 1e-9
     string: StringSettings = StringSettings()
     initial_string_mass: float = 0.0
+    thrusters: Mapping[str, Thruster] = field(default_factory=dict)
 
     @property
     def length(self) -> float:

@@ -33,6 +33,7 @@ from .commands import (
     MoveString,
     Pending,
     ReleaseString,
+    ThrusterCommand,
     TieString,
     WrenchCommand,
     order_key,
@@ -45,6 +46,9 @@ from .observer import BodySnapshot, Observer
 from .readings import Readings
 from .setup import Setup
 from .string_control import StringControl
+from .thrusters import ThrusterControl, check_forces
+
+_UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
 class Follower(Protocol):
@@ -189,6 +193,8 @@ class Simulation(Readings):
         tied, pending = self._string.tied, self._pending
         if tied is not None and tied.release_ns is not None:
             until_ns = min(until_ns, tied.release_ns)
+        if self.thrusters.due_ns < until_ns:
+            until_ns = self.thrusters.due_ns
         due: list[Pending] = []
         if not pending or pending[0][0] >= until_ns:
             return until_ns, due
@@ -209,7 +215,8 @@ class Simulation(Readings):
     def _is_ready(self, pending: Pending) -> bool:
         """Whether nothing but arithmetic is left to do when the command acts."""
         if not isinstance(pending.command, WrenchCommand):
-            return isinstance(pending.command, ClearWrench)
+            # The clock of thrusters at work is no matter of the compiled flight.
+            return isinstance(pending.command, ClearWrench) and self.thrusters.due_ns == fl.NEVER
         try:
             return self._still_holds(pending, pending.command)
         except CommandRefused:
@@ -273,6 +280,12 @@ class Simulation(Readings):
         changed = arrays.end_due()
         self._tell([])
         changed |= self._string.end_due(now_ns)
+        if self.thrusters.due_ns <= now_ns:
+            loads, timed_out = self.thrusters.end_due(now_ns, self.setup.wrench_timeout_ns)
+            if timed_out and self.logs_timeouts:
+                self.log("timeout", {"thrusters": True})
+            self._thrust(loads)
+            changed = True
         while self._pending and self._pending[0][0] == now_ns:
             pending = heapq.heappop(self._pending)[-1]
             self.listed = pending.listed
@@ -297,9 +310,14 @@ class Simulation(Readings):
             self._arrays.put([pending])
             self._arrays.apply()
             self._tell([pending])
+            if isinstance(command, ClearWrench):
+                self.thrusters.clear()
             self.state = self._arrays.state
             return
-        if isinstance(command, Change):
+        if isinstance(command, ThrusterCommand):
+            check_thrust(command.forces, self.setup)
+            self._thrust(self.thrusters.command(command.forces, self.time_ns, self.setup.wrench_timeout_ns))
+        elif isinstance(command, Change):
             self._change(command.apply())
         elif isinstance(command, TieString):
             self._string.tie_at(command, self.setup, self.state)
@@ -309,6 +327,21 @@ class Simulation(Readings):
         elif isinstance(command, ReleaseString):
             self._string.release()
         self._log_command(command)
+
+    def _thrust(self, loads: list[tuple[int, Load]]) -> None:
+        """Let thrusters, by number, push like this until they are told otherwise."""
+        arrays = self._arrays
+        for number, load in loads:
+            kind = fl.HELD_WRENCH if load.is_zero else fl.PULSE
+            row = Pending(self.time_ns, ClearWrench(), kind=kind, duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
+            row.slot = -1 - number
+            arrays.put([row])
+            arrays.apply()
+            for now_ns, what, load_id, _ in arrays.last_events():
+                if what == fl.ENDED:
+                    self.observer.load_ended(now_ns, load_id)
+                elif what == fl.BEGAN:
+                    self._notifier.load_began(self, load_id, "thruster", load)
 
     def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
         """Whether the load settled at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
@@ -342,6 +375,7 @@ class Simulation(Readings):
             self.state = self._arrays.state
         self._arrays.take(new)
         self._string.change(old, new, self.state)
+        self.thrusters.change(new.wrench_timeout_ns, self.time_ns)
         if new.surface is not old.surface and new.surface is not None:
             self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))
         self.announce()
@@ -355,6 +389,7 @@ class Simulation(Readings):
         self.time_ns = 0
         self.state = State(0, self.setup.initial.copy())
         self._string = StringControl(self.setup, self.state)
+        self.thrusters = ThrusterControl(self.setup.thrusters)
         self._arrays.start_over(self.setup, self._string.tied)
         self._notifier.start_over()
         self._notifier.string(self)
@@ -375,7 +410,16 @@ def judge(command: Command, setup: Setup) -> bytes:
         return b"" if command.frame.point[0] == "ray" else row
     if isinstance(command, MoveString):
         check_supported(setup.integrator, frozenset({STRING}))
+    if isinstance(command, ThrusterCommand):
+        check_thrust(command.forces, setup)
     return b""
+
+
+def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
+    """Raises CommandRefused for forces of thrusters that body or integrator can't take."""
+    check_forces(setup.thrusters, forces, setup.body)
+    for thruster in setup.thrusters.values():
+        check_supported(setup.integrator, needs_of_load(thruster.load(1.0)))
 
 
 def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:

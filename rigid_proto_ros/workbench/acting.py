@@ -17,6 +17,7 @@ from ..simulation.commands import (
     Command,
     MoveString,
     ReleaseString,
+    ThrusterCommand,
     TieString,
     WrenchCommand,
 )
@@ -92,6 +93,18 @@ class Acting:
             self._acting = []
         elif isinstance(command, WrenchCommand):
             self._load(command, time_ns, scenario, at)
+        elif isinstance(command, ThrusterCommand):
+            self._thrust(command, time_ns, scenario.setup)
+
+    def _thrust(self, command: ThrusterCommand, time_ns: int, setup: Setup) -> None:
+        """What they were told to push with, without their lags."""
+        self._acting = [acting for acting in self._acting if acting.slot >= NO_SLOT]
+        until_ns = time_ns + (setup.wrench_timeout_ns or 1 << 62)
+        for number, (thruster, force) in enumerate(zip(setup.thrusters.values(), command.forces, strict=True)):
+            if force:
+                text = _strength_text((force,), False)
+                load = thruster.load(thruster.within(force))
+                self._acting.append(_Acting(True, -1 - number, load, text, time_ns, until_ns))
 
     def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:
         setup, frame, held = scenario.setup, command.frame, command.held

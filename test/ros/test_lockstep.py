@@ -44,9 +44,9 @@ def test_a_detumbling_controller_in_lockstep_makes_the_same_session_every_time(r
             client.until(lambda: sum(e["kind"] == "step" for e in client.events()) == 200, "200 steps")
             events = client.events()
             reset = next(k for k, event in enumerate(events) if event["kind"] == "reset")
-            wrenches = [event for event in events[reset:] if event["kind"] == "wrench"]
+            commands = [event for event in events[reset:] if event["kind"] == "thrusters"]
             # Each acts at the very state that it answers to.
-            assert [event["time_ns"] for event in wrenches] == [k * 10_000_000 for k in range(200)]
+            assert [event["time_ns"] for event in commands] == [k * 10_000_000 for k in range(200)]
             sessions.add(events[-1]["sha256"])
         assert len(sessions) == 1
         client.pause(True)

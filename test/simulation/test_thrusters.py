@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Thrusters push along the body's own axes with what they are told, through limit, lag and timeout."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from flights import SECOND
+
+from rigid_proto_ros.base.errors import CommandRefused, InputError
+from rigid_proto_ros.scene.command_codec import entry_of, of_event
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario import make_scenario, yaml_value
+from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.session.replay import Resimulation
+from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.thrusters import _decay
+
+BODY = {
+    "mesh": "",
+    "inertia_model": "explicit",
+    "explicit_inertia.mass": 2.0,
+    "explicit_inertia.tensor": [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+    "wrench_timeout": 0.0,
+}
+LAG_S = 0.05
+
+
+class Told(Observer):
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.acting: dict[int, object] = {}
+        self.kinds: set[str] = set()
+
+    def event(self, _time_ns, line) -> None:
+        self.lines.append(line)
+
+    def load_began(self, _time_ns, load_id, load) -> None:
+        self.acting[load_id] = load
+        self.kinds.add(load.kind)
+
+    def load_ended(self, _time_ns, load_id) -> None:
+        del self.acting[load_id]
+
+
+def flown(script: str, until_s: float, **scene) -> tuple[OfflineRun, Told]:
+    told = Told()
+    run = OfflineRun(make_scenario({**BODY, **scene}), parse_script(script), told)
+    run.advance(round(until_s * 1e9))
+    assert not run.simulation.refused
+    return run, told
+
+
+def test_thrusters_push_together_in_the_order_of_their_names() -> None:
+    # b is written first; a pushes along x through the COM, b along z at 1 m on x: -1 N m about y per newton.
+    thrusters = {"thrusters.b": [1.0, 0.0, 0.0, 0.0, 0.0, 5.0], "thrusters.a": [0.0, 0.0, 0.0, 0.5, 0.0, 0.0]}
+    run, told = flown("[{t: 0, thrusters: [4, 0.002]}]", 0.01, **thrusters)
+    assert run.simulation.state.linear_velocity == pytest.approx([0.02, 0.0, 1e-5], rel=1e-4)  # it turns a little
+    assert run.simulation.state.angular_velocity == pytest.approx([0.0, -2e-5, 0.0], rel=1e-4)
+    assert told.kinds == {"thruster"} and len(told.acting) == 2
+
+
+def test_a_limit_holds_either_sign_and_0_is_none() -> None:
+    thrusters = {"thrusters.a": [0, 0, 0, 1, 0, 0, 3.0], "thrusters.b": [0, 0, 0, 0, 1, 0, 0.0]}
+    run, _ = flown("[{t: 0, thrusters: [-100, 100]}]", 1.0, **thrusters)
+    assert run.simulation.state.linear_velocity == pytest.approx([-1.5, 50.0, 0.0], rel=1e-12)
+
+
+def test_a_lag_of_first_order_gives_the_exact_impulse() -> None:
+    thruster = {"thrusters.a": [0, 0, 0, 1, 0, 0, 0, LAG_S]}
+    # 8 N asked for at 0, none at 1 s: u = 8(1 - exp(-t/lag)), and down again; impulse 8 N s in all.
+    run, told = flown("[{t: 0, thrusters: [8]}, {t: 1, thrusters: [0]}]", 3.0, **thruster)
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(8.0 / 2.0, rel=1e-12)  # measured 2e-16
+    # Displacement ∬u/m: v rises for 1 s by 4 m/s² and lags, and goes on by 4 m/s; a stair's error is (lag/16)²·a/12.
+    assert run.simulation.state.position[0] == pytest.approx(2.0 + 8.0 - 4.0 * LAG_S, abs=1e-5)  # measured 4e-15
+    assert not told.acting and run.simulation.thrusters.due_ns > 3 * SECOND
+
+
+def test_a_command_in_the_middle_of_a_stair_goes_on_from_the_force_there_is() -> None:
+    thruster = {"thrusters.a": [0, 0, 0, 1, 0, 0, 0, LAG_S]}
+    script = "[" + ", ".join(f"{{t: {k * 0.0017}, thrusters: [{1 + k % 3}]}}" for k in range(60)) + "]"
+    run, _ = flown(script, 2.0, **thruster)
+    times, targets = [k * 0.0017 for k in range(60)], [1 + k % 3 for k in range(60)]
+    impulse, u = 0.0, 0.0
+    for k, target in enumerate(targets):
+        span = (times[k + 1] if k < 59 else 2.0) - times[k]
+        decay = math.exp(-span / LAG_S)
+        impulse, u = impulse + target * span + (u - target) * LAG_S * (1.0 - decay), target + (u - target) * decay
+    # What a stair that is cut short has given too much or too little is second order in its length.
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(impulse / 2.0, rel=1e-3)  # measured 4e-4
+
+
+def test_thrusters_time_out_as_an_event_and_clear_wrench_stops_them_at_once() -> None:
+    scene = {"thrusters.a": [0, 0, 0, 1, 0, 0], "wrench_timeout": 0.5}
+    run, told = flown("[{t: 0, thrusters: [2]}]", 2.0, **scene)
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(0.5, rel=1e-12)
+    timeouts = [json.loads(line) for line in told.lines if '"timeout"' in line]
+    assert [(e["time_ns"], e["content"]) for e in timeouts] == [(SECOND // 2, {"thrusters": True})]
+    run, told = flown("[{t: 0, thrusters: [2]}, {t: 0.25, service: clear_wrench}]", 2.0, **scene)
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(0.25, rel=1e-12)
+    assert not told.acting and not any('"timeout"' in line for line in told.lines)
+
+
+@pytest.mark.parametrize("lag", [0.0, LAG_S])
+def test_thrusters_replay_to_the_bit_however_often_they_are_looked_at(lag: float) -> None:
+    scene = {**BODY, "thrusters.a": [0.1, 0.2, 0, 1, 0, 1, 5, lag], "thrusters.b": [0, 0, 0.3, 0, 1, 0, 0, lag]}
+    script = "[{t: 0, thrusters: [8, 1]}, {t: 0.4, force: [0, 1, 0]}, {t: 0.51, thrusters: [0, -2]}]"
+    run, told = flown(script, 1.0, **{**scene, "wrench_timeout": 0.3})
+    again = Resimulation(make_scenario({**scene, "wrench_timeout": 0.3}), told.lines)
+    rows = [again.advance(round(k * 1e7)) for k in range(101)]
+    assert rows[-1].tobytes() == run.simulation.state.row.tobytes()
+    assert again.simulation.events.sha256 == json.loads(told.lines[-1])["sha256"]
+
+
+def test_decay_is_the_exponential_to_the_last_digit() -> None:
+    x = np.linspace(0.0, 1.0 / 16.0, 101)
+    assert max(abs(_decay(float(v)) - math.exp(-v)) for v in x) <= 1.2e-16
+
+
+@pytest.mark.parametrize(
+    ("numbers", "field"),
+    [([0, 0, 0, 0, 0, 0], "thrusters.a"), ([0, 0, 0, 1, 0, 0, -1], "thrusters.a"), ([1, 2, 3], "thrusters.a")],
+)
+def test_what_is_no_thruster_is_refused_by_name(numbers, field) -> None:
+    with pytest.raises(InputError, match=field):
+        make_scenario({**BODY, "thrusters.a": numbers})
+
+
+def test_the_wrong_number_of_forces_is_refused_with_the_names() -> None:
+    with pytest.raises((CommandRefused, InputError), match=r"1 numbers, one a thruster \(a\)"):
+        flown("[{t: 0, thrusters: [1, 2]}]", 1.0, **{"thrusters.a": [0, 0, 0, 1, 0, 0]})
+    with pytest.raises(InputError, match="none is declared"):
+        flown("[{t: 0, thrusters: [1]}]", 1.0)
+
+
+def test_a_scene_keeps_its_thrusters_and_a_command_its_forces() -> None:
+    numbers = [0.0, 0.1, 0.2, 1.0, 0.0, 0.0, 5.0, 0.01]
+    scenario = make_scenario({**BODY, "thrusters.tail": numbers})
+    assert f"thrusters.tail: {yaml_value(numbers)}" in scenario.text
+    (command,) = parse_script("[{t: 0.5, thrusters: [1, -2.5]}]")
+    assert entry_of(command) == {"thrusters": [1.0, -2.5]}
+    assert of_event(command.t_ns, "thrusters", {"forces": [1.0, -2.5]}).forces == command.forces
