@@ -195,8 +195,8 @@ class Parameters:
     step_periods: int = whole(1, "Publication periods that ~/step advances by.", lower=1, upper=1_000_000)
     lockstep: bool = switch(
         False,
-        "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; without its "
-        "round trip.",
+        "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; "
+        "without its round trip.",
     )
     start_paused: bool = switch(False, "Start paused.", changes=READ_ONLY)
     wrench_timeout: float = number(
