@@ -43,6 +43,7 @@ ALLOWED = {
     "rerun_bindings": ("rerun_view",),
     "pyarrow": ("rerun_view", "sweep.table", "export.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
+    "pygltflib": ("export.gltf",),
     "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.comparison", "identify.residual_checks"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),

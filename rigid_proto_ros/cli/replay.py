@@ -141,14 +141,15 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
 
 def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
     from ..export.flight_record import FlightRecord
+    from ..export.looks import looks_of_session
     from ..session.playback import play
 
-    session, record = runs[-1], FlightRecord()
+    session, record, given = runs[-1], FlightRecord(), given_scene(args.scene)
     with Progress("reading the motion") as progress:
-        play(session, record, given_scene(args.scene), progress.fraction)
+        play(session, record, given, progress.fraction)
     if len(runs) > 1:
         print(f"  exported is run {len(runs)}, the last")
-    write_exports(args, record, lambda text: print(f"  {text}"))
+    write_exports(args, record, looks_of_session(session, given), lambda text: print(f"  {text}"))
 
 
 def given_scene(path: str | None) -> Scenario | None:

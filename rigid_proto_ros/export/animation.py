@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""From a record of a flight to the keys of an animation, with the error that was measured of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .flight_record import FlightRecord
+from .keys import PoseKeys, pose_keys
+from .looks import Looks
+from .sampling import Motion, Sampler, Tolerance, body_size
+
+TIMES_CHECKED = 1000
+"""Evenly over the flight, beside those that the keys were chosen from."""
+
+
+@dataclass(frozen=True)
+class Animation:
+    """motion: looks at the flight; keys: of its tracks. error: the worst that was measured, in [m] and [rad], of all
+    tracks. report: what to say of it, a line each.
+    """
+
+    motion: Motion
+    keys: list[PoseKeys]
+    error: tuple[float, float]
+    report: list[str]
+
+
+def animate(
+    record: FlightRecord,
+    looks: Looks | None,
+    share: float = 1e-3,
+    fps: float | None = None,
+    ghost: bool = False,
+    progress: Callable[[float, float], None] = lambda *_: None,
+) -> Animation:
+    """Keys that err by at most ``share`` of the body's size and as many hundred degrees, as few as it takes; or ``fps``
+    evenly spaced ones a second, whatever they err. Raises InputError where that takes too many.
+    """
+    size = body_size(record)
+    tolerance = Tolerance.of(share, size)
+    sampler = Sampler(record, looks, tolerance, ghost)
+    motion = sampler.within(progress) if fps is None else sampler.at(sampler.evenly(fps))
+    keys = [pose_keys(motion, track, tolerance if fps is None else None) for track in motion.tracks]
+    between = np.linspace(sampler.start_ns, sampler.end_ns, TIMES_CHECKED + 2)[1:-1].astype(np.int64)
+    checked = [motion, sampler.at(between), sampler.at(record.times_ns)]
+    errors = [
+        own.errors((look.times_ns - motion.times_ns[0]) * 1e-9, track.poses)
+        for look in checked
+        for own, track in zip(keys, look.tracks, strict=False)
+    ]
+    worst = max(e[0] for e in errors), max(e[1] for e in errors)
+    count = sum(len(own.places.times) + len(own.attitudes.times) for own in keys)
+    text = (
+        f"{count} keys; worst error {worst[0]:.2g} m ({worst[0] / size:.2g} of the body's size) and "
+        f"{np.degrees(worst[1]):.2g} degrees, measured at {sum(len(look.times_ns) for look in checked)} times"
+    )
+    report = [text]
+    if not (worst[0] <= tolerance.position and worst[1] <= tolerance.angle):
+        report.append(
+            f"beyond the tolerance of {share:g} body sizes and {100 * share:g} degrees: "
+            + ("a larger --fps, or none, errs less" if fps else "glTF's single precision has no digits for less")
+        )
+    if sampler.note:
+        report.append(sampler.note)
+    return Animation(motion, keys, worst, report)

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: MIT
+"""A flight as a glTF 2.0 binary file (.glb): nodes with the meshes, and one animation.
+
+The root node turns our z up into glTF's y up. A body's node has the centre of mass as its origin; below it hangs a node
+for each mesh, moved so that the mesh lies about that centre as it does in the simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+from ..base.errors import InputError
+from ..base.output_file import whole_file
+from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, TRAIL_COLOUR
+from ..rerun_view.surface_normals import shaded_surface
+from .flight_record import DrawnBody, FlightRecord
+from .interpolation import Keys
+from .keys import PoseKeys
+from .sampling import Motion, Track, single
+
+if TYPE_CHECKING:
+    import pygltflib
+
+FLOAT, UNSIGNED_INT = 5126, 5125
+VERTICES, INDICES = 34962, 34963
+LINE_STRIP, TRIANGLES = 3, 4
+COMPONENTS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+
+Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
+"""Attitude xyzw of the root: a quarter turn about x takes z up to y up."""
+
+
+def check_gltf() -> None:
+    """Raise InputError where the library isn't installed."""
+    try:
+        import pygltflib  # noqa: F401
+    except ImportError:
+        raise InputError("--gltf", "pygltflib is missing: pip install 'rigid_proto_ros[export]'") from None
+
+
+@dataclass(frozen=True)
+class Step:
+    """What holds from ``seconds`` on: whether a node is shown, and how it lies."""
+
+    seconds: float
+    scale: np.ndarray
+    translation: np.ndarray
+
+
+@dataclass
+class Document:
+    """A file in the making."""
+
+    gltf: pygltflib.GLTF2
+    data: bytearray = field(default_factory=bytearray)
+    inputs: dict[bytes, int] = field(default_factory=dict)
+
+    def accessor(self, values: np.ndarray, target: int | None = None, bounds: bool = False) -> int:
+        """The number of an accessor of these values (n,) or (n, c), as float32 or uint32."""
+        import pygltflib
+
+        whole = values.dtype.kind in "iu"
+        values = np.ascontiguousarray(values, dtype=np.uint32 if whole else np.float32)
+        flat = values.reshape(len(values), -1)
+        view = pygltflib.BufferView(buffer=0, byteOffset=len(self.data), byteLength=values.nbytes, target=target)
+        self.data += values.tobytes()
+        self.gltf.bufferViews.append(view)
+        self.gltf.accessors.append(
+            pygltflib.Accessor(
+                bufferView=len(self.gltf.bufferViews) - 1,
+                componentType=UNSIGNED_INT if whole else FLOAT,
+                count=len(values),
+                type=COMPONENTS[flat.shape[1]],
+                min=flat.min(axis=0).tolist() if bounds else None,
+                max=flat.max(axis=0).tolist() if bounds else None,
+            )
+        )
+        return len(self.gltf.accessors) - 1
+
+    def node(self, name: str, parent: int | None, **properties: Any) -> int:
+        """The number of a new node."""
+        import pygltflib
+
+        number = len(self.gltf.nodes)
+        self.gltf.nodes.append(pygltflib.Node(name=name, children=[], **properties))
+        if parent is not None:
+            self.gltf.nodes[parent].children.append(number)
+        return number
+
+    def material(self, name: str, colour: tuple[int, int, int], alpha: float = 1.0) -> int:
+        """The number of a new material; colour: sRGB of 0 to 255."""
+        import pygltflib
+
+        shade = np.array(colour) / 255.0
+        linear = np.where(shade <= 0.04045, shade / 12.92, ((shade + 0.055) / 1.055) ** 2.4)
+        surface = pygltflib.PbrMetallicRoughness(
+            baseColorFactor=[*linear.tolist(), alpha], metallicFactor=0.0, roughnessFactor=0.6
+        )
+        self.gltf.materials.append(
+            pygltflib.Material(
+                name=name,
+                pbrMetallicRoughness=surface,
+                alphaMode="OPAQUE" if alpha == 1.0 else "BLEND",
+                alphaCutoff=None,
+                doubleSided=True,
+            )
+        )
+        return len(self.gltf.materials) - 1
+
+    def mesh(self, name: str, attributes: dict[str, int], indices: int | None, mode: int, material: int) -> int:
+        """The number of a new mesh of one primitive."""
+        import pygltflib
+
+        primitive = pygltflib.Primitive(
+            attributes=pygltflib.Attributes(**attributes), indices=indices, mode=mode, material=material
+        )
+        self.gltf.meshes.append(pygltflib.Mesh(name=name, primitives=[primitive]))
+        return len(self.gltf.meshes) - 1
+
+    def animate(self, node: int, path: str, keys: Keys, interpolation: str = "LINEAR") -> None:
+        """Play these keys at a node's ``translation``, ``rotation`` or ``scale``."""
+        import pygltflib
+
+        animation = self.gltf.animations[0]
+        times = keys.times.astype(np.float32)
+        if times.tobytes() not in self.inputs:
+            self.inputs[times.tobytes()] = self.accessor(times, bounds=True)
+        values = keys.values
+        if path == "rotation":
+            values = values / np.linalg.norm(values, axis=1, keepdims=True)
+        sampler = pygltflib.AnimationSampler(
+            input=self.inputs[times.tobytes()], output=self.accessor(values), interpolation=interpolation
+        )
+        target = pygltflib.AnimationChannelTarget(node=node, path=path)
+        animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers), target=target))
+        animation.samplers.append(sampler)
+
+    def animate_steps(self, node: int, steps: list[Step]) -> None:
+        """Give a node what holds from time to time; without an animation where that never changes."""
+        target = self.gltf.nodes[node]
+        target.scale, target.translation = steps[0].scale.tolist(), steps[0].translation.tolist()
+        times = np.array([step.seconds for step in steps])
+        for path in ("scale", "translation"):
+            values = np.array([getattr(step, path) for step in steps])
+            if np.ptp(values, axis=0).any():
+                self.animate(node, path, Keys(times, values), "STEP")
+
+
+def write_gltf(file: str, record: FlightRecord, motion: Motion, keys: list[PoseKeys], trail: bool = False) -> None:
+    """Write the motion: the body, the ghost where the motion has one, and the centre of mass's path on request.
+    keys: of the motion's tracks.
+    """
+    check_gltf()
+    import pygltflib
+
+    document = Document(
+        pygltflib.GLTF2(
+            asset=pygltflib.Asset(version="2.0", generator=f"rigid_proto_ros {__version__}"),
+            scene=0,
+            scenes=[pygltflib.Scene(name="flight", nodes=[0])],
+            animations=[pygltflib.Animation(name="flight", channels=[], samplers=[])],
+        )
+    )
+    root = document.node("flight", None, rotation=Y_UP)
+    document.gltf.nodes[root].extras = {"first_time_s": motion.times_ns[0] * 1e-9}
+    surfaces = [_surface(document, mesh.vertices, mesh.triangles) for mesh in record.meshes]
+    looks = (("body", document.material("body", BODY_COLOUR)), ("ghost", -1))
+    for (name, material), track, pose in zip(looks, motion.tracks, keys, strict=False):
+        if name == "ghost":
+            material = document.material("ghost", GHOST_COLOUR, 0.45)
+        body = document.node(name, root)
+        document.gltf.nodes[body].extras = _mass_properties(track.bodies[0])
+        document.gltf.nodes[body].translation = pose.places.values[0].tolist()
+        document.gltf.nodes[body].rotation = _unit(pose.attitudes.values[0])
+        document.animate(body, "translation", pose.places)
+        document.animate(body, "rotation", pose.attitudes)
+        _draw_meshes(document, body, name, material, surfaces, record, motion, track)
+        _show_while_there(document, body, motion, track)
+    if trail and len(keys[0].places.times) > 1:
+        _draw_trail(document, root, keys[0].places.values)
+    _save(document, file)
+
+
+def _unit(attitude: np.ndarray) -> list[float]:
+    return (attitude / np.linalg.norm(attitude)).tolist()
+
+
+def _surface(document: Document, vertices: np.ndarray, triangles: np.ndarray) -> tuple[dict[str, int], int]:
+    # About the box's centre: single precision has no digits for a mesh far from its origin.
+    places, corners, normals = shaded_surface(vertices - _centre(vertices), triangles)
+    attributes = {
+        "POSITION": document.accessor(places, VERTICES, bounds=True),
+        "NORMAL": document.accessor(normals, VERTICES),
+    }
+    return attributes, document.accessor(corners.ravel(), INDICES)
+
+
+def _centre(vertices: np.ndarray) -> np.ndarray:
+    return 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+
+
+def _draw_meshes(
+    document: Document,
+    body: int,
+    name: str,
+    material: int,
+    surfaces: list[tuple[dict[str, int], int]],
+    record: FlightRecord,
+    motion: Motion,
+    track: Track,
+) -> None:
+    """A node for each mesh that the body is drawn as, below the body's."""
+    spans = motion.spans(track)
+    for number, (attributes, indices) in enumerate(surfaces):
+        if number not in {span.drawn.mesh for span in spans}:
+            continue
+        centre = _centre(record.meshes[number].vertices)
+        steps = []
+        for k, span in enumerate(spans):
+            scale, com = span.drawn.body.scale, span.drawn.body.center_of_mass
+            # Of the first span the time is the flight's start, whenever the body became what it is.
+            seconds = 0.0 if k == 0 else float(single(np.array([span.drawn.time_ns - motion.times_ns[0]]))[0])
+            drawn = scale if span.drawn.mesh == number else np.zeros(3)
+            steps.append(Step(seconds, drawn, scale * centre - com))
+        mesh = document.mesh(f"{name} mesh", attributes, indices, TRIANGLES, material)
+        label = f"{name} mesh" if number == 0 else f"{name} mesh {number + 1}"
+        document.animate_steps(document.node(label, body, mesh=mesh), steps)
+
+
+def _show_while_there(document: Document, node: int, motion: Motion, track: Track) -> None:
+    """A ghost that comes or goes in flight is of no size where there is none."""
+    if track.shown.all():
+        return
+    at = np.flatnonzero(np.diff(track.shown.astype(int), prepend=-1))
+    steps = [Step(motion.seconds[k], np.full(3, float(track.shown[k])), np.zeros(3)) for k in at]
+    times = np.array([step.seconds for step in steps])
+    document.animate(node, "scale", Keys(times, np.array([step.scale for step in steps])), "STEP")
+
+
+def _mass_properties(drawn: DrawnBody) -> dict[str, Any]:
+    """Of the body at the start, for those who read a node's extras: SI units, the tensor about the centre of mass."""
+    known = asdict(drawn.body)
+    return {
+        "mass": known["mass"],
+        "center_of_mass": known["center_of_mass"].tolist(),
+        "inertia": known["inertia"].tolist(),
+        "inertia_model": known["inertia_model"],
+    }
+
+
+def _draw_trail(document: Document, root: int, places: np.ndarray) -> None:
+    material = document.material("trail", TRAIL_COLOUR)
+    points = document.accessor(places, VERTICES, bounds=True)
+    mesh = document.mesh("trail", {"POSITION": points}, None, LINE_STRIP, material)
+    document.node("trail", root, mesh=mesh)
+
+
+def _save(document: Document, file: str) -> None:
+    import pygltflib
+
+    gltf = document.gltf
+    for node in gltf.nodes:
+        if not node.children:
+            node.children = None
+    gltf.buffers.append(pygltflib.Buffer(byteLength=len(document.data)))
+    gltf.set_binary_blob(bytes(document.data))
+    with whole_file("--gltf", file) as path:
+        path.write_bytes(b"".join(gltf.save_to_bytes()))
