@@ -6,9 +6,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
-
-import numpy as np
 
 from ..base.bundled import body_names
 from ..base.command_line import completes
@@ -20,7 +17,8 @@ from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify
 from ..mass.properties import scale_vector
 from ..mesh.locate import resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
-from .inspect_report import print_diagnoses, print_report
+from .inspect_report import print_report
+from .inspect_robot import NEEDS_COMPARE, add_robot_arguments, compare, given, number_or_link
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
@@ -38,6 +36,10 @@ EXAMPLES = (
     ),
     ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
     ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
+    (
+        "rigid_proto inspect --compare robot.urdf --fix fixed.urdf --total-mass 12",
+        "the same file with right inertials, for a robot of 12 kg",
+    ),
 )
 
 
@@ -48,9 +50,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     mesh = parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
     completes(mesh, body_names)
-    mass = parser.add_mutually_exclusive_group()
-    mass.add_argument("--density", type=float, metavar="D", help=f"kg/m^3 (default {DENSITY:g})")
-    mass.add_argument("--mass", type=float, metavar="M", help="kg; takes precedence over density")
+    parser.add_argument(
+        "--density", type=number_or_link, action="append", metavar="D",
+        help=f"kg/m^3 (default {DENSITY:g}); with --compare LINK=D is one link's, and may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mass", type=number_or_link, action="append", metavar="M",
+        help="kg, instead of a density; with --compare LINK=M is one link's, and may be repeated",
+    )  # fmt: skip
     parser.add_argument("--scale", nargs="+", default=["1"], metavar="S", help="one or three numbers (0.001: mm to m)")
     parser.add_argument("--model", choices=MODELS, default="solid", help="inertia model (default solid)")
     parser.add_argument(
@@ -72,12 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verify", action="store_true", help="compare with exact rational arithmetic (exit 1 above 1e-13)"
     )
-    parser.add_argument("--compare", metavar="ROBOT", help="show the errors of the inertials in a URDF, SDF or MJCF")
-    parser.add_argument("--link", metavar="NAME", help="with --compare: this link alone")
-    parser.add_argument(
-        "--package-path", type=Path, action="append", default=[], metavar="DIR",
-        help="with --compare: a folder that holds the packages or models that the file names; may be repeated",
-    )  # fmt: skip
+    add_robot_arguments(parser)
     parser.add_argument("--record", metavar="FILE.rrd", help="record mesh, COM, axes and boxes for the Rerun viewer")
     parser.add_argument("--frame", choices=FRAMES, default="mesh", help="origin of the exported link's frame")
     output = parser.add_mutually_exclusive_group()
@@ -118,18 +120,23 @@ def run(args: argparse.Namespace) -> int:
     """Inspect, print, and return the exit status; raises InputError for what is refused."""
     scale, mesh_name = _scale_and_mesh(args)
     args.repair, mesh_name = _repair_and_mesh(args, mesh_name)
-    density = DENSITY if args.density is None else args.density
-    for name, value in (("mass", args.mass), ("density", density)):
-        if value is not None and not 0.0 < value < float("inf"):
-            raise InputError(name, value, "a finite number > 0")
-    mass = args.mass or 0.0
+    given_mass, given_density = given("mass", args.mass), given("density", args.density)
+    if given_mass.everywhere and given_density.everywhere:
+        raise InputError("--density", given_density.everywhere, "--mass or --density, not both")
     scale_vector(scale)
     if args.max_triangles < 1:
         raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
     if args.compare is not None:
-        return _compare(args, mesh_name, scale)
-    if args.link is not None or args.package_path:
-        raise InputError("--link" if args.link is not None else "--package-path", "takes --compare ROBOT with it")
+        return compare(args, mesh_name, scale, given_mass, given_density)
+    for name in NEEDS_COMPARE:
+        if getattr(args, name) not in (None, []):
+            raise InputError(f"--{name.replace('_', '-')}", "takes --compare ROBOT with it")
+    if given_mass.by_link or given_density.by_link:
+        named = next(iter({**given_mass.by_link, **given_density.by_link}))
+        raise InputError(
+            "--mass" if given_mass.by_link else "--density", f"{named}=", "LINK= with --compare ROBOT alone"
+        )
+    mass, density = given_mass.everywhere or 0.0, given_density.everywhere or DENSITY
     if mesh_name is None:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     path = resolve_mesh(mesh_name)
@@ -183,28 +190,3 @@ def _verify(inspection: Inspection, report: dict, to_json: bool) -> int:
         return 0
     print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)
     return 1
-
-
-def _compare(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> int:
-    """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to 1e-3, otherwise 1."""
-    from ..mass.diagnosis import OK, Options, compare_robot  # XML and all: only who compares pays for it
-
-    for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
-        if getattr(args, flag):
-            raise InputError(f"--{flag}", "can't be used with --compare, which takes --json alone")
-    # Solids of one density are what a robot's inertials are compared with.
-    if args.model != "solid" or args.ballast:
-        flag, received = ("ballast", args.ballast) if args.ballast else ("model", args.model)
-        raise InputError(f"--{flag}", received, "--compare with plain solids: without --model and --ballast")
-    if mesh is None and scale != [1.0]:
-        raise InputError("--scale", scale, "the MESH of one link with it; without, the robot's file says each scale")
-    chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
-    options = Options(
-        args.mass or 0.0, args.density or 0.0, args.repair, args.fallback, args.max_triangles, tuple(args.package_path)
-    )
-    diagnoses = compare_robot(Path(args.compare), options, mesh=mesh, scale=chosen, link=args.link)
-    if args.json:
-        print(json.dumps({"compare": args.compare, "links": [d.as_dict() for d in diagnoses]}))
-    else:
-        print_diagnoses(diagnoses)
-    return 0 if all(d.status == OK for d in diagnoses) else 1

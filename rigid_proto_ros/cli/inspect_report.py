@@ -15,7 +15,9 @@ from .terminal import SEVERITY_STYLES, Text, line, table
 
 if TYPE_CHECKING:
     from ..mass.diagnosis import LinkDiagnosis
+    from ..mass.robot_fix import FixedLink
 
+_STATUS_STYLES = {"ok": "green", "off": "bold red"}
 SHOWN_ZERO = 5e-7
 """Of a quantity's largest entry: what is smaller is beyond the six digits shown, and stands as 0. JSON has it."""
 
@@ -103,19 +105,20 @@ def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
     """What ``--compare`` prints: a paragraph for each link, one line for those that merely have no
     inertial, and a count.
     """
-    styles = {"ok": "green", "off": "bold red"}
     for d in diagnoses:
         if d.status == "missing":
             continue
         by = f" by its {d.judged_by} shapes" if d.judged_by and d.status != "unknown" else ""
         note = f"; {d.note}" if d.note else ""
-        line((d.link, "bold"), f" ({d.mesh}): ", (d.status, styles.get(d.status, "yellow")), f"{by}{note}")
+        line((d.link, "bold"), f" ({d.mesh}): ", (d.status, _STATUS_STYLES.get(d.status, "yellow")), f"{by}{note}")
         if d.inertia_error is not None:
             off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
             center = f"centre of mass {d.center_of_mass_error:.2g} of the size"
             line(f"  relative errors: inertia {d.inertia_error:.2g}, {center}{off}")
         for cause in d.causes:
             line(f"  cause: {cause}")
+        for doubt in d.doubts:
+            line(f"  doubt: {doubt}")
         if d.status == "off":
             _print_expected(d)
     missing = [d for d in diagnoses if d.status == "missing"]
@@ -125,6 +128,48 @@ def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
     counts = {status: sum(d.status == status for d in diagnoses) for status in ("ok", "off", "missing", "unknown")}
     if len(diagnoses) > 1:
         line(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items() if count)}")
+
+
+def _percent(error: float | None) -> str:
+    return "-" if error is None else f"{100.0 * error:.3g} %"
+
+
+def print_diagnosis_lines(diagnoses: list[LinkDiagnosis]) -> None:
+    """What ``--compare --tolerance`` prints: one line a link."""
+    for d in diagnoses:
+        parts = []
+        if d.inertia_error is not None:
+            parts = [f"inertia {_percent(d.inertia_error)}", f"centre of mass {_percent(d.center_of_mass_error)}"]
+        if d.mass_error is not None:
+            parts.append(f"mass {_percent(d.mass_error)}")
+        reasons = "; ".join(d.causes or ((d.note,) if d.inertia_error is None else ()))
+        text = ", ".join(parts) + ("; " if parts and reasons else "") + reasons
+        line((d.link, "bold"), ": ", (d.status, _STATUS_STYLES.get(d.status, "yellow")), f": {text}" if text else "")
+
+
+def print_fixed_links(links: list[FixedLink], out: str) -> None:
+    """What ``--fix`` prints: each link before and after, and those that were left, with the reason."""
+    rows: list[tuple[Text, ...]] = []
+    for link in links:
+        before, after = link.before, link.after
+        errors = [
+            f"{_percent(old)} -> {_percent(new)}" if link.written else _percent(old)
+            for old, new in (
+                (before.inertia_error, after.inertia_error),
+                (before.center_of_mass_error, after.center_of_mass_error),
+            )
+        ]
+        old, new = (f"{d.mass:.6g}" for d in (before, after))
+        mass = f"{old} -> {new}" if link.written and old != new else old
+        done = f"from its {before.judged_by} shapes" if link.written else f"left: {link.left}" if link.left else ""
+        status = f"{before.status} -> {after.status}" if link.written else before.status
+        rows.append((before.link, (status, _STATUS_STYLES.get(after.status, "yellow")), mass, *errors, done))
+    table(rows, ("link", "", "mass [kg]", "error of the inertia", "of the centre of mass", ""))
+    for link in links:
+        for doubt in link.after.doubts if link.written else ():
+            line((link.before.link, "bold"), ": written, but ", doubt)
+    written, left = (sum(map(bool, column)) for column in zip(*((x.written, x.left) for x in links), strict=True))
+    line(f"{out}: {written} of {len(links)} inertials rewritten, {left} left as they are")
 
 
 def _print_expected(d: LinkDiagnosis) -> None:

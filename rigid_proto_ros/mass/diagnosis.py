@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from .properties import MassProperties
 from .robot_files import COLLISION, VISUAL, LinkInertial, Shape, read_robot
 from .tensor import check_tensor
 
+WATER = 1000.0
+"""kg/m³ of a link of which no mass is known."""
 MAX_ROUNDING = 0.05
 """A number printed with one digit is right to 50 %, which would excuse anything: this much is excused at most."""
 OK, OFF, MISSING, UNKNOWN = "ok", "off", "missing", "unknown"
@@ -34,7 +37,8 @@ _RANK = {OFF: 0, MISSING: 1, UNKNOWN: 2, OK: 3}
 @dataclass(frozen=True)
 class LinkDiagnosis:
     """One link: ``status`` is ok, off, missing (no inertial) or unknown; errors are relative (COM over the box's
-    diagonal); ``judged_by`` says whether by its visual or its collision shapes."""
+    diagonal); ``judged_by`` says whether by its visual or its collision shapes, of which ``volume`` [m³] is the sum;
+    ``doubts``: what they enclose twice."""
 
     link: str
     mesh: str
@@ -47,6 +51,8 @@ class LinkDiagnosis:
     expected: MassProperties | None = None
     note: str = ""
     judged_by: str = ""
+    volume: float = 0.0
+    doubts: tuple[str, ...] = ()
 
     @property
     def error(self) -> float:
@@ -72,12 +78,18 @@ class LinkDiagnosis:
             "expected": expected,
             "note": self.note,
             "judged_by": self.judged_by,
+            "doubts": list(self.doubts),
         }
 
 
 @dataclass(frozen=True)
 class Options:
-    """How shapes are taken, and where their files are looked for; ``mass`` or ``density`` > 0 are the true ones."""
+    """How shapes are taken, and where their files are looked for.
+
+    ``mass`` or ``density`` > 0 are the true ones of every link, ``masses`` and ``densities`` those of the links that
+    they name; with ``total_mass`` > 0 the links that no mass or density is given for are of one density, at which the
+    robot weighs that. ``tolerance``: relative differences up to this are taken for rounding.
+    """
 
     mass: float = 0.0
     density: float = 0.0
@@ -85,6 +97,18 @@ class Options:
     fallback: str = ""
     max_triangles: int = MAX_TRIANGLES
     folders: tuple[Path, ...] = ()
+    masses: Mapping[str, float] = field(default_factory=dict)
+    densities: Mapping[str, float] = field(default_factory=dict)
+    total_mass: float = 0.0
+    tolerance: float = LIMIT
+
+    def mass_of(self, link: str, volume: float) -> float:
+        """The true mass of a link of ``volume`` [m³], 0 where none is given."""
+        if link in self.masses:
+            return self.masses[link]
+        if link in self.densities:
+            return self.densities[link] * volume
+        return self.mass or self.density * volume
 
 
 def _tensor_error(link: LinkInertial, truth: MassProperties) -> tuple[float, float]:
@@ -104,12 +128,15 @@ def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by:
     plain = LinkDiagnosis(link.link, parts.names, UNKNOWN, link.mass, judged_by=judged_by)
     try:
         volume = parts.volume()
-        wanted = options.mass or options.density * volume
+        plain = replace(plain, volume=volume, doubts=parts.doubts)
+        wanted = options.mass_of(link.link, volume)
         if link.problem:
-            expected = parts.properties(options.mass or (options.density or 1000.0) * volume)
+            expected = parts.properties(wanted or WATER * volume)
             return replace(plain, status=MISSING, mass=math.nan, causes=(link.problem,), expected=expected)
         if not (0.0 < link.mass < math.inf) or not np.all(np.isfinite(link.inertia)):
-            return replace(plain, status=OFF, causes=("mass or tensor not a positive number",))
+            known = wanted or link.mass
+            expected = parts.properties(known) if 0.0 < known < math.inf else None
+            return replace(plain, status=OFF, causes=("mass or tensor not a positive number",), expected=expected)
         truth = parts.properties(link.mass)
     except InputError as error:
         if link.problem:
@@ -121,16 +148,16 @@ def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by:
     inertia_error, inertia_left = _tensor_error(link, truth)
     mass_error = abs(link.mass - wanted) / wanted if wanted else None
     causes: list[str] = []
-    if inertia_left > LIMIT:
+    if inertia_left > options.tolerance:
         found = explain_inertia(link.inertia, link.mass, link.center_of_mass, parts)
         causes += found or ("tensor: no usual cause fits",)
     try:
         check_tensor(link.inertia)
     except InputError as error:
         causes.append(f"no rigid body has this tensor: {error}")
-    if center_left > LIMIT:
+    if center_left > options.tolerance:
         causes += explain_center(link.center_of_mass, parts, truth) or ("COM: no usual cause fits",)
-    if mass_error is not None and mass_error > LIMIT + min(link.mass_step / link.mass, MAX_ROUNDING):
+    if mass_error is not None and mass_error > options.tolerance + min(link.mass_step / link.mass, MAX_ROUNDING):
         causes.append(f"mass: {wanted:.6g} kg expected")
     note = f"density {link.mass / volume:.4g} kg/m^3"
     if not 1.0 <= link.mass / volume <= 25000.0:
@@ -150,15 +177,56 @@ def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by:
     )
 
 
-class _Robot:
-    """A robot file's links, and the meshes that they name, each loaded once."""
+class Robot:
+    """A robot file's links, and the meshes that they name, each loaded once.
 
-    def __init__(self, path: Path, options: Options) -> None:
+    Raises InputError for a total mass that the links' given masses leave nothing of, and for names of no link.
+    """
+
+    def __init__(self, path: Path, links: list[LinkInertial], options: Options) -> None:
         self.path = path
         self.options = options
         self.search = Search(path.parent, options.folders)
-        self.links = read_robot(path)
+        self.links = links
         self.body = functools.cache(self._body)
+        for name in (*options.masses, *options.densities):
+            self.require(name)
+        if options.total_mass:
+            self.options = replace(options, masses=self._shared_out(options.total_mass))
+
+    def require(self, name: str) -> None:
+        """Raise InputError when not one link has this name."""
+        names = [known.link for known in self.links]
+        if names.count(name) > 1:
+            raise InputError("link", f"{names.count(name)} links are called {name!r}")
+        if name not in names:
+            hint = did_you_mean(name, names) or f"the links are {', '.join(names)}"
+            raise InputError("link", f"there is no link {name!r} with an inertial or a shape; {hint}")
+
+    def _shared_out(self, total: float) -> dict[str, float]:
+        """Masses by link of which the whole is ``total``: the links without a given one are of one density."""
+        given = dict(self.options.masses)
+        volumes: dict[str, float] = {}
+        rest = total
+        for link in self.links:
+            diagnosis = self.judge(link)
+            volume = diagnosis.volume if diagnosis else 0.0
+            known = self.options.mass_of(link.link, volume)
+            if known or not (volume or link.problem):
+                rest -= known or link.mass
+            elif not link.problem:
+                self.require(link.link)
+                volumes[link.link] = volume
+        if not volumes or not rest > 0.0:
+            left = f"{rest:.6g} kg for {len(volumes)} links that enclose a volume"
+            raise InputError("--total-mass", total, f"more than the links of given mass weigh; it leaves {left}")
+        density = rest / sum(volumes.values())
+        return {**given, **{name: density * volume for name, volume in volumes.items()}}
+
+    def diagnoses(self, only: str | None = None) -> list[tuple[LinkInertial, LinkDiagnosis]]:
+        """The links that have a shape (or that one) with their diagnoses, in the file's order."""
+        found = [(link, self.judge(link)) for link in self.links if only in (None, link.link)]
+        return [(link, diagnosis) for link, diagnosis in found if diagnosis is not None]
 
     def _body(self, file: str) -> MeshBody:
         mesh = load_mesh(file, max_triangles=self.options.max_triangles, search=self.search)
@@ -225,7 +293,7 @@ def _common_parts(first: str, second: str) -> int:
     return count
 
 
-def _by_mesh(robot: _Robot, mesh: str, scale: np.ndarray | None, link_name: str | None) -> LinkDiagnosis:
+def _by_mesh(robot: Robot, mesh: str, scale: np.ndarray | None, link_name: str | None) -> LinkDiagnosis:
     """The diagnosis of the one link that the mesh belongs to."""
     options = robot.options
     loaded = load_mesh(mesh, max_triangles=options.max_triangles)
@@ -260,15 +328,17 @@ def compare_robot(
 
     Raises InputError when the file, or nothing in it, can be judged.
     """
-    robot = _Robot(path, options)
-    if link is not None and all(known.link != link for known in robot.links):
-        names = [known.link for known in robot.links]
-        hint = did_you_mean(link, names) or f"the links are {', '.join(names)}"
-        raise InputError("link", f"there is no link {link!r} with an inertial or a shape; {hint}")
+    robot = Robot(path, read_robot(path), options)
+    if link is not None:
+        robot.require(link)
     if mesh is not None:
         return [_by_mesh(robot, mesh, scale, link)]
-    found = [robot.judge(known) for known in robot.links if link in (None, known.link)]
-    diagnoses = [diagnosis for diagnosis in found if diagnosis is not None]
+    return ranked(robot, link)
+
+
+def ranked(robot: Robot, link: str | None = None) -> list[LinkDiagnosis]:
+    """Diagnoses of the robot's links (or of that one), those farthest off first; raises InputError when it has none."""
+    diagnoses = [diagnosis for _, diagnosis in robot.diagnoses(link)]
     if not diagnoses:
-        raise InputError("compare", path.name, "links that show a mesh; name it, inspect MESH --compare FILE")
+        raise InputError("compare", robot.path.name, "links that show a mesh; name it, inspect MESH --compare FILE")
     return sorted(diagnoses, key=lambda diagnosis: (_RANK[diagnosis.status], -diagnosis.error))

@@ -68,6 +68,11 @@ def sdf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
     )
 
 
+def is_flat(a: float, b: float, c: float) -> bool:
+    """Whether ascending principal moments are those of a flat body, to what a reader's own eigenvalues may change."""
+    return a + b - c < _FLAT * c
+
+
 def mjcf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
     """An MJCF <inertial> element, ``fullinertia`` in the order xx yy zz xy xz yz.
 
@@ -77,7 +82,7 @@ def mjcf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
     position = _numbers(_position(properties, frame))
     head = _comment(properties, frame, "the geom pos") + f'<inertial pos="{position}" mass="{_number(properties.mass)}"'
     (a, b, c), axes = principal_axes(properties.inertia)
-    if a + b - c < _FLAT * c:
+    if is_flat(a, b, c):
         w, x, y, z = quaternion_wxyz(axes)
         return f'{head} quat="{_numbers((w, x, y, z))}" diaginertia="{_numbers((a, b, min(c, a + b)))}"/>\n'
     ixx, ixy, ixz, iyy, iyz, izz = six_from_tensor(properties.inertia)

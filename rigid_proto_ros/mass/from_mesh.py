@@ -18,7 +18,7 @@ from ..mesh.union import can_unite
 from .moments import Moments, referenced_vertices
 from .properties import MeshMoments
 from .repair import CRACK, repair_surface, unite_components, weld_cracks
-from .verdict import INFO, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, judge_surface
+from .verdict import INFO, NESTED, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, judge_surface
 
 UNION = "union"
 """The repair that makes one solid of components that overlap or lie inside others."""
@@ -101,7 +101,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "
 
 
 def _wants_repair(verdict: Verdict) -> bool:
-    return not verdict.closed or any(finding.code in ("nested_components", OVERLAPPING) for finding in verdict.findings)
+    return not verdict.closed or any(finding.code in (NESTED, OVERLAPPING) for finding in verdict.findings)
 
 
 def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from .from_mesh import MeshBody
 from .moments import referenced_vertices, solid_moments
 from .properties import MassProperties
 from .robot_files import Shape
+from .verdict import COUNTED_TWICE, WARNING
 
 
 def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarray]:
@@ -62,6 +63,17 @@ class LinkShapes:
     def names(self) -> str:
         """What the shapes are called: mesh names and kinds."""
         return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the meshes' verdicts say of volume that counts twice."""
+        bodies = {body.mesh.path: body for _, body in self.parts if body}
+        return tuple(
+            f"{body.mesh.name}: {finding.message}"
+            for body in bodies.values()
+            for finding in body.verdict.findings
+            if finding.code in COUNTED_TWICE and finding.severity == WARNING
+        )
 
     @cached_property
     def points(self) -> np.ndarray:

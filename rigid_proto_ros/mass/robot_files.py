@@ -47,7 +47,8 @@ class Shape:
 class LinkInertial:
     """What a file says of one link: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
     axes; ``problem`` instead when there are none. The steps are half a unit of the last digit printed, for mass, COM
-    (3,) and tensor (3, 3): what a number may be off by for its printing alone.
+    (3,) and tensor (3, 3): what a number may be off by for its printing alone. ``element``: the <inertial> that was
+    read, or the whole link where it has none that can be.
     """
 
     link: str
@@ -59,6 +60,7 @@ class LinkInertial:
     mass_step: float = 0.0
     center_step: np.ndarray = field(default_factory=lambda: np.zeros(3))
     inertia_step: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+    element: ElementTree.Element | None = None
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
@@ -120,6 +122,7 @@ def link_inertial(  # noqa: PLR0913 - the numbers of one element, each with what
     six: list[str],
     rotation: np.ndarray,
     shapes: list[Shape],
+    element: ElementTree.Element,
 ) -> LinkInertial:
     """An inertial from a file's words: mass, COM, and the six entries of the tensor in axes turned by ``rotation``."""
     tensor = symmetric([float(word) for word in six])
@@ -134,22 +137,36 @@ def link_inertial(  # noqa: PLR0913 - the numbers of one element, each with what
         float(printed_steps([mass])[0]),
         printed_steps(center.split()) if center else np.zeros(3),
         np.abs(rotation) @ step @ np.abs(rotation).T,
+        element,
     )
 
 
-def without_inertial(link: str, shapes: list[Shape], problem: str) -> LinkInertial:
+def without_inertial(link: str, shapes: list[Shape], problem: str, element: ElementTree.Element) -> LinkInertial:
     """A link of which the file doesn't say the mass or the tensor."""
-    return LinkInertial(link, math.nan, np.full(3, math.nan), np.full((3, 3), math.nan), tuple(shapes), problem)
+    nothing = math.nan, np.full(3, math.nan), np.full((3, 3), math.nan)
+    return LinkInertial(link, *nothing, tuple(shapes), problem, element=element)
+
+
+def is_xacro(root: ElementTree.Element, path: Path) -> bool:
+    """Whether the file is to be expanded by xacro before it is a robot's description."""
+    return path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter())
 
 
 def read_robot(path: Path) -> list[LinkInertial]:
-    """The links of a robot file that have an inertial or a shape; raises InputError when the file can't be read."""
+    """The links of a robot file that have an inertial or a shape, xacro expanded; raises InputError when the file can't
+    be read.
+    """
+    root = parse_xml(read_bounded(path, MAX_BYTES, "compare", "a URDF, SDF or MJCF file"), path)
+    if is_xacro(root, path):
+        root = parse_xml(_expanded(path), path)
+    return links_of(root, path)
+
+
+def links_of(root: ElementTree.Element, path: Path) -> list[LinkInertial]:
+    """The links below the root of a robot file that have an inertial or a shape; raises InputError as read_robot."""
     from .robot_mjcf import read_mjcf
     from .robot_urdf import read_sdf, read_urdf
 
-    root = parse_xml(read_bounded(path, MAX_BYTES, "compare", "a URDF, SDF or MJCF file"), path)
-    if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
-        root = parse_xml(_expanded(path), path)
     readers: dict[str, Callable[[ElementTree.Element, Path], list[LinkInertial]]] = {
         "robot": read_urdf,
         "sdf": read_sdf,

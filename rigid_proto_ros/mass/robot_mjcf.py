@@ -242,5 +242,6 @@ def read_mjcf(root: Element, path: Path) -> list[LinkInertial]:
                 six = [a, "0", "0", b, "0", c]
             shapes = list(_shapes(body, model, childclass))
             name = body.get("name", "?")
-            links.append(link_inertial(name, inertial.get("mass", ""), inertial.get("pos"), six, rotation, shapes))
+            mass, position = inertial.get("mass", ""), inertial.get("pos")
+            links.append(link_inertial(name, mass, position, six, rotation, shapes, inertial))
     return links

@@ -57,15 +57,15 @@ def read_urdf(root: Element, _path: Path) -> list[LinkInertial]:
         inertial = link.find("inertial")
         if inertial is None:
             if shapes:
-                links.append(without_inertial(name, shapes, "no <inertial>"))
+                links.append(without_inertial(name, shapes, "no <inertial>", link))
             continue
         origin, mass, tensor = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
         if mass is None or tensor is None or mass.get("value") is None:
-            links.append(without_inertial(name, shapes, "an <inertial> without mass or inertia"))
+            links.append(without_inertial(name, shapes, "an <inertial> without mass or inertia", link))
             continue
         six = [tensor.get(entry, "0") for entry in _SIX]
         rotation, _ = _urdf_pose(origin)
-        links.append(link_inertial(name, mass.get("value", ""), _get(origin, "xyz"), six, rotation, shapes))
+        links.append(link_inertial(name, mass.get("value", ""), _get(origin, "xyz"), six, rotation, shapes, inertial))
     return links
 
 
@@ -117,13 +117,13 @@ def read_sdf(root: Element, _path: Path) -> list[LinkInertial]:
         inertial = link.find("inertial")
         if inertial is None:
             if shapes:
-                links.append(without_inertial(name, shapes, "no <inertial>"))
+                links.append(without_inertial(name, shapes, "no <inertial>", link))
             continue
         tensor, mass = inertial.find("inertia"), inertial.findtext("mass")
         if tensor is None or mass is None:
-            links.append(without_inertial(name, shapes, "an <inertial> without mass or inertia"))
+            links.append(without_inertial(name, shapes, "an <inertial> without mass or inertia", link))
             continue
         six = [tensor.findtext(entry, "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in _SIX]
         rotation, position = _sdf_pose(inertial)
-        links.append(link_inertial(name, mass, position, six, rotation, shapes))
+        links.append(link_inertial(name, mass, position, six, rotation, shapes, inertial))
     return links

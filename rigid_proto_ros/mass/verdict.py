@@ -16,7 +16,10 @@ from ..mesh.union import can_unite, counted_once, united_volume
 from .moments import solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
-UNREFERENCED, OVERLAPPING = "unreferenced_vertices", "overlapping_components"
+UNREFERENCED = "unreferenced_vertices"
+OVERLAPPING, NESTED, SELF_CROSSING = "overlapping_components", "nested_components", "self_crossing"
+COUNTED_TWICE = (OVERLAPPING, NESTED, SELF_CROSSING)
+"""Codes of surfaces whose volume counts twice what they enclose twice."""
 NO_OVERLAP = 1e-6
 """Part of the volume below which an overlap is a remark, no warning."""
 MAX_NESTED_COMPONENTS = 2000
@@ -217,7 +220,7 @@ def _judge_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
                     f"; the volume is {np.sum(volume):.4g} so, {hollow:.4g} with cavities, {once:.4g} as one solid"
                 )
             remedy = "--repair (mesh_repair) makes cavities of them, --repair union one solid"
-            verdict.add("nested_components", WARNING, message, remedy)
+            verdict.add(NESTED, WARNING, message, remedy)
     if cavities:
         verdict.add("cavities", INFO, f"{_count(cavities, 'closed inner surface')} wound inward, taken as cavities")
     if not nesting.complete:
@@ -296,7 +299,7 @@ def judge_surface(
         crossings = self_crossings(vertices, topology.corners, topology.component)
         if crossings:
             message = f"the surface passes through itself ({_count(crossings, 'pair')} of triangles)"
-            verdict.add("self_crossing", WARNING, f"{message}; what it encloses twice counts twice")
+            verdict.add(SELF_CROSSING, WARNING, f"{message}; what it encloses twice counts twice")
     if polygon_starts is not None:
         _judge_polygons(verdict, polygon_planarity(vertices, triangles, polygon_starts, middle), diagonal)
     return verdict, topology

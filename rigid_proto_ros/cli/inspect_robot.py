@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto inspect`` of a whole robot: ``--compare`` judges its inertials, ``--fix`` rewrites them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.output_file import whole_file
+from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links
+
+if TYPE_CHECKING:
+    from ..mass.diagnosis import LinkDiagnosis, Options
+    from ..mass.robot_fix import FixedLink
+
+NEEDS_COMPARE = ("link", "package_path", "fix", "total_mass", "tolerance")
+"""Options that say nothing without ``--compare``."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """What ``--mass`` or ``--density`` gave: for all that no link is named for (None when nothing), and by link."""
+
+    everywhere: float | None
+    by_link: dict[str, float]
+
+
+def number_or_link(text: str) -> tuple[str, float]:
+    """``7850`` or ``arm=7850`` as the link's name, or "", and the number; raises ValueError for others."""
+    link, _, number = text.rpartition("=")
+    return link, float(number)
+
+
+def given(option: str, values: list[tuple[str, float]] | None) -> Given:
+    """The values of an option that may be repeated; raises InputError for what no mass or density is."""
+    found = dict(values or [])
+    for link, value in found.items():
+        if not 0.0 < value < float("inf"):
+            raise InputError(option, f"{link}={value:g}" if link else value, "a finite number > 0")
+    everywhere = found.pop("", None)
+    return Given(everywhere, found)
+
+
+def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what concerns robots."""
+    parser.add_argument("--compare", metavar="ROBOT", help="show the errors of the inertials in a URDF, SDF or MJCF")
+    parser.add_argument("--link", metavar="NAME", help="with --compare: this link alone")
+    parser.add_argument(
+        "--package-path", type=Path, action="append", default=[], metavar="DIR",
+        help="with --compare: a folder that holds the packages or models that the file names; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--tolerance", type=float, metavar="T",
+        help="with --compare: one line a link; exit 1 when one is off by more than T, relatively (default 1e-3)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--fix", metavar="OUT", help="with --compare: write the file to OUT with every inertial that is off rewritten"
+    )
+    parser.add_argument(
+        "--total-mass", type=float, metavar="M",
+        help="with --compare: links without --mass or --density are of one density, the robot weighs M kg",
+    )  # fmt: skip
+
+
+def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
+    """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to the tolerance, otherwise 1."""
+    from ..mass.diagnosis import OFF, OK, UNKNOWN, compare_robot  # XML and all: only who compares pays for it
+
+    _check(args, mesh, scale)
+    chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
+    options = _options(args, mass, density)
+    if args.fix is not None:
+        return _fix(args, options)
+    diagnoses = compare_robot(Path(args.compare), options, mesh=mesh, scale=chosen, link=args.link)
+    if args.json:
+        print(json.dumps({"compare": args.compare, "links": [d.as_dict() for d in diagnoses]}))
+    elif args.tolerance is not None:
+        print_diagnosis_lines(diagnoses)
+    else:
+        print_diagnoses(diagnoses)
+    if args.tolerance is None:
+        return 0 if all(d.status == OK for d in diagnoses) else 1
+    # A check that judged nothing must not look like one that found nothing.
+    off, unknown = (sum(d.status == status for d in diagnoses) for status in (OFF, UNKNOWN))
+    return 1 if off or unknown == len(diagnoses) else 0
+
+
+def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> None:
+    """Refuse what makes no sense with a robot."""
+    for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
+        if getattr(args, flag):
+            raise InputError(f"--{flag}", "can't be used with --compare, which takes --json alone")
+    # Solids of one density are what a robot's inertials are compared with.
+    if args.model != "solid" or args.ballast:
+        flag, received = ("ballast", args.ballast) if args.ballast else ("model", args.model)
+        raise InputError(f"--{flag}", received, "--compare with plain solids: without --model and --ballast")
+    if mesh is None and scale != [1.0]:
+        raise InputError("--scale", scale, "the MESH of one link with it; without, the robot's file says each scale")
+    for name in ("tolerance", "total_mass"):
+        value = getattr(args, name)
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InputError(f"--{name.replace('_', '-')}", value, "a finite number > 0")
+    if mesh is not None and (args.fix is not None or args.total_mass is not None):
+        flag = "--fix" if args.fix is not None else "--total-mass"
+        raise InputError(flag, mesh, "the whole robot: --compare ROBOT without a MESH")
+
+
+def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
+    from ..mass.diagnosis import LIMIT, Options
+
+    both = mass.by_link.keys() & density.by_link.keys()
+    if both:
+        raise InputError("--mass", min(both), "either the mass or the density of a link")
+    if args.total_mass is not None and (mass.everywhere or density.everywhere):
+        raise InputError("--total-mass", args.total_mass, "--mass and --density with LINK= beside it, or none")
+    return Options(
+        mass.everywhere or 0.0,
+        density.everywhere or 0.0,
+        args.repair,
+        args.fallback,
+        args.max_triangles,
+        tuple(args.package_path),
+        mass.by_link,
+        density.by_link,
+        args.total_mass or 0.0,
+        args.tolerance or LIMIT,
+    )
+
+
+def _fix(args: argparse.Namespace, options: Options) -> int:
+    """Write OUT; 0 when no link is off any longer, otherwise 1."""
+    from ..mass.diagnosis import OFF
+    from ..mass.robot_fix import fix_robot
+
+    data, links = fix_robot(Path(args.compare), options, link=args.link)
+    with whole_file("--fix", args.fix) as path:
+        path.write_bytes(data)
+    if args.json:
+        print(json.dumps({"compare": args.compare, "fix": args.fix, "links": [_as_dict(link) for link in links]}))
+    else:
+        print_fixed_links(links, args.fix)
+    return 1 if any(link.after.status == OFF for link in links) else 0
+
+
+def _as_dict(link: FixedLink) -> dict:
+    def state(d: LinkDiagnosis) -> dict:
+        full = d.as_dict()
+        return {key: full[key] for key in ("status", "mass", "mass_error", "center_of_mass_error", "inertia_error")}
+
+    whole = link.before.as_dict()
+    return {**whole, "written": link.written, "left": link.left, "after": state(link.after)}

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: MIT
+"""``--fix`` rewrites the inertials that are off, and nothing else; a second run finds nothing."""
+
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.diagnosis import Options, compare_robot
+from rigid_proto_ros.mass.robot_files import read_robot
+from rigid_proto_ros.mass.robot_fix import fix_robot
+
+BAR = (CUBE_VERTICES - 0.5) * [0.1, 0.2, 0.3]
+INERTIAL = re.compile(rb"<inertial\b.*?(?:</inertial>|/>(?=\s*<(?:/body|geom|inertial)))", re.DOTALL)
+COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+
+
+def outside(data: bytes) -> tuple[list[bytes], bytes]:
+    """All comments, and the bytes outside the inertials."""
+    return COMMENT.findall(data), INERTIAL.sub(b"#", COMMENT.sub(b"", data))
+
+
+@pytest.fixture
+def parts(tmp_path):
+    (tmp_path / "bar.stl").write_bytes(stl(1000.0 * BAR))
+    (tmp_path / "open.obj").write_bytes(obj(BAR, CUBE_TRIANGLES[:-1]))
+    return tmp_path
+
+
+MESH = '<geometry><mesh filename="bar.stl" scale="0.001 0.001 0.001"/></geometry>'
+URDF = (
+    '\ufeff<?xml version="1.0"?>\r\n<!-- größer: <inertial> in a comment -->\r\n<robot name="r">\r\n\t<link name = \'arm\' >\r\n'
+    f'\t\t<visual><origin xyz="0.1 0 0" rpy="0 0 0.5"/>{MESH}</visual>\r\n\t\t<visual>{MESH}</visual>\r\n'
+    '\t\t<inertial  >  <!-- weighed: ä -->\r\n\t\t\t<inertia izz = "1" iyy=\'1\' ixx="1"   ixy="0.0" ixz="0" iyz="0" note=">"/>\r\n'
+    '\t\t\t<mass   value=" 2.50 "/><!-- <mass value="9"/> -->\r\n\t\t\t<origin rpy="0 0 1.5"/>\r\n\t\t</inertial>\r\n\t</link>\r\n'
+    f'<link name="bare"><visual>{MESH}</visual></link>\r\n<link name="open"><visual><geometry><mesh filename="open.obj"/></geometry>'
+    '</visual><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>\r\n'
+    f'<link name="one"><collision>{MESH}</collision><inertial><mass value="3"/><inertia ixx="7" iyy="1" izz="1"/></inertial></link>'
+    '\r\n<joint name="j" type="fixed"><parent link="arm"/><child link="one"/></joint></robot>\r\n<!-- end -->\r\n'
+)  # fmt: skip
+
+
+def fixed(path: Path, **options):
+    """Bytes and the links by name."""
+    data, links = fix_robot(path, Options(**options))
+    return data, {link.before.link: link for link in links}
+
+
+def assert_finds_nothing(path: Path, data: bytes, *left: str) -> None:
+    path.write_bytes(data)
+    again, links = fixed(path)
+    assert again == data
+    assert {name for name, link in links.items() if link.after.status != "ok"} == set(left)
+
+
+def test_only_the_inertials_of_a_urdf_change(parts):
+    path = parts / "robot.urdf"
+    path.write_bytes(URDF.encode())
+    data, links = fixed(path)
+    assert outside(data) == outside(URDF.encode())
+    assert [(name, link.before.status, link.after.status, link.written) for name, link in links.items()] == [
+        ("arm", "off", "ok", True), ("bare", "missing", "missing", False), ("open", "unknown", "unknown", False), ("one", "off", "ok", True)
+    ]  # fmt: skip
+    assert "--mass LINK=M" in links["bare"].left and "open surface" in links["open"].left
+    # Comments, order and the mass stay inside the element, too.
+    text = data.decode()
+    assert "<inertial  >  <!-- weighed: ä -->" in text and '<mass   value=" 2.50 "/><!-- <mass value="9"/> -->' in text
+    assert text.count('note=">"') == 1 and re.search(r'<origin rpy="0 0 0" xyz="[^"]+"/>\r\n\t\t</inertial>', text)
+    (arm, _, _, one) = read_robot(_written(path, data))
+    assert arm.mass == 2.5 and arm.center_of_mass == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
+    assert one.inertia == pytest.approx(3.0 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-12)
+    assert_finds_nothing(path, data, "bare", "open")
+
+
+def _written(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path
+
+
+def test_masses_and_densities_of_links_write_what_was_missing(parts):
+    path = parts / "robot.urdf"
+    path.write_bytes(URDF.encode())
+    data, links = fixed(path, masses={"bare": 0.5}, densities={"one": 2000.0})
+    by_name = {link.link: link for link in read_robot(_written(path, data))}
+    assert by_name["bare"].mass == 0.5 and by_name["one"].mass == pytest.approx(2000.0 * 0.006, rel=1e-12)
+    assert by_name["bare"].inertia == pytest.approx(0.5 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-12)
+    assert links["bare"].before.status == "missing" and links["bare"].after.status == "ok"
+    assert_finds_nothing(path, data, "open")
+
+
+def test_a_total_mass_is_shared_out_at_one_density(parts):
+    path = parts / "robot.urdf"
+    path.write_bytes(URDF.encode())
+    data, _ = fixed(path, total_mass=10.0)
+    masses = {link.link: link.mass for link in read_robot(_written(path, data))}
+    # The open mesh keeps its kilogram; the arm has two bars, the other link one.
+    assert (masses["open"], masses["arm"], masses["one"]) == pytest.approx((1.0, 6.0, 3.0), rel=1e-14)
+    path.write_bytes(URDF.encode())
+    data, _ = fixed(path, total_mass=10.0, masses={"one": 4.0})
+    masses = {link.link: link.mass for link in read_robot(_written(path, data))}
+    assert (masses["arm"], masses["one"]) == pytest.approx((5.0, 4.0), rel=1e-14)
+    for options, refusal in (({"total_mass": 0.5}, "total-mass"), ({"masses": {"amr": 1.0}}, "did you mean arm")):
+        with pytest.raises(InputError, match=refusal):
+            fixed(path, **options)
+
+
+SDF = """<sdf version="1.9"><model name="m"><!-- a --><link name="l">
+  <collision name="c"><pose>0.1 0 0 0 0 0.5</pose><geometry><mesh><uri>bar.stl</uri><scale>0.001 0.001 0.001</scale></mesh></geometry></collision>
+  <inertial>
+    <mass> 2 </mass> <!-- kg -->
+    <inertia><ixx>1</ixx>
+      <iyy> 1 </iyy></inertia>
+  </inertial>
+</link></model></sdf>
+"""
+
+
+def test_an_sdfs_elements_are_changed_and_added_in_place(parts):
+    path = parts / "model.sdf"
+    path.write_text(SDF)
+    data, _ = fixed(path)
+    assert outside(data) == outside(SDF.encode())
+    text = data.decode()
+    assert "<mass> 2 </mass> <!-- kg -->" in text and re.search(r"<iyy> [\d.e-]+ </iyy>", text)
+    assert re.search(r"\n    <pose>0\.1 \S+ \S+ 0 0 0</pose>\n  </inertial>", text)
+    (link,) = read_robot(_written(path, data))
+    assert link.center_of_mass == pytest.approx([0.1, 0.0, 0.0], abs=1e-15) and link.mass == 2.0
+    assert_finds_nothing(path, data)
+
+
+MJCF = """<mujoco><include file="more.xml"/>
+  <asset><mesh name="bar" file="bar.stl" scale="0.001 0.001 0.001"/></asset>
+  <worldbody>
+    <body name="full"><inertial pos="0 0 0"  mass="2" fullinertia="1 1 1 0 0 0"/><geom type="mesh" mesh="bar" euler="10 20 30"/></body>
+    <body name="diagonal"><inertial
+        mass="3" pos="0 0 0" euler="0 0 45" diaginertia="1 1 1"/>
+      <geom type="mesh" mesh="bar" pos="0.1 0 0" euler="10 20 30"/></body>
+  </worldbody></mujoco>
+"""
+MORE = """<mujoco><worldbody><body name="more"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<geom type="box" size="1 2 3"/></body></worldbody></mujoco>"""
+
+
+def test_an_mjcfs_inertials_keep_their_form_and_mujoco_reads_them(parts):
+    path = parts / "model.xml"
+    path.write_text(MJCF)
+    (parts / "more.xml").write_text(MORE)
+    data, links = fixed(path)
+    assert outside(data) == outside(MJCF.encode())
+    assert "included file" in links["more"].left
+    text = data.decode()
+    assert (
+        text.count("fullinertia") == 1
+        and 'euler="0 0 45"' not in text
+        and '<inertial\n        mass="3" pos="0.1 ' in text
+    )
+    assert_finds_nothing(path, data, "more")
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.body_mass[2:] == pytest.approx([2.0, 3.0])  # the included body comes first
+    for body in (2, 3):
+        expected = model.body_mass[body] / 12.0 * np.array([0.13, 0.1, 0.05])
+        assert np.sort(model.body_inertia[body]) == pytest.approx(np.sort(expected), rel=1e-9)
+
+
+def test_the_command_writes_tells_and_leaves(parts, capsys):
+    path, out = parts / "robot.urdf", parts / "fixed.urdf"
+    path.write_bytes(URDF.encode())
+    assert main(["inspect", "--compare", str(path), "--fix", str(out), "--mass", "bare=0.5"]) == 0
+    told = capsys.readouterr().out
+    assert "off -> ok" in told and "left: open" in told and "3 of 4 inertials rewritten, 1 left" in told
+    assert path.read_bytes() == URDF.encode()
+    assert main(["inspect", "--compare", str(out), "--fix", str(out), "--json"]) == 0
+    links = {link["link"]: link for link in json.loads(capsys.readouterr().out)["links"]}
+    assert [links[name]["after"]["status"] for name in ("arm", "bare", "open", "one")] == ["ok", "ok", "unknown", "ok"]
+    assert not any(link["written"] for link in links.values())
+
+
+def test_a_check_prints_one_line_a_link_and_fails_beyond_the_tolerance(parts, capsys):
+    path, out = parts / "robot.urdf", parts / "fixed.urdf"
+    path.write_bytes(URDF.encode())
+    check = ["inspect", "--tolerance", "0.01", "--compare"]
+    assert main([*check, str(path)]) == 1
+    assert capsys.readouterr().out.count("\n") == 4
+    assert main(["inspect", "--compare", str(path), "--fix", str(out)]) == 0
+    capsys.readouterr()
+    assert main([*check, str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "arm: ok: inertia" in told and "bare: missing: no <inertial>" in told
+    # A difference of 0.4 % is beyond 0.1 %, and within 1 %.
+    text = out.read_text()
+    ixx = re.search(r'ixx="([^"]+)"', text).group(1)
+    out.write_text(text.replace(ixx, repr(1.004 * float(ixx))))
+    assert main([*check, str(out)]) == 0
+    assert main(["inspect", "--compare", str(out), "--link", "arm"]) == 1
+    # Where nothing can be judged nothing is right.
+    assert main([*check, str(path), "--link", "open"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--mass", "nobody=1", "--fix", "OUT"], "nobody"),
+        (["--mass", "arm=1", "--density", "arm=1"], "either the mass or the density"),
+        (["--mass", "arm=-1"], "> 0"),
+        (["--total-mass", "nan"], "> 0"),
+        (["--tolerance", "0"], "> 0"),
+        (["--total-mass", "3", "--density", "1000"], "LINK="),
+        (["hammer", "--fix", "OUT"], "without a MESH"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_line(parts, capsys, arguments, words):
+    path = parts / "robot.urdf"
+    path.write_bytes(URDF.encode())
+    assert main(["inspect", *arguments, "--compare", str(path)]) == 2
+    refusal = capsys.readouterr().err
+    assert refusal.count("\n") == 1 and words in refusal
+    assert not Path("OUT").exists()
+
+
+@pytest.mark.parametrize(
+    "option", [["--fix", "OUT"], ["--total-mass", "3"], ["--tolerance", "0.1"], ["--mass", "arm=1"]]
+)
+def test_a_robots_options_need_a_robot(capsys, option):
+    assert main(["inspect", "hammer", *option]) == 2
+    assert "--compare ROBOT" in capsys.readouterr().err
+
+
+def test_xacro_is_refused_with_the_command_that_expands_it(parts):
+    path = parts / "arm.urdf.xacro"
+    path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
+    with pytest.raises(InputError, match=r"xacro \S*arm\.urdf\.xacro > arm\.urdf"):
+        fixed(path)
+    path = parts / "wide.urdf"
+    path.write_bytes(URDF.replace("\ufeff", "").replace('<?xml version="1.0"?>', "").encode("utf-16"))
+    with pytest.raises(InputError, match="UTF-8"):
+        fixed(path)
+
+
+ROBOTS = os.environ.get("RIGID_PROTO_ROBOTS", "")
+
+
+@pytest.mark.stress
+@pytest.mark.skipif(not ROBOTS, reason="RIGID_PROTO_ROBOTS, a folder of robot descriptions, is not set")
+def test_every_real_robot_is_mended_outside_nothing_changed_and_inside_all_right():
+    folders = (Path(ROBOTS), *(path.parent for path in Path(ROBOTS).rglob("package.xml")))
+    files = [path for ending in ("urdf", "sdf") for path in sorted(Path(ROBOTS).rglob(f"*.{ending}"))]
+    mended = 0
+    for path in files:
+        try:
+            compare_robot(path, Options(folders=folders))
+        except InputError:
+            continue
+        data, links = fixed(path, folders=folders)
+        assert outside(data) == outside(path.read_bytes()), path
+        assert not [link.before.link for link in links.values() if link.after.status == "off" and not link.left], path
+        mended += sum(link.written for link in links.values())
+    assert mended > 100
