@@ -26,7 +26,7 @@ ROS = [
 MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 # Motion for other tools: tables, glTF, USD, films.
-EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2"]
+EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]

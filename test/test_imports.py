@@ -44,6 +44,7 @@ ALLOWED = {
     "pyarrow": ("rerun_view", "sweep.table", "export.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
     "pygltflib": ("export.gltf",),
+    "pxr": ("export.usd",),
     "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.comparison", "identify.residual_checks"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),

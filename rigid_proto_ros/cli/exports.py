@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
     from ..export.looks import Looks
 
-ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "gltf": (".glb",)}
+ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "gltf": (".glb",), "usd": (".usda", ".usdc")}
 """Options that take a file, and how its name may end."""
 
 HELP = {
     "csv": "write the states as a table",
     "parquet": "write the states as a table",
     "gltf": "write the motion for Blender, Unreal, three.js and others that read glTF",
+    "usd": "write the motion, with mass properties, for Omniverse, Houdini and others that read USD",
 }
 
 PARTS = ("ghost", "trail")
@@ -37,10 +38,14 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=float,
         metavar="T",
-        help="of --gltf: keys err by at most T body sizes and 100 T degrees (default 1e-3)",
+        help="of --gltf and --usd: keys err by at most T body sizes and 100 T degrees (default 1e-3)",
     )
-    group.add_argument("--fps", type=float, metavar="N", help="of --gltf: N evenly spaced keys a second instead")
-    group.add_argument("--with", dest="parts", metavar="PART,..", help=f"of --gltf: draw {', '.join(PARTS)} too")
+    group.add_argument(
+        "--fps", type=float, metavar="N", help="of --gltf and --usd: N evenly spaced keys a second instead"
+    )
+    group.add_argument(
+        "--with", dest="parts", metavar="PART,..", help=f"of --gltf and --usd: draw {', '.join(PARTS)} too"
+    )
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
@@ -64,13 +69,19 @@ def check_exports(args: argparse.Namespace) -> None:
         from ..export.gltf import check_gltf
 
         check_gltf()
+    if "usd" in files:
+        from ..export.usd import check_usd
+
+        check_usd()
 
 
 def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
     for option in ("tolerance", "fps", "parts"):
         given = getattr(args, option)
-        if given is not None and "gltf" not in files:
-            raise InputError("--with" if option == "parts" else f"--{option}", given, "it together with --gltf")
+        if given is not None and not {"gltf", "usd"} & set(files):
+            raise InputError(
+                "--with" if option == "parts" else f"--{option}", given, "it together with --gltf or --usd"
+            )
     if args.tolerance is not None and not (math.isfinite(args.tolerance) and 1e-9 <= args.tolerance <= 0.5):
         raise InputError("--tolerance", args.tolerance, "a share of the body's size from 1e-9 to 0.5")
     if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
@@ -103,20 +114,33 @@ def write_exports(
                     else:
                         table.write_parquet(files[name], columns)
                 say(f"{files[name]}: {len(record.times_ns)} states")
-    if "gltf" in files:
-        _write_animation(args, files["gltf"], record, looks, say)
+    if "gltf" in files or "usd" in files:
+        _write_animations(args, files, record, looks, say)
 
 
-def _write_animation(
-    args: argparse.Namespace, file: str, record: FlightRecord, looks: Looks | None, say: Callable[[str], None]
+def _write_animations(
+    args: argparse.Namespace,
+    files: dict[str, str],
+    record: FlightRecord,
+    looks: Looks | None,
+    say: Callable[[str], None],
 ) -> None:
     from ..export.animation import animate
     from ..export.gltf import write_gltf
+    from ..export.sampling import body_size
+    from ..export.usd import write_usd
 
     parts = _parts(args)
-    with Progress(f"looking at the motion for {file}") as progress:
+    with Progress("choosing keys") as progress:
         made = animate(record, looks, args.tolerance or 1e-3, args.fps, "ghost" in parts, progress.fraction)
-    with Progress(f"writing {file}"):
-        write_gltf(file, record, made.motion, made.keys, "trail" in parts)
-    for line in made.report:
-        say(f"{file}: {line}")
+    for name in ("gltf", "usd"):
+        if name not in files:
+            continue
+        with Progress(f"writing {files[name]}"):
+            if name == "gltf":
+                write_gltf(files[name], record, made.motion, made.keys, "trail" in parts)
+            else:
+                trail = body_size(record) if "trail" in parts else 0.0
+                write_usd(files[name], record, made.motion, made.keys, args.fps, trail)
+        for line in made.report:
+            say(f"{files[name]}: {line}")

@@ -62,7 +62,7 @@ def animate(
     if not (worst[0] <= tolerance.position and worst[1] <= tolerance.angle):
         report.append(
             f"beyond the tolerance of {share:g} body sizes and {100 * share:g} degrees: "
-            + ("a larger --fps, or none, errs less" if fps else "glTF's single precision has no digits for less")
+            + ("a larger --fps, or none, errs less" if fps else "single precision has no digits for less")
         )
     if sampler.note:
         report.append(sampler.note)

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""A flight as USD (.usda, .usdc): time samples, and the body's mass properties as UsdPhysics has them.
+
+The stage has z up and metres, as ROS has. A body's prim has the centre of mass as its origin, so that the axes of its
+tensor are the prim's own.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.output_file import whole_file
+from ..base.rotation import quaternion_from_matrix, rotate
+from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, TRAIL_COLOUR
+from ..rerun_view.inertia_shapes import PrincipalFrame
+from ..rerun_view.surface_normals import shaded_surface
+from ..simulation.observer import BodySnapshot
+from .flight_record import DrawnMesh, FlightRecord
+from .keys import PoseKeys
+from .sampling import Motion, Track, single
+
+if TYPE_CHECKING:
+    from pxr import Usd, UsdGeom
+
+PLAYED_FPS = 60.0
+"""Time codes a second where none are asked for; samples lie wherever they are needed."""
+
+GHOST_OPACITY = 0.45
+TRAIL_WIDTH = 0.01
+"""Of the body's size."""
+
+
+def check_usd() -> None:
+    """Raise InputError where the library isn't installed."""
+    try:
+        import pxr  # noqa: F401
+    except ImportError:
+        raise InputError("--usd", "usd-core is missing: pip install 'rigid_proto_ros[export]'") from None
+
+
+def write_usd(
+    file: str, record: FlightRecord, motion: Motion, keys: list[PoseKeys], fps: float | None = None, trail: float = 0.0
+) -> None:
+    """Write the motion: the body, the ghost where the motion has one, and the centre of mass's path where ``trail``,
+    the size of the body [m], is given. keys: of the motion's tracks.
+    """
+    check_usd()
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    rate = fps or PLAYED_FPS
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate)
+    stage.SetStartTimeCode(0.0)
+    stage.SetEndTimeCode(float(motion.seconds[-1]) * rate)
+    root = UsdGeom.Xform.Define(stage, "/flight")
+    stage.SetDefaultPrim(root.GetPrim())
+    looks = (("body", BODY_COLOUR, 1.0), ("ghost", GHOST_COLOUR, GHOST_OPACITY))
+    for (name, colour, opacity), track, pose in zip(looks, motion.tracks, keys, strict=False):
+        prim = UsdGeom.Xform.Define(stage, f"/flight/{name}")
+        _animate(prim, pose, rate)
+        _hide_while_away(prim, motion, track, rate)
+        _draw_meshes(stage, prim, (colour, opacity), record, motion, track, rate)
+    _add_physics(stage, record)
+    if trail and len(keys[0].places.times) > 1:
+        _draw_trail(stage, keys[0].places.values, TRAIL_WIDTH * trail)
+    with whole_file("--usd", file) as path:
+        # The library takes an empty file for a damaged one.
+        path.unlink()
+        if not stage.GetRootLayer().Export(str(path)):
+            raise InputError("--usd", file, "a file that can be written")
+
+
+def _animate(prim: UsdGeom.Xform, pose: PoseKeys, rate: float) -> None:
+    from pxr import Gf, UsdGeom
+
+    place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
+    for t, at in zip(pose.places.times.tolist(), pose.places.values.tolist(), strict=True):
+        place.Set(Gf.Vec3d(*at), t * rate)
+    attitude = prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
+    values = pose.attitudes.values / np.linalg.norm(pose.attitudes.values, axis=1, keepdims=True)
+    for t, (x, y, z, w) in zip(pose.attitudes.times.tolist(), values.tolist(), strict=True):
+        attitude.Set(Gf.Quatd(w, x, y, z), t * rate)
+
+
+def _hide_while_away(prim: UsdGeom.Xform, motion: Motion, track: Track, rate: float) -> None:
+    if not track.shown.all():
+        for k in np.flatnonzero(np.diff(track.shown.astype(int), prepend=-1)):
+            _show(prim, bool(track.shown[k]), motion.seconds[k] * rate)
+
+
+def _show(prim: UsdGeom.Imageable, shown: bool, time_code: float) -> None:
+    from pxr import UsdGeom
+
+    prim.CreateVisibilityAttr().Set(UsdGeom.Tokens.inherited if shown else UsdGeom.Tokens.invisible, time_code)
+
+
+def _draw_meshes(
+    stage: Usd.Stage,
+    body: UsdGeom.Xform,
+    look: tuple[tuple[int, int, int], float],
+    record: FlightRecord,
+    motion: Motion,
+    track: Track,
+    rate: float,
+) -> None:
+    """A prim for each mesh that the body is drawn as, below the body's; values that change do so from one instant to
+    the next.
+    """
+    from pxr import Gf, UsdGeom
+
+    spans = motion.spans(track)
+    for number, mesh in enumerate(record.meshes):
+        if number not in {span.drawn.mesh for span in spans}:
+            continue
+        name = "mesh" if number == 0 else f"mesh_{number + 1}"
+        prim = UsdGeom.Mesh.Define(stage, body.GetPath().AppendChild(name))
+        centre = _fill(prim, mesh, look)
+        ops = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble), prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble)
+        before: tuple[Any, Any] | None = None
+        for k, span in enumerate(spans):
+            scale, com = span.drawn.body.scale, span.drawn.body.center_of_mass
+            values = Gf.Vec3d(*(scale * centre - com)), Gf.Vec3d(*scale)
+            seconds = 0.0 if k == 0 else float(single(np.array([span.drawn.time_ns - motion.times_ns[0]]))[0])
+            for n, op in enumerate(ops):
+                if len(spans) == 1:
+                    op.Set(values[n])
+                    continue
+                if before is not None:
+                    op.Set(before[n], float(np.nextafter(np.float32(seconds), np.float32(-1.0))) * rate)
+                op.Set(values[n], seconds * rate)
+            before = values
+            if len(spans) > 1:
+                _show(prim, span.drawn.mesh == number, seconds * rate)
+
+
+def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int], float]) -> np.ndarray:
+    """The prim's surface about the middle of its box; returns that point (3,) [mesh coordinates]."""
+    from pxr import Gf, UsdGeom, Vt
+
+    centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    points, triangles, normals = shaded_surface(mesh.vertices - centre, mesh.triangles)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel().astype(np.int32)))
+    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
+    prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
+    colour, opacity = look
+    prim.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(colour) / 255.0).tolist())])
+    if opacity < 1.0:
+        prim.CreateDisplayOpacityAttr([opacity])
+    return centre
+
+
+def _add_physics(stage: Usd.Stage, record: FlightRecord) -> None:
+    """The rigid body as it is at the start, with its velocities, and gravity: what a physics engine begins with."""
+    from pxr import Gf, UsdPhysics
+
+    body, row = record.bodies[0].body, record.rows[0]
+    prim = stage.GetPrimAtPath("/flight/body")
+    rigid = UsdPhysics.RigidBodyAPI.Apply(prim)
+    rigid.CreateVelocityAttr(Gf.Vec3f(*row[7:10].tolist()))
+    spin = np.degrees(rotate(*row[3:7].tolist(), *row[10:13].tolist()))
+    rigid.CreateAngularVelocityAttr(Gf.Vec3f(*spin.tolist()))
+    _add_mass(UsdPhysics.MassAPI.Apply(prim), body)
+    scene = UsdPhysics.Scene.Define(stage, "/flight/physics_scene")
+    pull = float(np.linalg.norm(body.gravity))
+    scene.CreateGravityMagnitudeAttr(pull)
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(*(body.gravity / pull if pull else [0.0, 0.0, -1.0])))
+
+
+def _add_mass(mass: Any, body: BodySnapshot) -> None:
+    """Mass, centre of mass in the prim's space, principal moments [kg m²] and the attitude of their axes in it."""
+    from pxr import Gf
+
+    frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
+    x, y, z, w = quaternion_from_matrix(frame.axes).tolist()
+    mass.CreateMassAttr(body.mass)
+    mass.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
+    mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*frame.moments.tolist()))
+    mass.CreatePrincipalAxesAttr(Gf.Quatf(w, x, y, z))
+
+
+def _draw_trail(stage: Usd.Stage, places: np.ndarray, width: float) -> None:
+    from pxr import Gf, UsdGeom, Vt
+
+    curve = UsdGeom.BasisCurves.Define(stage, "/flight/trail")
+    curve.CreateTypeAttr(UsdGeom.Tokens.linear)
+    points = places.astype(np.float32)
+    curve.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    curve.CreateCurveVertexCountsAttr([len(points)])
+    curve.CreateWidthsAttr([width])
+    curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+    reach = 0.5 * width
+    curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])))
+    curve.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(TRAIL_COLOUR) / 255.0).tolist())])

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""A flight as USD: read back by USD itself it is where the simulation is, and the body has the mass properties it has."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_gltf import CHANGES, THROWN, TIMES, flown
+
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.script import read_script
+
+pxr = pytest.importorskip("pxr")
+from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation  # noqa: E402
+
+
+def broken_rules(stage) -> list[str]:
+    """What usdchecker finds: every validator that comes with USD."""
+    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    return [f"{error.GetName()}: {error.GetMessage()}" for error in context.Validate(stage)]
+
+
+def test_the_rules_are_all_of_usdcheckers_and_find_what_breaks_them():
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.Xform.Define(stage, "/a")
+    assert any("defaultPrim" in rule or "default prim" in rule.lower() for rule in broken_rules(stage))
+    outer = UsdGeom.Xform.Define(stage, "/a")
+    inner = UsdGeom.Xform.Define(stage, "/a/b")
+    for prim in (outer, inner):
+        UsdPhysics.RigidBodyAPI.Apply(prim.GetPrim())
+    assert any("igid" in rule for rule in broken_rules(stage))
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("script") / "changes.yaml"
+    path.write_text(CHANGES)
+    return path
+
+
+@pytest.mark.parametrize("ending", ["usda", "usdc"])
+def test_the_mesh_is_drawn_where_it_flies_and_no_rule_is_broken(ending, script, tmp_path):
+    file = tmp_path / f"flight.{ending}"
+    settings = [f"--set={name}={value}" for name, value in THROWN.items()]
+    options = ["--script", str(script), "--duration", "1", "--usd", str(file), "--with", "ghost,trail"]
+    assert main(["simulate", "hammer", *settings, *options]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+    stage = Usd.Stage.Open(str(file))
+    assert not broken_rules(stage)
+    assert UsdGeom.GetStageUpAxis(stage) == "Z" and UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    assert stage.GetEndTimeCode() / stage.GetTimeCodesPerSecond() == pytest.approx(1.0)
+    times = TIMES[::4] if ending == "usdc" else TIMES
+    worst = 0.0
+    for t, (row, body, surface) in zip(times, flown("hammer", THROWN, read_script(str(script)), times), strict=True):
+        code = t * stage.GetTimeCodesPerSecond()
+        meshes = [UsdGeom.Mesh(p) for p in stage.GetPrimAtPath("/flight/body").GetChildren()]
+        (shown,) = [mesh for mesh in meshes if mesh.ComputeVisibility(code) == "inherited"]
+        low, high = np.array(shown.GetExtentAttr().Get(), dtype=float)
+        world = np.array(shown.ComputeLocalToWorldTransform(code))
+        seen = np.array([[*low, 1.0], [*high, 1.0]]) @ world
+        corners = np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)]) * body.scale
+        true = (corners - body.center_of_mass) @ matrix_from_quaternion(row[3:7]).T + row[:3]
+        size = np.linalg.norm(np.ptp(corners, axis=0))
+        worst = max(worst, float(np.linalg.norm(seen[:, :3] - true, axis=1).max() / size))
+    assert worst < 1e-3 + np.radians(0.1)  # measured 1.4e-3: the place's and the attitude's tolerance
+
+
+def test_a_physics_engine_is_given_the_exact_tensor_the_velocities_and_gravity(tmp_path):
+    file = tmp_path / "flight.usda"
+    assert main(["simulate", "thrown_hammer", "--duration", "0.2", "--usd", str(file)]) == 0
+    run = OfflineRun(read_scene("thrown_hammer"))
+    body, state = run.simulation.setup.body, run.simulation.state
+    stage = Usd.Stage.Open(str(file))
+    prim = stage.GetPrimAtPath("/flight/body")
+    mass = UsdPhysics.MassAPI(prim)
+    assert mass.GetMassAttr().Get() == np.float32(body.mass)
+    # The prim's origin is the centre of mass, and the mesh hangs below it.
+    assert tuple(mass.GetCenterOfMassAttr().Get()) == (0.0, 0.0, 0.0)
+    q = mass.GetPrincipalAxesAttr().Get()
+    axes = matrix_from_quaternion([*q.GetImaginary(), q.GetReal()])
+    tensor = axes @ np.diag(mass.GetDiagonalInertiaAttr().Get()) @ axes.T
+    assert np.abs(tensor - body.inertia).max() < 1e-6 * np.abs(body.inertia).max()  # single precision: measured 1e-7
+    rigid = UsdPhysics.RigidBodyAPI(prim)
+    assert np.allclose(rigid.GetVelocityAttr().Get(), state.linear_velocity, rtol=1e-6)
+    assert np.allclose(np.radians(rigid.GetAngularVelocityAttr().Get()), state.angular_velocity, rtol=1e-6)
+    scene = UsdPhysics.Scene(stage.GetPrimAtPath("/flight/physics_scene"))
+    gravity = np.array(scene.GetGravityDirectionAttr().Get()) * scene.GetGravityMagnitudeAttr().Get()
+    assert np.allclose(gravity, run.simulation.setup.gravity, rtol=1e-6)
+
+
+def test_the_engine_that_integrates_what_it_was_given_lands_where_the_samples_are(tmp_path):
+    """Free fall from the stage's own numbers: mass properties, velocities and gravity are those of the samples."""
+    file = tmp_path / "flight.usda"
+    assert main(["simulate", "thrown_hammer", "--duration", "0.5", "--usd", str(file), "--fps", "50"]) == 0
+    stage = Usd.Stage.Open(str(file))
+    prim = stage.GetPrimAtPath("/flight/body")
+    place = UsdGeom.Xformable(prim).GetOrderedXformOps()[0]
+    velocity = np.array(UsdPhysics.RigidBodyAPI(prim).GetVelocityAttr().Get(), dtype=float)
+    scene = UsdPhysics.Scene(stage.GetPrimAtPath("/flight/physics_scene"))
+    gravity = np.array(scene.GetGravityDirectionAttr().Get()) * scene.GetGravityMagnitudeAttr().Get()
+    fallen = np.array(place.Get(0.0)) + 0.5 * velocity + 0.125 * gravity
+    assert np.abs(np.array(place.Get(25.0)) - fallen).max() < 1e-5
+    assert place.GetNumTimeSamples() == 26
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--usd", "a.usdz"], ("--usd", ".usda or .usdc")),
+        (["--usd", "{tmp}/a.usda", "--tolerance", "-1"], ("--tolerance", "-1.0")),
+    ],
+)
+def test_what_makes_no_stage_is_refused_in_one_line(arguments, words, tmp_path, capsys):
+    arguments = [word.replace("{tmp}", str(tmp_path)) for word in arguments]
+    assert main(["simulate", "book", "--duration", "0.1", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and all(word in err for word in words)
+
+
+def test_without_usd_core_the_extra_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    assert main(["simulate", "book", "--usd", str(tmp_path / "a.usda")]) == 2
+    assert "pip install 'rigid_proto_ros[export]'" in capsys.readouterr().err
