@@ -79,8 +79,8 @@ adaptive_steps_at = _function_at(ADAPTIVE_STEPS)
 
 
 def address_of_array(array: np.ndarray) -> int:
-    """Where the first number of an array stands."""
-    return array.__array_interface__["data"][0]
+    """Where the first number of an array stands, which may be written to."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
 
 
 def _pointer_to(kind: types.Type) -> Callable:

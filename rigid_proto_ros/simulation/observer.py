@@ -160,7 +160,20 @@ class Observers(Observer):
 
 def listens(observer: Observer, method: str) -> bool:
     """Whether the observer does anything with a method of the interface."""
-    return method in vars(observer) or method in _methods_of(type(observer))  # type: ignore[arg-type]  # a protocol's class has a hash as every class has
+    return method in heard_by(observer)
+
+
+def heard_by(observer: Observer) -> frozenset[str]:
+    """The methods of the interface that the observer does anything with, among other names."""
+    of_its_kind = _methods_of(type(observer))  # type: ignore[arg-type]  # a protocol's class has a hash as every class has
+    own = vars(observer)
+    return of_its_kind.union(own) if own else of_its_kind
+
+
+def ignores_events(observer: Observer) -> bool:
+    """Whether the observer never wants the line of an event."""
+    asked = type(observer).wants_events is not Observer.wants_events
+    return not asked and "event" not in heard_by(observer)
 
 
 @functools.cache

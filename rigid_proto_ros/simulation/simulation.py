@@ -7,9 +7,9 @@ commands are constant and an integrator advances the body. ``advance`` is the wh
 
 from __future__ import annotations
 
-import heapq
 from collections import Counter
 from collections.abc import Iterable
+from heapq import heappop, heappush
 from typing import Protocol
 
 from ..base.errors import CommandRefused, InputError
@@ -140,7 +140,7 @@ class Simulation(Readings):
         self._arrivals += 1
         key = order_key(pending.command, pending.listed)
         # Arrival decides only between messages that are equal to the byte.
-        heapq.heappush(self._pending, (pending.time_ns, key, self._arrivals, pending))
+        heappush(self._pending, (pending.time_ns, key, self._arrivals, pending))
 
     def refuse(self, error: CommandRefused, count: int = 1) -> None:
         """Count a refusal, of so many commands at once, and tell the observer."""
@@ -198,17 +198,17 @@ class Simulation(Readings):
         due: list[Pending] = []
         if not pending or pending[0][0] >= until_ns:
             return until_ns, due
-        taken, setup = [], self.setup
+        setup = self.setup
         while pending and pending[0][0] < until_ns:
             first = pending[0][-1]
             if first.settled_for is not setup and not self._is_ready(first):
                 until_ns = first.time_ns
                 break
-            taken.append(heapq.heappop(pending))
+            heappop(pending)
+            due.append(first)
         # All commands of one instant act together.
-        while taken and taken[-1][0] == until_ns:
-            heapq.heappush(pending, taken.pop())
-        due = [entry[-1] for entry in taken]
+        while due and due[-1].time_ns == until_ns:
+            self._push(due.pop())
         self._arrays.put(due)
         return until_ns, due
 
@@ -240,7 +240,8 @@ class Simulation(Readings):
     def _tell(self, due: list[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier = self.observer, self._notifier
-        if not (notifier.wants_loads or observer.wants_events() or self._arrays.has_timeouts):
+        heard = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
+        if not (heard or self._arrays.has_timeouts):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
@@ -287,7 +288,7 @@ class Simulation(Readings):
             self._thrust(loads)
             changed = True
         while self._pending and self._pending[0][0] == now_ns:
-            pending = heapq.heappop(self._pending)[-1]
+            pending = heappop(self._pending)[-1]
             self.listed = pending.listed
             try:
                 self._apply(pending)
@@ -443,7 +444,9 @@ def _check_load_supported(command: WrenchCommand, load: Load, setup: Setup) -> N
 
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
     """What the scene asks of its integrator."""
-    needs = set().union(*(needs_of_load(load) for load in loads))
+    needs: set[str] = set()
+    for load in loads:
+        needs |= needs_of_load(load)
     if not setup.gyroscopic:
         needs.add(NO_GYROSCOPIC_TERM)
     if setup.angular_damping:
