@@ -131,7 +131,8 @@ def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
 @njit(cache=True, error_model="numpy")
 def commit_until(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; whether all were good."""
-    if until_ns == n[COMMITTED_NS]:
+    # A step that waits and goes on beyond that leaves nothing to commit.
+    if until_ns == n[COMMITTED_NS] or until_ns - n[COMMITTED_NS] < f[CONTROL + ctl.ACCEPTED_NS]:
         return True
     advanced, taken, good = commit(
         methods[n[METHOD]],
