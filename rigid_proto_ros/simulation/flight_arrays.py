@@ -98,8 +98,8 @@ def _entries() -> tuple[Callable, Callable]:
 
 
 class FlightArrays:
-    """f, n, times, loads, events: as simulation/flight.py lays them out. What isn't a matter of arrays is
-    the simulation's.
+    """f, n, times, loads, events: as simulation/flight.py lays them out; integers: n once more, as Python reads single
+    numbers fastest. What isn't a matter of arrays is the simulation's.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -113,12 +113,12 @@ class FlightArrays:
     def _take_methods(self, setup: Setup, start: FlightStart) -> None:
         self.integrator, self.methods = setup.integrator, start.methods
         if len(self.f) < fl.ROOM + start.room:
-            f, n, head = self.f[: fl.ROOM].copy(), self.n.copy(), self._head
+            f, n, head = self.f[: fl.ROOM].copy(), self.n.copy(), self.integers
             table = head[TABLES_AT], head[TABLE_ROWS]
             self._make_room(start.room)
             self.f[: fl.ROOM], self.n[:] = f, n
-            self._head[TABLES_AT], self._head[TABLE_ROWS] = table
-        self._head[METHODS_AT], self._head[METHODS] = start.methods_at, len(start.methods)
+            self.integers[TABLES_AT], self.integers[TABLE_ROWS] = table
+        self.integers[METHODS_AT], self.integers[METHODS] = start.methods_at, len(start.methods)
 
     def take(self, setup: Setup) -> None:
         """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
@@ -135,11 +135,11 @@ class FlightArrays:
 
     def start_over(self, setup: Setup, tied: Tied | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
-        start, load_ids = setup.flight_start, self._head[fl.LOAD_IDS]
+        start, load_ids = setup.flight_start, self.integers[fl.LOAD_IDS]
         self._take_methods(setup, start)
         self.f[: fl.ROOM] = start.f
         self.n[:] = start.n
-        self._head[fl.LOAD_IDS] = load_ids
+        self.integers[fl.LOAD_IDS] = load_ids
         if tied is not None:
             self.tie(tied)
         self._begin(self._at)
@@ -155,7 +155,7 @@ class FlightArrays:
 
     def put(self, due: list[Pending]) -> None:
         """Put commands into the tables, behind the loads that act, as those that act next."""
-        head = self._head
+        head = self.integers
         first = self.first_due = head[fl.ACTING]
         last = first + len(due)
         if last > head[TABLE_ROWS]:
@@ -172,12 +172,12 @@ class FlightArrays:
     @property
     def waiting(self) -> int:
         """How many of the commands put last haven't acted yet."""
-        return self._head[fl.DUE_END] - self._head[fl.DUE]
+        return self.integers[fl.DUE_END] - self.integers[fl.DUE]
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
         while (came := self._fly(self._at, until_ns)) == fl.NO_KERNEL:
-            provide_kernel(self.integrator, self.methods, self._head[fl.METHOD])
+            provide_kernel(self.integrator, self.methods, self.integers[fl.METHOD])
         return came == fl.REACHED
 
     def apply(self) -> None:
@@ -194,14 +194,9 @@ class FlightArrays:
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
-        self._head[fl.EVENTS] = self._head[fl.TIMEOUTS] = 0
-        if self._head[fl.ACTING]:
+        self.integers[fl.EVENTS] = self.integers[fl.TIMEOUTS] = 0
+        if self.integers[fl.ACTING]:
             fl.end_all(self.n, self.times, self.events)
-
-    @property
-    def has_timeouts(self) -> bool:
-        """Whether held wrenches timed out in the last call."""
-        return self._head[fl.TIMEOUTS] > 0
 
     def last_events(self) -> list[list[int]]:
         """What the last call began and ended: rows (EVENT,)."""
@@ -222,12 +217,12 @@ class FlightArrays:
     @property
     def time_ns(self) -> int:
         """Simulated time [ns]."""
-        return self._head[fl.NOW_NS]
+        return self.integers[fl.NOW_NS]
 
     @property
     def state(self) -> State:
         """The state now."""
-        return State(self._head[fl.NOW_NS], self.row.copy())
+        return State(self.integers[fl.NOW_NS], self.row.copy())
 
     def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
@@ -237,7 +232,7 @@ class FlightArrays:
     @property
     def acts(self) -> bool:
         """Whether any load acts."""
-        return bool(self._head[fl.ACTING])
+        return bool(self.integers[fl.ACTING])
 
     def acting(self) -> Iterator[Acting]:
         """The loads that act, in the order in which they began."""
@@ -284,37 +279,37 @@ class FlightArrays:
         at = address_of_array(whole)
         first = -(at // 8 + INTEGERS + fl.ROOM) % _LINE
         self._at = at + 8 * first
-        integers = whole[first : first + INTEGERS].view(np.int64)
-        self._head = integers.data
-        self._head[DOUBLES], self._head[fl.ACTING] = doubles, 0
-        self.n = integers[: fl.INTEGERS]
+        own = whole[first : first + INTEGERS].view(np.int64)
+        self.integers = own.data
+        self.integers[DOUBLES], self.integers[fl.ACTING] = doubles, 0
+        self.n = own[: fl.INTEGERS]
         self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
         self.row = self.f[fl.ROW : fl.ROW + 13]
 
     def _make_tables(self, rows: int) -> None:
         """Tables of so many rows; what acts goes on."""
-        kept = self._head[fl.ACTING]
+        kept = self.integers[fl.ACTING]
         before = (self.times[:kept], self.loads[:kept]) if kept else None
         self._tables = np.zeros(sum(_sizes(rows)), np.int64)
         self._table_bytes = self._tables.data.cast("B")
-        self._head[TABLES_AT], self._head[TABLE_ROWS] = address_of_array(self._tables), rows
+        self.integers[TABLES_AT], self.integers[TABLE_ROWS] = address_of_array(self._tables), rows
         if before is not None:
             self.times[:kept], self.loads[:kept] = before
 
     @property
     def times(self) -> np.ndarray:
         """(rows, TIMES)"""
-        times, _, _ = _sizes(self._head[TABLE_ROWS])
+        times, _, _ = _sizes(self.integers[TABLE_ROWS])
         return self._tables[:times].reshape(-1, fl.TIMES)
 
     @property
     def loads(self) -> np.ndarray:
         """(rows, LOAD_ROW)"""
-        times, loads, _ = _sizes(self._head[TABLE_ROWS])
+        times, loads, _ = _sizes(self.integers[TABLE_ROWS])
         return self._tables[times : times + loads].view(np.float64).reshape(-1, fl.LOAD_ROW)
 
     @property
     def events(self) -> np.ndarray:
         """(4 rows + 4, EVENT)"""
-        times, loads, _ = _sizes(self._head[TABLE_ROWS])
+        times, loads, _ = _sizes(self.integers[TABLE_ROWS])
         return self._tables[times + loads :].reshape(-1, fl.EVENT)

@@ -231,7 +231,7 @@ class Simulation(Readings):
             for pending in due[waiting:]:
                 self._push(pending)
             del due[waiting:]
-        if due or self._notifier.wants_loads or arrays.has_timeouts:
+        if due or self._notifier.wants_loads or arrays.integers[fl.TIMEOUTS]:
             self._tell(due)
         self.time_ns = until_ns if reached else arrays.time_ns
         self.state = State(self.time_ns, arrays.row.copy())
@@ -241,7 +241,7 @@ class Simulation(Readings):
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier = self.observer, self._notifier
         heard = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
-        if not (heard or self._arrays.has_timeouts):
+        if not (heard or self._arrays.integers[fl.TIMEOUTS]):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
