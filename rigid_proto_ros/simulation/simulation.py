@@ -179,7 +179,7 @@ class Simulation(Readings):
             raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
         while True:
             # 1. Commands that are nothing but loads are handed to the compiled flight.
-            event_ns, due = self._hand_over(until_ns) if self._pending or self._string.tied else (until_ns, [])
+            event_ns, due = self._hand_over(until_ns)
             # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
             if not self._fly(event_ns, due):
                 return self._stop_in_last_good_state()
