@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .compilation import njit
+from .elementary import sine_cosine
 
 Numbers = Sequence[float] | np.ndarray
 """Components of a vector or a quaternion, as they may be given."""
@@ -27,6 +28,16 @@ def vector(numbers: Numbers) -> Vector:
 def cross(a: Numbers, b: Numbers) -> np.ndarray:
     """a × b (3,)."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def dot(a: Numbers, b: Numbers) -> float:
+    """a · b of three components, summed in their order: NumPy's dot and norm leave that to BLAS."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def length(v: Numbers) -> float:
+    """|v|, where squares neither over- nor underflow."""
+    return math.sqrt(dot(v, v))
 
 
 def times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
@@ -99,8 +110,9 @@ def exponential(x: float, y: float, z: float) -> tuple[float, float, float, floa
     """Unit quaternion xyzw of the turn by |v| [rad] about v = (x, y, z); exact in the limit of small turns too."""
     angle = math.sqrt(x * x + y * y + z * z)
     # sin(a/2)/a: below 1e-4 the series ½ − a²/48 errs by 1e-19.
-    factor = math.sin(0.5 * angle) / angle if angle > 1e-4 else 0.5 - angle * angle / 48.0
-    return x * factor, y * factor, z * factor, math.cos(0.5 * angle)
+    sine, cosine = sine_cosine(0.5 * angle)
+    factor = sine / angle if angle > 1e-4 else 0.5 - angle * angle / 48.0
+    return x * factor, y * factor, z * factor, cosine
 
 
 @njit(cache=True)

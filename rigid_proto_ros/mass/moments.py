@@ -338,7 +338,7 @@ def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
         reference,
         moments.center,
         moments.center_low,
-        moments.second * factor**3,
+        moments.second * (factor * factor * factor),
         "closed form",
     )
 
@@ -355,5 +355,5 @@ def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     second = np.zeros(6)
     # A flat box has no volume but a distribution all the same: a unit measure then stands for its mass.
     measure = volume if volume > 0.0 else 1.0
-    second[[0, 3, 5]] = measure * side**2 / 12.0
+    second[[0, 3, 5]] = measure * (side * side) / 12.0
     return Moments(measure, middle, np.zeros(3), np.zeros(3), second, "closed form")

@@ -19,7 +19,7 @@ MAX_DIGITS = 18
 
 # Powers of ten that a double holds exactly: within them one multiplication or division rounds once, hence correctly
 # (Clinger, "How to read floating point numbers accurately", 1990).
-_POWERS = np.array([10.0**k for k in range(23)])
+_POWERS = np.array([float(10**k) for k in range(23)])
 
 
 @njit(cache=True, nogil=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.rotation import Numbers, cross, times, transposed_times, vector
+from ..base.rotation import Numbers, cross, dot, times, transposed_times, vector
 from .body import Body
 from .state import State
 
@@ -131,7 +131,7 @@ class Tied:
         """
         least = NO_DIRECTION * settings.rest_length
         mass = mass or effective_mass(body, self.arm(body), state, self.span(body, state), least)
-        stiffness = mass * settings.frequency**2 if settings.frequency > 0.0 else settings.stiffness
+        stiffness = mass * (settings.frequency * settings.frequency) if settings.frequency > 0.0 else settings.stiffness
         return replace(
             self,
             effective_mass=mass,
@@ -190,7 +190,7 @@ def effective_mass(body: Body, arm: np.ndarray, state: State, span: np.ndarray, 
     turning = 0.0
     for direction in directions:
         lever = cross(arm, direction)
-        turning += weight * float((lever * body.angular_acceleration(lever)).sum())
+        turning += weight * dot(lever, body.angular_acceleration(lever))
     return 1.0 / (1.0 / body.mass + turning)
 
 
@@ -199,4 +199,4 @@ def _length(vector: np.ndarray) -> float:
     if largest == 0.0:
         return 0.0
     scaled = vector / largest
-    return largest * math.sqrt(float((scaled * scaled).sum()))
+    return largest * math.sqrt(dot(scaled, scaled))

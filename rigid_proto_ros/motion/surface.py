@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import Numbers
+from ..base.elementary import inverse_tangent_of
+from ..base.rotation import Numbers, length
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,10 @@ class Surface:
         which doesn't depend on how the faces are triangulated. Zero where they cancel.
         """
         point = np.asarray(point, dtype=float)
-        diagonal = float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
-        outward = np.array(_pseudo_normal(self.vertices, self.triangles, point, 1e-9 * diagonal))
-        length = math.sqrt(float((outward * outward).sum()))
-        return -outward / length if length > 1e-12 else np.zeros(3)
+        box = self.vertices.max(axis=0) - self.vertices.min(axis=0)
+        outward = np.array(_pseudo_normal(self.vertices, self.triangles, point, 1e-9 * length(box)))
+        size = length(outward)
+        return -outward / size if size > 1e-12 else np.zeros(3)
 
 
 @njit(cache=True)
@@ -159,7 +160,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
 @njit(cache=True)
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
     x, y, z = _cross(a, b)
-    return math.atan2(math.sqrt(x * x + y * y + z * z), (a * b).sum())
+    return inverse_tangent_of(math.sqrt(x * x + y * y + z * z), (a * b).sum())
 
 
 @njit(cache=True)

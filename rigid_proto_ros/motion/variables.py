@@ -12,11 +12,10 @@ e⁻ᶻ)/z². Damping is linear, so what a body-fixed force adds obeys u' = R g_
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.elementary import exponential_less_one
 from ..base.rotation import multiply
 from .problem import (
     PRINCIPAL_AXES,
@@ -51,7 +50,7 @@ def damping_functions(z: float) -> tuple[float, float]:
         for k in range(13, -1, -1):
             phi2 = (1.0 - z * phi2) / (k + 2.0)
         return 1.0 - z * phi2, phi2
-    phi1 = -math.expm1(-z) / z
+    phi1 = -exponential_less_one(-z) / z
     return phi1, (1.0 - phi1) / z
 
 

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.elementary import inverse_tangent_of
 from ..base.rotation import rotate
 from ..motion.state import angular_momentum, kinetic_energy
 
@@ -85,7 +86,7 @@ def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
     y = a[3] * b[1] + a[0] * b[2] - a[1] * b[3] - a[2] * b[0]
     z = a[3] * b[2] - a[0] * b[1] + a[1] * b[0] - a[2] * b[3]
-    return 2.0 * math.atan2(_length(x, y, z), abs(w))
+    return 2.0 * inverse_tangent_of(_length(x, y, z), abs(w))
 
 
 @njit(cache=True, error_model="numpy")
@@ -128,7 +129,7 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
         return _length(lx, ly, lz)
     ax, ay, az = context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2]
     across = _length(ly * az - lz * ay, lz * ax - lx * az, lx * ay - ly * ax)
-    return math.atan2(across, lx * ax + ly * ay + lz * az)
+    return inverse_tangent_of(across, lx * ax + ly * ay + lz * az)
 
 
 @njit(cache=True, error_model="numpy")

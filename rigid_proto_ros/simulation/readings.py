@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ..base.rotation import Numbers, cross, transposed_times
+from ..base.rotation import Numbers, cross, dot, length, transposed_times
 from ..motion.integrators.error_measure import FLOOR
 from ..motion.loads import LoadSum
 from ..motion.state import State
@@ -90,7 +90,7 @@ class Readings:
         """
         setup = self.setup
         limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
-        spin = float((self.state.angular_velocity_body**2).sum()) ** 0.5 * h
+        spin = length(self.state.angular_velocity_body) * h
         string = self.string
         swing = string.frequency * h if string else 0.0
         if spin > limit:
@@ -131,7 +131,7 @@ class Readings:
         setup = self.setup
         # Read once: another thread may let it go meanwhile.
         string = self.string
-        energy = -setup.body.mass * float((setup.gravity * self.state.position).sum())
+        energy = -setup.body.mass * dot(setup.gravity, self.state.position)
         return energy + (string.potential_energy(setup.body, self.state) if string else 0.0)
 
     @property
@@ -152,8 +152,8 @@ class Readings:
         if turned or self.setup.angular_damping or not self.setup.gyroscopic:
             return 0.0
         start = self._segment.start.angular_momentum(self.setup.body.inertia)
-        moved, size = self.angular_momentum - start, float((start * start).sum()) ** 0.5
-        return float((moved * moved).sum()) ** 0.5 / size if size > 0.0 else 0.0
+        moved, size = self.angular_momentum - start, length(start)
+        return length(moved) / size if size > 0.0 else 0.0
 
     @property
     def has_pending(self) -> bool:
@@ -189,7 +189,7 @@ def why_rounding_binds(setup: Setup, state: State, step_floor: bool, exact_step:
     step_floor: the stepper's own report. exact_step: the segment is one exact step. elapsed: since the segment's start
     [s].
     """
-    accuracy, spin = setup.accuracy, math.sqrt(float((state.angular_velocity_body**2).sum()))
+    accuracy, spin = setup.accuracy, length(state.angular_velocity_body)
     inertia, moments = setup.body.inertia, setup.body.principal_moments
     rate = ROUNDINGS * _EPSILON * spin
     if exact_step and rate > accuracy:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.addresses import address_of_array
+from ..base.rotation import length
 from ..motion.body import BODY, LENGTH, Body
 from ..motion.integrators.integrator import Integrator
 from ..motion.integrators.stepping import COLUMNS, ROWS, method_table
@@ -73,7 +74,7 @@ class Setup:
         if self.surface is None:
             return 1.0
         diagonal = self.surface.extent * self.body.scale
-        return 0.5 * float((diagonal * diagonal).sum()) ** 0.5
+        return 0.5 * length(diagonal)
 
     @cached_property
     def body_row(self) -> np.ndarray:

@@ -104,7 +104,7 @@ def _checked(tied: Tied, body: Body, state: State) -> Tied:
         for end in (tied.target, tied.origin)
     )
     with np.errstate(over="ignore"):
-        acceleration = tied.frequency**2 * farthest
+        acceleration = tied.frequency * tied.frequency * farthest
     if not acceleration <= MAX_ACCELERATION:
         raise CommandRefused(
             "magnitude",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy import uint32, uint64
 
 from ..base.compilation import njit
+from ..base.elementary import exponential_of, logarithm, sine_cosine
 
 _POOL = 4
 _LOW = uint64(0xFFFFFFFF)
@@ -226,7 +227,7 @@ def normal_quantile(u: float) -> float:
     q = u - 0.5
     if abs(q) <= 0.425:
         return q * _tail(0.180625 - q * q, _A, _B)
-    r = math.sqrt(-math.log(min(u, 1.0 - u)))
+    r = math.sqrt(-logarithm(min(u, 1.0 - u)))
     x = _tail(r - 1.6, _C, _D) if r <= 5.0 else _tail(r - 5.0, _E, _F)
     return x if q > 0.0 else -x
 
@@ -249,15 +250,17 @@ def shape_uniforms(kind: int, a: float, b: float, u: np.ndarray, out: np.ndarray
         if kind == UNIFORM:
             out[i, 0] = a + (b - a) * u[i, 0]
         elif kind == LOG_UNIFORM:
-            out[i, 0] = math.exp(math.log(a) + (math.log(b) - math.log(a)) * u[i, 0])
+            out[i, 0] = exponential_of(logarithm(a) + (logarithm(b) - logarithm(a)) * u[i, 0])
         elif kind == NORMAL:
             out[i, 0] = a + b * normal_quantile(min(max(u[i, 0], 2.0**-54), 1.0 - 2.0**-53))
         elif kind == ROTATION:
             near, far = math.sqrt(1.0 - u[i, 0]), math.sqrt(u[i, 0])
-            s, t = 2.0 * math.pi * u[i, 1], 2.0 * math.pi * u[i, 2]
-            out[i, 0], out[i, 1] = near * math.sin(s), near * math.cos(s)
-            out[i, 2], out[i, 3] = far * math.sin(t), far * math.cos(t)
+            sine, cosine = sine_cosine(2.0 * math.pi * u[i, 1])
+            out[i, 0], out[i, 1] = near * sine, near * cosine
+            sine, cosine = sine_cosine(2.0 * math.pi * u[i, 2])
+            out[i, 2], out[i, 3] = far * sine, far * cosine
         else:
-            z, turn = 2.0 * u[i, 0] - 1.0, 2.0 * math.pi * u[i, 1]
+            z = 2.0 * u[i, 0] - 1.0
+            sine, cosine = sine_cosine(2.0 * math.pi * u[i, 1])
             across = math.sqrt(max(1.0 - z * z, 0.0))
-            out[i, 0], out[i, 1], out[i, 2] = a * across * math.cos(turn), a * across * math.sin(turn), a * z
+            out[i, 0], out[i, 1], out[i, 2] = a * across * cosine, a * across * sine, a * z

@@ -12,6 +12,13 @@ from __future__ import annotations
 import math
 
 from ...base.compilation import njit
+from ...base.elementary import (
+    hyperbolic_secant,
+    hyperbolic_tangent,
+    inverse_hyperbolic_tangent,
+    inverse_tangent,
+    sine_cosine,
+)
 
 SMALL_ARGUMENT = 0.03
 """Below it the Maclaurin series of sn, cut after u⁹, errs by 2e-19 (for m = 1 the next term is 0.0089 u¹¹)."""
@@ -34,12 +41,12 @@ def complete_quarter_period(m1: float) -> float:
 def sn_cn_dn(u: float, m: float, m1: float) -> tuple[float, float, float]:
     """sn, cn, dn (u | m); cn and dn keep their relative accuracy where they are small. |u| ≤ K, or m₁ = 0."""
     if m1 == 0.0:
-        sech = 1.0 / math.cosh(u) if abs(u) < 700.0 else 0.0
-        return math.tanh(u), sech, sech
+        sech = hyperbolic_secant(u)
+        return hyperbolic_tangent(u), sech, sech
     if abs(u) < 1.0:
         return _by_series(u, m)
     if m == 0.0:
-        return math.sin(u), math.cos(u), 1.0
+        return (*sine_cosine(u), 1.0)
     return _by_landen(u, m1)
 
 
@@ -95,7 +102,7 @@ def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
             break
         squeeze *= a
         a = c
-    s, co = math.sin(c * u), math.cos(c * u)
+    s, co = sine_cosine(c * u)
     if s == 0.0:
         return s, co, 1.0
     a = co / s
@@ -138,7 +145,7 @@ def _rc_of_one(e: float) -> float:
         # Σ (−e)ᵏ/(2k + 1), six terms.
         return 1.0 - e * (1.0 / 3.0 - e * (0.2 - e * (1.0 / 7.0 - e * (1.0 / 9.0 - e / 11.0))))
     root = math.sqrt(abs(e))
-    return math.atan(root) / root if e > 0.0 else math.atanh(root) / root
+    return inverse_tangent(root) / root if e > 0.0 else inverse_hyperbolic_tangent(root) / root
 
 
 @njit(cache=True, error_model="numpy")

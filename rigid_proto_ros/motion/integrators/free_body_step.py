@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 
 from ...base.compilation import njit
+from ...base.elementary import inverse_tangent, sine_cosine
 from ...base.exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
 from ...base.rotation import multiply, normalize
 from .elliptic import carlson_rj, complete_quarter_period, sn_cn_dn
@@ -147,7 +148,7 @@ def _circulate(A: float, B: float, C: float, w1: float, w2: float, w3: float, h:
         v1, v2, v3, psi = _long(A, B, C, w1, w2, w3, P, Q, rate, h)
     M1, M2, M3 = A * w1, B * w2, C * w3
     L = math.sqrt(M1 * M1 + M2 * M2 + M3 * M3)
-    s, c = math.sin(0.5 * psi), math.cos(0.5 * psi)
+    s, c = sine_cosine(0.5 * psi)
     tx, ty, tz, tw = multiply(-M2, M1, 0.0, L + M3, 0.0, 0.0, s, c)
     tx, ty, tz, tw = multiply(tx, ty, tz, tw, B * v2, -A * v1, 0.0, L + C * v3)
     return tx, ty, tz, tw, v1, v2, v3
@@ -157,8 +158,9 @@ def _circulate(A: float, B: float, C: float, w1: float, w2: float, w3: float, h:
 def _even_turn(w1: float, w2: float, w3: float, h: float) -> tuple[float, float, float, float]:
     """Turn by |w| h about w."""
     size = math.sqrt(w1 * w1 + w2 * w2 + w3 * w3)
-    s = math.sin(0.5 * size * h) / size
-    return w1 * s, w2 * s, w3 * s, math.cos(0.5 * size * h)
+    s, c = sine_cosine(0.5 * size * h)
+    s /= size
+    return w1 * s, w2 * s, w3 * s, c
 
 
 @njit(cache=True, error_model="numpy")
@@ -298,7 +300,7 @@ def _added_by_phase(s0: float, s: float, s1: float, c1: float, modulus1: float, 
     product = s0 * s * s1 / (1.0 + nu * s1 * s1 - nu * s0 * s * c1 * d1)
     root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
     angle = root * product
-    return product if abs(angle) < 1e-9 else math.atan(angle) / root
+    return product if abs(angle) < 1e-9 else inverse_tangent(angle) / root
 
 
 @njit(cache=True, error_model="numpy")

@@ -22,6 +22,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.elementary import exponential_of
 from ...base.rotation import exponential, multiply, rotate, rotate_inverse
 from ..problem import (
     ACCELERATION_ADDED,
@@ -160,7 +161,7 @@ def _turn_back(y: np.ndarray, p: np.ndarray, n: tuple[float, float, float], gain
     back = math.sqrt(max(square, 0.0))
     if one_sided or rate >= 0.0:
         back = -back
-    left = math.exp(-0.5 * p[STRING_DAMPING] * lightness * h)
+    left = exponential_of(-0.5 * p[STRING_DAMPING] * lightness * h)
     y[HEAT] += 0.5 * back * back * (1.0 - left) * (1.0 + left) / lightness
     _strike(y, p, n, (left * back - rate) / lightness)
     if square < 0.0:
@@ -176,6 +177,6 @@ def _turn_back(y: np.ndarray, p: np.ndarray, n: tuple[float, float, float], gain
             n = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
             lightness = yield_along(y, p, n[0], n[1], n[2])[0]
             rate = _rate(y, p, n)
-            left = math.exp(-0.5 * p[STRING_DAMPING] * lightness * h)
+            left = exponential_of(-0.5 * p[STRING_DAMPING] * lightness * h)
             y[HEAT] += 0.5 * rate * rate * (1.0 - left) * (1.0 + left) / lightness
             _strike(y, p, n, (left - 1.0) * rate / lightness)

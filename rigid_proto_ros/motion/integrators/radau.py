@@ -19,6 +19,7 @@ from fractions import Fraction
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.elementary import sine, sine_cosine
 from ...base.rotation import multiply, normalize, rotate, rotate_inverse
 from ..problem import (
     ACCELERATION_BODY,
@@ -98,7 +99,8 @@ def _rates_of_turn(tx: float, ty: float, tz: float, wx: float, wy: float, wz: fl
         )
     else:
         half = 0.5 * math.sqrt(x)
-        k = (1.0 - half / math.tan(half)) / x
+        s, c = sine_cosine(half)
+        k = (1.0 - half * c / s) / x
     ax, ay, az = ty * wz - tz * wy, tz * wx - tx * wz, tx * wy - ty * wx
     return (
         wx + 0.5 * ax + k * (ty * az - tz * ay),
@@ -138,8 +140,8 @@ def _turns(V: np.ndarray, h: float, theta: np.ndarray, rates: np.ndarray) -> boo
 def _half_turn(tx: float, ty: float, tz: float) -> tuple[float, float, float, float]:
     """exp θ as quaternion, its scalar part less 1 without cancellation."""
     angle = math.sqrt(tx * tx + ty * ty + tz * tz)
-    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
-    less = math.sin(0.25 * angle)
+    s = 0.5 if angle < 1e-8 else sine(0.5 * angle) / angle
+    less = sine(0.25 * angle)
     return s * tx, s * ty, s * tz, -2.0 * less * less
 
 

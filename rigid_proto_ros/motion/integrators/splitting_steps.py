@@ -24,6 +24,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.elementary import cube_root
 from ..problem import (
     ACCELERATION_BODY,
     DAMPING_ANGULAR,
@@ -86,7 +87,7 @@ def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
         rate, distance = circulation(p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2], y[4], y[5], y[6])
         allowed = accuracy / strongest
         # The last one is for a spin that the loads have stopped: |ω| is κh then.
-        resolved = min(RESOLVED / spin, math.sqrt(2.0 * allowed / spin), (allowed / strongest) ** (1.0 / 3.0))
+        resolved = min(RESOLVED / spin, math.sqrt(2.0 * allowed / spin), cube_root(allowed / strongest))
         short = min(SHORT_PHASE / rate, allowed / (1.0 + SHORT_SPREAD))
         long = allowed / (1.0 + SPREAD + SPREAD_AT_SEPARATRIX / distance)
         h = min(max(resolved, short, long), ctl.LONGEST)

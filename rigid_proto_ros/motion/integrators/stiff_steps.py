@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.elementary import exponential_of, logarithm
 from ...base.simd import aligned
 from ..problem import (
     ATTACH,
@@ -286,7 +287,7 @@ def _implicit(  # noqa: PLR0913
         if error <= allowed or noisy:
             break
         last = error
-        factor = SAFETY * math.exp(math.log(allowed / error) * _EXPONENT) if math.isfinite(error) else 0.0
+        factor = SAFETY * exponential_of(logarithm(allowed / error) * _EXPONENT) if math.isfinite(error) else 0.0
         h *= min(max(factor, _LEAST), 0.7)
         if whole_ns:
             h = math.floor(h * 1e9) * 1e-9
@@ -296,7 +297,7 @@ def _implicit(  # noqa: PLR0913
     control[ctl.PENDING_EXCESS] += max(error - accuracy * h, 0.0)
     # What is estimated below a quarter of the floor is rounding, and says nothing about a longer step.
     clear = error > 0.25 * FLOOR
-    growth = SAFETY * math.exp(math.log(allowed / error) * _EXPONENT) if clear else _MOST_GROWTH
+    growth = SAFETY * exponential_of(logarithm(allowed / error) * _EXPONENT) if clear else _MOST_GROWTH
     control[ctl.NEXT] = min(h * min(max(growth, 0.2), _MOST_GROWTH), ctl.LONGEST)
     switch = NONE
     if is_one_sided(p):

@@ -1,0 +1,617 @@
+# SPDX-License-Identifier: MIT
+"""Elementary functions that give the same bits on every machine: a C library's differ by version, vendor and processor.
+
+They are made of what IEEE 754 fixes, +, −, ·, / and √, in the order written, and err by less than 1 ulp (measured
+against mpmath: see test/base/test_elementary.py). Where a sum decides about the last digit it is taken in pairs of
+doubles (exact_arithmetic.py). tools/elementary_coefficients.py computes the constants.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from .compilation import INTERPRETED, intrinsic, njit
+from .exact_arithmetic import fast_two_sum, pair_add, pair_divide, pair_multiply, two_product, two_sum
+
+BIAS, MANTISSA_BITS = 1023, 52
+MANTISSA = (1 << MANTISSA_BITS) - 1
+
+
+@intrinsic
+def bits_of(_typing_context: Any, _x: Any) -> tuple:
+    """The 64 bits of a double as an integer."""
+    return types.int64(types.float64), lambda _, builder, _signature, arguments: builder.bitcast(
+        arguments[0], ir.IntType(64)
+    )
+
+
+@intrinsic
+def double_of(_typing_context: Any, _bits: Any) -> tuple:
+    """The double with these 64 bits."""
+    return types.float64(types.int64), lambda _, builder, _signature, arguments: builder.bitcast(
+        arguments[0], ir.DoubleType()
+    )
+
+
+if INTERPRETED:
+
+    def bits_of(x: float) -> int:
+        """The 64 bits of a double as an integer."""
+        return int(np.float64(x).view(np.int64))
+
+    def double_of(bits: int) -> float:
+        """The double with these 64 bits."""
+        return float(np.int64(bits).view(np.float64))
+
+
+_TO_NEAREST = 6755399441055744.0
+"""1.5·2⁵²: added and taken off again, it leaves the nearest whole number of one up to 2⁵¹."""
+
+# Parts of log 2 and of π/2: products of the first ones with a whole number, below 2¹¹ and 2²⁰, are exact.
+_LN2_1 = 0.6931471805598903
+_LN2_2 = 5.497923018708371e-14
+_HALF_PI_1 = 1.5707963267341256
+_HALF_PI_2 = 6.077100506303966e-11
+_HALF_PI_3 = 2.0222662487959506e-21
+_PAIR_HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
+
+_AS_ITSELF = 1e-9
+"""|x| below which x²/2 is lost beside 1, so that sine, tangent and their like are x."""
+_FAR = 1.6e6
+"""|x| below which x less whole quarter turns is exact by three parts of π/2."""
+_NEAR_MULTIPLE = 2.0**-30
+"""A rest below which that many digits have cancelled isn't known well enough."""
+
+# Minimax polynomials in the square (exp: in the argument itself) of what is left after
+# sin r = r + r³ S, cos r = 1 − r²/2 + r⁴ C, eʳ = 1 + r + r²/2 + r³ E, artanh s = s + s³ T, arctan z = z + z³ A.
+_SIN = (
+    -0.1666666666666663,
+    0.008333333333322108,
+    -0.00019841269829580234,
+    2.7557313618034487e-06,
+    -2.5050747220107847e-08,
+    1.5896197712199157e-10,
+)
+_COS = (
+    0.041666666666666595,
+    -0.001388888888887304,
+    2.480158728884145e-05,
+    -2.755731417625541e-07,
+    2.087570041819921e-09,
+    -1.1358514060814301e-11,
+)
+_EXP = (
+    0.16666666666666682,
+    0.0416666666666667,
+    0.008333333333316857,
+    0.001388888888886516,
+    0.00019841269896821913,
+    2.480158736512563e-05,
+    2.75572344355906e-06,
+    2.755723865038956e-07,
+    2.5112179990753723e-08,
+    2.092568857645337e-09,
+)
+_ATANH = (
+    0.33333333333333676,
+    0.1999999999970468,
+    0.14285714371842764,
+    0.11111099214521343,
+    0.0909178617639457,
+    0.0765691609772075,
+    0.07399129342169176,
+)
+_ATAN = (
+    -0.3333333333333333,
+    0.199999999999999,
+    -0.14285714285675663,
+    0.11111111103649086,
+    -0.0909090827462691,
+    0.0769225367843588,
+    -0.06664458490498826,
+    0.05827632965465174,
+    -0.04502428537208239,
+)
+
+# arctan k/8, π/2 ∓ it, π − it for k = 0 … 8, and what doubles lack of them.
+_ANGLES = np.array(
+    [
+        [
+            0.0,
+            0.12435499454676144,
+            0.24497866312686414,
+            0.35877067027057225,
+            0.4636476090008061,
+            0.5585993153435624,
+            0.6435011087932844,
+            0.7188299996216245,
+            0.7853981633974483,
+        ],
+        [
+            1.5707963267948966,
+            1.446441332248135,
+            1.3258176636680326,
+            1.2120256565243244,
+            1.1071487177940904,
+            1.0121970114513341,
+            0.9272952180016122,
+            0.8519663271732721,
+            0.7853981633974483,
+        ],
+        [
+            1.5707963267948966,
+            1.695151321341658,
+            1.8157749899217608,
+            1.9295669970654687,
+            2.0344439357957027,
+            2.129395642138459,
+            2.214297435588181,
+            2.289626326416521,
+            2.356194490192345,
+        ],
+        [
+            3.141592653589793,
+            3.017237659043032,
+            2.896613990462929,
+            2.782821983319221,
+            2.677945044588987,
+            2.5829933382462307,
+            2.498091544796509,
+            2.4227626539681686,
+            2.356194490192345,
+        ],
+    ]
+)
+_ANGLES_LOW = np.array(
+    [
+        [
+            0.0,
+            -3.1253241424539383e-18,
+            1.0698755618734451e-17,
+            -2.4623815582638635e-17,
+            2.2698777452961687e-17,
+            -5.4556305485916264e-18,
+            1.5834785051444286e-17,
+            -2.1478388444456983e-17,
+            3.061616997868383e-17,
+        ],
+        [
+            6.123233995736766e-17,
+            9.211323971545052e-17,
+            -8.824429373951136e-17,
+            3.034500430874847e-17,
+            9.40447137356638e-17,
+            6.668797050595929e-17,
+            4.5397554905923374e-17,
+            -2.831157406069101e-17,
+            3.061616997868383e-17,
+        ],
+        [
+            6.123233995736766e-17,
+            3.0351440199284805e-17,
+            -1.133563127078463e-17,
+            9.211967560598685e-17,
+            2.841996617907152e-17,
+            5.577670940877603e-17,
+            1.880894274713276e-16,
+            3.975395151291068e-17,
+            9.184850993605148e-17,
+        ],
+        [
+            1.2246467991473532e-16,
+            -6.869902525221314e-17,
+            1.950326511428876e-16,
+            9.157734426611613e-17,
+            1.5527705369303147e-16,
+            1.2792031046332694e-16,
+            -4.392407599224622e-18,
+            1.439430683591923e-16,
+            9.184850993605148e-17,
+        ],
+    ]
+)
+
+_LIMB = 28
+_LIMB_MASK = (1 << _LIMB) - 1
+_TWO_OVER_PI = np.array(
+    [
+        0x0000000,
+        0x0000000,
+        0xA2F9836,
+        0xE4E4415,
+        0x29FC275,
+        0x7D1F534,
+        0xDDC0DB6,
+        0x295993C,
+        0x439041F,
+        0xE5163AB,
+        0xDEBBC56,
+        0x1B7246E,
+        0x3A424DD,
+        0x2E00649,
+        0x2EEA09D,
+        0x1921CFE,
+        0x1DEB1CB,
+        0x129A73E,
+        0xE88235F,
+        0x52EBB44,
+        0x84E99C7,
+        0x026B45F,
+        0x7E41399,
+        0x1D63983,
+        0x5339F49,
+        0xC845F8B,
+        0xBDF9283,
+        0xB1FF897,
+        0xFFDE059,
+        0x80FEF2F,
+        0x118B5A0,
+        0xA6D1F6D,
+        0x367ECF2,
+        0x7CB09B7,
+        0x4F463F6,
+        0x69E5FEA,
+        0x2D7527B,
+        0xAC7EBE5,
+        0xF17B3D0,
+        0x739F78A,
+        0x5292EA6,
+        0xBFB5FB1,
+        0x1F8D5D0,
+        0x8560330,
+        0x46FC7B6,
+    ],
+    np.int64,
+)
+"""2/π in limbs of 28 bits, two limbs of zeros before the point."""
+
+
+@njit(cache=True, error_model="numpy")
+def _reduced_exactly(x: float) -> tuple[int, float, float]:
+    """As ``_reduced`` for any finite x, with as many digits of 2/π as that takes (Payne and Hanek, SIGNUM Newsletter 18
+    (1983) 19): those whose product with x is a multiple of four quarter turns are left out.
+    """
+    bits = bits_of(abs(x))
+    mantissa = (bits & MANTISSA) | (1 << MANTISSA_BITS)
+    # The last bit of x counts 2**(first − 1022): from bit ``first`` on, the product's top two bits are the quadrant.
+    first = (bits >> MANTISSA_BITS) - BIAS - MANTISSA_BITS - 2 + 2 * _LIMB
+    at, shift = first // _LIMB, first % _LIMB
+    low, high = mantissa & _LIMB_MASK, mantissa >> _LIMB
+    product = np.empty(7, np.int64)
+    carry, after = 0, 0
+    for k in range(6, -1, -1):
+        limb = ((_TWO_OVER_PI[at + k] << shift) | (_TWO_OVER_PI[at + k + 1] >> (_LIMB - shift))) & _LIMB_MASK
+        total = limb * low + after * high + carry
+        carry, after = total >> _LIMB, limb
+        product[k] = total & _LIMB_MASK
+    quarters = product[0] >> (_LIMB - 2)
+    product[0] &= _LIMB_MASK >> 2
+    negative = product[0] >> (_LIMB - 3) == 1
+    if negative:
+        quarters += 1
+        borrow = 0
+        for k in range(6, -1, -1):
+            difference = -product[k] - borrow
+            product[k] = difference & _LIMB_MASK
+            borrow = 1 if difference < 0 else 0
+        product[0] &= _LIMB_MASK >> 2
+    part, part_low, weight = 0.0, 0.0, 2.0 ** (2 - _LIMB)
+    for k in range(7):
+        part, lost = two_sum(part, float(product[k]) * weight)
+        part_low += lost
+        weight *= 2.0**-_LIMB
+    part, part_low = fast_two_sum(part, part_low)
+    r, r_low = pair_multiply(part, part_low, _PAIR_HALF_PI[0], _PAIR_HALF_PI[1])
+    if negative != (x < 0.0):
+        r, r_low = -r, -r_low
+    return -quarters if x < 0.0 else quarters, r, r_low
+
+
+@njit(cache=True, error_model="numpy")
+def _reduced(x: float) -> tuple[int, float, float]:
+    """n, modulo 4 where it is large, and a pair r with x = n π/2 + r, |r| ≤ π/4.
+
+    Source: Cody and Waite, Software Manual for the Elementary Functions (1980).
+    """
+    size = abs(x)
+    if size < _FAR:
+        whole = (x * (2.0 / math.pi) + _TO_NEAREST) - _TO_NEAREST
+        r, low = two_sum(x - whole * _HALF_PI_1, -whole * _HALF_PI_2)
+        r, low = fast_two_sum(r, low - whole * _HALF_PI_3)
+        if abs(r) > _NEAR_MULTIPLE:
+            return int(whole), r, low
+    if not size < math.inf:
+        return 0, math.nan, 0.0
+    return _reduced_exactly(x)
+
+
+@njit(cache=True, error_model="numpy")
+def _sine(r: float, low: float) -> float:
+    z = r * r
+    c = _SIN
+    zz = z * z
+    tail = (c[1] + z * c[2]) + zz * ((c[3] + z * c[4]) + zz * c[5])
+    return r + (z * r * (c[0] + z * tail) + low * (1.0 - 0.5 * z))
+
+
+@njit(cache=True, error_model="numpy")
+def _cosine(r: float, low: float) -> float:
+    z = r * r
+    c = _COS
+    zz = z * z
+    tail = (c[0] + z * c[1]) + zz * ((c[2] + z * c[3]) + zz * (c[4] + z * c[5]))
+    half = 0.5 * z
+    top = 1.0 - half
+    return top + (((1.0 - top) - half) + (zz * tail - r * low))
+
+
+@njit(cache=True, error_model="numpy")
+def sine_cosine(x: float) -> tuple[float, float]:
+    """sin x and cos x."""
+    if abs(x) < _AS_ITSELF:
+        return x, 1.0
+    n, r, low = _reduced(x) if not abs(x) <= 0.25 * math.pi else (0, x, 0.0)
+    s, c = _sine(r, low), _cosine(r, low)
+    if n & 1:
+        s, c = c, -s
+    if n & 2:
+        s, c = -s, -c
+    return s, c
+
+
+@njit(cache=True, error_model="numpy")
+def sine(x: float) -> float:
+    """sin x."""
+    if abs(x) < _AS_ITSELF:
+        return x
+    n, r, low = _reduced(x) if not abs(x) <= 0.25 * math.pi else (0, x, 0.0)
+    s = _cosine(r, low) if n & 1 else _sine(r, low)
+    return -s if n & 2 else s
+
+
+@njit(cache=True, error_model="numpy")
+def cosine(x: float) -> float:
+    """cos x."""
+    n, r, low = _reduced(x) if not abs(x) <= 0.25 * math.pi else (0, x, 0.0)
+    c = _sine(r, low) if n & 1 else _cosine(r, low)
+    return -c if (n + 1) & 2 else c
+
+
+@njit(cache=True, error_model="numpy")
+def _exponential_parts(x: float) -> tuple[int, float, float, float]:
+    """n, r and a pair (t, t_low) with eˣ = 2ⁿ (1 + r + t), |r| ≤ ½ log 2; |x| < 1000."""
+    whole = (x * (1.0 / 0.6931471805599453) + _TO_NEAREST) - _TO_NEAREST
+    r, low = two_sum(x - whole * _LN2_1, -whole * _LN2_2)
+    square, square_low = two_product(r, r) if abs(r) > 1e-140 else (0.0, 0.0)
+    c = _EXP
+    rr = r * r
+    tail = ((c[0] + r * c[1]) + rr * (c[2] + r * c[3])) + rr * rr * (
+        ((c[4] + r * c[5]) + rr * (c[6] + r * c[7])) + rr * rr * (c[8] + r * c[9])
+    )
+    t, t_low = fast_two_sum(0.5 * square, r * rr * tail + low * (1.0 + r))
+    return int(whole), r, t, t_low + 0.5 * square_low
+
+
+@njit(cache=True, error_model="numpy")
+def _scaled(x: float, n: int) -> float:
+    """x 2ⁿ, |n| ≤ 1500, rounded once."""
+    if -1000 < n < 1000:
+        return x * double_of((n + BIAS) << MANTISSA_BITS)
+    half = n // 2
+    return x * double_of((half + BIAS) << MANTISSA_BITS) * double_of((n - half + BIAS) << MANTISSA_BITS)
+
+
+@njit(cache=True, error_model="numpy")
+def exponential_of(x: float) -> float:
+    """eˣ."""
+    if not -746.0 < x < 710.0:
+        return 0.0 if x < 0.0 else x * math.inf
+    n, r, t, t_low = _exponential_parts(x)
+    s, e = fast_two_sum(1.0, r)
+    s, f = fast_two_sum(s, t)
+    return _scaled(s + (e + f + t_low), n)
+
+
+@njit(cache=True, error_model="numpy")
+def _exponential_less_one(x: float) -> tuple[float, float]:
+    """eˣ − 1 as a pair, |x| < 709."""
+    n, r, t, t_low = _exponential_parts(x)
+    if n == 0:
+        high, low = two_sum(r, t)
+        return fast_two_sum(high, low + t_low)
+    s, e = fast_two_sum(1.0, r)
+    s, f = fast_two_sum(s, t)
+    high, low = two_sum(_scaled(s, n), -1.0)
+    return fast_two_sum(high, low + _scaled(e + f + t_low, n))
+
+
+@njit(cache=True, error_model="numpy")
+def exponential_less_one(x: float) -> float:
+    """eˣ − 1, without cancellation for small x."""
+    if not -40.0 < x < 709.0:
+        return -1.0 if x < 0.0 else exponential_of(x)
+    if abs(x) < 1e-17:
+        return x
+    return _exponential_less_one(x)[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _logarithm(x: float) -> tuple[float, float]:
+    """log x as an unevaluated sum of two, for normal x > 0."""
+    bits = bits_of(x)
+    # The mantissa between √½ and √2: 0x6a09e667f3bcd is that of √2.
+    n = (bits >> MANTISSA_BITS) - BIAS
+    up = 1 if (bits & MANTISSA) > 0x6A09E667F3BCD else 0
+    n += up
+    f = double_of((bits & MANTISSA) | ((BIAS - up) << MANTISSA_BITS)) - 1.0
+    # log(1 + f) = 2 artanh s with s = f/(2 + f), and 2 s = f − f²/2 + s f²/2.
+    s = f / (2.0 + f)
+    square, square_low = two_product(f, f)
+    z = s * s
+    high, low = two_sum(float(n) * _LN2_1, f)
+    high, lost = two_sum(high, -0.5 * square)
+    rest = s * (0.5 * square + 2.0 * z * _artanh_tail(z)) + float(n) * _LN2_2 - 0.5 * square_low
+    return high, (low + lost) + rest
+
+
+@njit(cache=True, error_model="numpy")
+def _artanh_tail(z: float) -> float:
+    c = _ATANH
+    zz = z * z
+    return ((c[0] + z * c[1]) + zz * (c[2] + z * c[3])) + zz * zz * ((c[4] + z * c[5]) + zz * c[6])
+
+
+@njit(cache=True, error_model="numpy")
+def logarithm(x: float) -> float:
+    """log x; −∞ for 0, NaN for less."""
+    if not 0.0 < x < math.inf:
+        return -math.inf if x == 0.0 else x if x > 0.0 else math.nan
+    if x == 1.0:
+        return 0.0
+    if x < 1e-300:
+        high, low = _logarithm(x * 2.0**100)
+        total, lost = two_sum(high, -100.0 * _LN2_1)
+        return total + (lost + low - 100.0 * _LN2_2)
+    high, low = _logarithm(x)
+    return high + low
+
+
+@njit(cache=True, error_model="numpy")
+def hyperbolic_tangent(x: float) -> float:
+    """tanh x = (e²ˣ − 1)/(e²ˣ + 1)."""
+    size = abs(x)
+    if not size < 22.0:
+        return math.copysign(1.0, x) if size > 0.0 else x
+    if size < _AS_ITSELF:
+        return x
+    high, low = _exponential_less_one(2.0 * size)
+    below, below_low = pair_add(high, low, 2.0, 0.0)
+    return math.copysign(pair_divide(high, low, below, below_low)[0], x)
+
+
+@njit(cache=True, error_model="numpy")
+def hyperbolic_secant(x: float) -> float:
+    """1/cosh x = 2 e⁻ˣ/(1 + e⁻²ˣ)."""
+    size = abs(x)
+    if not size < 40.0:
+        return 2.0 * exponential_of(-size)
+    n, r, t, t_low = _exponential_parts(-size)
+    high, low = fast_two_sum(1.0, r)
+    high, lost = fast_two_sum(high, t)
+    high, low = fast_two_sum(_scaled(high, n), _scaled(low + lost + t_low, n))
+    below, below_low = pair_multiply(high, low, high, low)
+    below, below_low = pair_add(below, below_low, 1.0, 0.0)
+    return pair_divide(2.0 * high, 2.0 * low, below, below_low)[0]
+
+
+@njit(cache=True, error_model="numpy")
+def inverse_hyperbolic_tangent(x: float) -> float:
+    """artanh x, |x| ≤ 1: ½ log (1 + x)/(1 − x)."""
+    size = abs(x)
+    if size < 0.17:
+        z = x * x
+        return x + x * z * _artanh_tail(z)
+    if not size < 1.0:
+        return math.copysign(math.inf, x) if size == 1.0 else math.nan
+    above, above_low = two_sum(1.0, size)
+    below, below_low = two_sum(1.0, -size)
+    ratio, ratio_low = pair_divide(above, above_low, below, below_low)
+    high, low = _logarithm(ratio)
+    return math.copysign(0.5 * (high + (low + ratio_low / ratio)), x)
+
+
+@njit(cache=True, error_model="numpy")
+def _angle(less: float, more: float, octant: int) -> float:
+    """φ = arctan less/more in octant 0, π/2 − φ in 1, π/2 + φ in 2, π − φ in 3, for 0 ≤ less ≤ more, neither tiny nor
+    huge.
+
+    With c = k/8 near the ratio, φ = arctan c + arctan z, z = (less − c more)/(more + c less). Where that sum would
+    amplify the rounding of z, up to 3/16, c is 0.
+    """
+    ratio = less if more == 1.0 else less / more
+    k = int(8.0 * ratio + 0.5) if ratio > 0.1875 else 0
+    z, rest = ratio, 0.0
+    if k != 0:
+        c = 0.125 * k
+        # c has three digits: its product with the upper part of more is exact, and so is the first difference.
+        upper = double_of(bits_of(more) & ~15)
+        z = ((less - c * upper) - c * (more - upper)) / (more + c * less)
+    elif octant == 0 and more != 1.0:
+        p, e = two_product(z, more)
+        rest = ((less - p) - e) / more
+    s = z * z
+    a = _ATAN
+    ss = s * s
+    tail = a[0] + s * a[1] + ss * ((a[2] + s * a[3]) + ss * ((a[4] + s * a[5]) + ss * ((a[6] + s * a[7]) + ss * a[8])))
+    tail = z * s * tail + rest
+    if octant == 1 or octant == 3:
+        z, tail = -z, -tail
+    high, low = fast_two_sum(_ANGLES[octant, k], z)
+    return high + (low + (_ANGLES_LOW[octant, k] + tail))
+
+
+@njit(cache=True, error_model="numpy")
+def inverse_tangent(x: float) -> float:
+    """arctan x."""
+    size = abs(x)
+    if size < _AS_ITSELF:
+        return x
+    if size > 1e17:
+        return math.copysign(0.5 * math.pi, x)
+    if size != size:
+        return x
+    return math.copysign(_angle(size, 1.0, 0) if size <= 1.0 else _angle(1.0, size, 1), x)
+
+
+@njit(cache=True, error_model="numpy")
+def inverse_tangent_of(y: float, x: float) -> float:
+    """The angle of (x, y) from the x axis, −π to π; signs of zeros count as in C's atan2."""
+    if not (abs(x) < math.inf and abs(y) < math.inf):
+        if x != x or y != y:
+            return math.nan
+        # Only directions are left.
+        if abs(y) < math.inf:
+            y = math.copysign(0.0, y)
+        elif abs(x) < math.inf:
+            x = 0.0
+        y = math.copysign(1.0, y) if abs(y) == math.inf else y
+        x = math.copysign(1.0, x) if abs(x) == math.inf else x
+    across, along = abs(y), abs(x)
+    back = math.copysign(1.0, x) < 0.0
+    more = max(across, along)
+    if across == 0.0:
+        return math.copysign(math.pi if back else 0.0, y)
+    if more > 1e100 or more < 1e-100:
+        _, exponent = math.frexp(more)
+        across, along = math.ldexp(across, -exponent), math.ldexp(along, -exponent)
+    if across < 1e-20 * along:
+        # What the quotient's rounding and the next term add is below an ulp.
+        return y / x if not back else math.copysign(math.pi, y)
+    if along < 1e-20 * across:
+        return math.copysign(0.5 * math.pi, y)
+    less, more = min(across, along), max(across, along)
+    octant = (3 if back else 0) if across <= along else (2 if back else 1)
+    return math.copysign(_angle(less, more, octant), y)
+
+
+@njit(cache=True, error_model="numpy")
+def cube_root(x: float) -> float:
+    """∛x by Halley's iteration from the exponent's third; the last step's residual is taken in pairs."""
+    if x == 0.0 or not abs(x) < math.inf:
+        return x
+    m, exponent = math.frexp(abs(x))
+    third = exponent // 3
+    m = math.ldexp(m, exponent - 3 * third)  # ½ ≤ m < 4
+    y = 0.6 + 0.3 * m - 0.02 * m * m
+    for _ in range(3):
+        cube = y * y * y
+        y *= (cube + 2.0 * m) / (2.0 * cube + m)
+    square, square_low = two_product(y, y)
+    cube, cube_low = pair_multiply(square, square_low, y, 0.0)
+    y -= ((cube - m) + cube_low) / (3.0 * square)
+    return math.copysign(math.ldexp(y, third), x)

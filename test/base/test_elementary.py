@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""Elementary functions err by less than one unit in the last place, from the smallest to the largest arguments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import mpmath
+import numpy as np
+import pytest
+
+from rigid_proto_ros.base import elementary as el
+
+mpmath.mp.prec = 160
+TINY, HUGE = -300.0, 300.0
+Arguments = Callable[[np.random.Generator, int], np.ndarray]
+
+
+def spread(low: float, high: float, signed: bool = True) -> Arguments:
+    """Log-uniform from 10**low to 10**high, of either sign."""
+
+    def drawn(random: np.random.Generator, count: int) -> np.ndarray:
+        sizes = 10.0 ** random.uniform(low, high, count)
+        return sizes * random.choice([-1.0, 1.0], count) if signed else sizes
+
+    return drawn
+
+
+# Measured over 10⁶ arguments each; 0.5 is what rounding leaves of an exact value.
+FUNCTIONS: dict[str, tuple[Callable[[float], float], Callable, Arguments]] = {
+    "sine": (el.sine, mpmath.sin, spread(TINY, HUGE)),
+    "cosine": (el.cosine, mpmath.cos, spread(TINY, HUGE)),
+    "sine_cosine, sine": (lambda x: el.sine_cosine(x)[0], mpmath.sin, spread(-3.0, 9.0)),
+    "sine_cosine, cosine": (lambda x: el.sine_cosine(x)[1], mpmath.cos, spread(-3.0, 9.0)),
+    "exponential_of": (el.exponential_of, mpmath.exp, spread(TINY, math.log10(708.0))),
+    "exponential_less_one": (el.exponential_less_one, mpmath.expm1, spread(TINY, math.log10(708.0))),
+    "logarithm": (el.logarithm, mpmath.log, spread(TINY, HUGE, signed=False)),
+    "logarithm near 1": (
+        el.logarithm,
+        mpmath.log,
+        lambda random, count: 1.0 + spread(-16.0, math.log10(0.9))(random, count),
+    ),
+    "hyperbolic_tangent": (el.hyperbolic_tangent, mpmath.tanh, spread(TINY, 2.0)),
+    "hyperbolic_secant": (el.hyperbolic_secant, mpmath.sech, spread(TINY, math.log10(700.0))),
+    "inverse_hyperbolic_tangent": (el.inverse_hyperbolic_tangent, mpmath.atanh, spread(TINY, -1e-9)),
+    "inverse_tangent": (el.inverse_tangent, mpmath.atan, spread(TINY, HUGE)),
+    "cube_root": (el.cube_root, lambda x: mpmath.sign(x) * mpmath.cbrt(abs(x)), spread(TINY, HUGE)),
+}
+
+
+def ulps(computed: float, exact: mpmath.mpf) -> float:
+    """The error in units of the last place of the exact value."""
+    return float(abs(mpmath.mpf(computed) - exact) / math.ulp(float(exact)))
+
+
+def worst(name: str, count: int, seed: int) -> tuple[float, float]:
+    """The largest error of so many arguments [ulp], and where."""
+    computed, exact, arguments = FUNCTIONS[name]
+    return max(
+        (ulps(computed(x), exact(mpmath.mpf(x))), x) for x in arguments(np.random.default_rng(seed), count).tolist()
+    )
+
+
+def worst_angle(count: int, seed: int) -> tuple[float, tuple[float, float]]:
+    """The same of the angle of (x, y)."""
+    random = np.random.default_rng(seed)
+    x = spread(-150.0, 150.0)(random, count)
+    y = x * spread(-20.0, 20.0)(random, count)
+    pairs = zip(y.tolist(), x.tolist(), strict=True)
+    return max((ulps(el.inverse_tangent_of(b, a), mpmath.atan2(b, a)), (b, a)) for b, a in pairs)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_an_elementary_function_errs_by_less_than_one_unit_in_the_last_place(name: str) -> None:
+    error, at = worst(name, 1500, 1)
+    assert error < 1.0, at
+
+
+def test_an_angle_errs_by_less_than_one_unit_in_the_last_place() -> None:
+    error, at = worst_angle(1500, 1)
+    assert error < 1.0, at
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("name", [*FUNCTIONS, "inverse_tangent_of"])
+def test_over_a_million_arguments_none_errs_by_more_than_one_unit(name: str) -> None:
+    error, at = worst_angle(10**6, 2) if name == "inverse_tangent_of" else worst(name, 10**6, 2)
+    print(f"{name}: {error:.3f} ulp at {at!r}")
+    assert error <= 1.0, at
+
+
+def test_multiples_of_a_quarter_turn_keep_their_digits() -> None:
+    # 6381956970095103·2⁷⁹⁷ lies nearer to a multiple of π/2 than any other double (Muller, Elementary Functions, 2006).
+    for x in (6381956970095103.0 * 2.0**797, math.pi, 1e5 * math.pi, 2.0**60 * math.pi, 1e22, 1.7e308):
+        assert ulps(el.sine(x), mpmath.sin(mpmath.mpf(x))) < 1.0
+        assert ulps(el.cosine(x), mpmath.cos(mpmath.mpf(x))) < 1.0
+
+
+def test_zeros_infinities_and_what_is_no_number() -> None:
+    inf, nan = math.inf, math.nan
+    for f in (el.sine, el.hyperbolic_tangent, el.inverse_tangent, el.cube_root, el.exponential_less_one):
+        assert f(0.0) == 0.0 and math.copysign(1.0, f(-0.0)) == -1.0
+    for f, x, y in (
+        (el.sine, inf, nan),
+        (el.cosine, -inf, nan),
+        (el.cosine, 0.0, 1.0),
+        (el.exponential_of, -inf, 0.0),
+        (el.exponential_of, inf, inf),
+        (el.exponential_of, 710.0, inf),
+        (el.exponential_of, -745.0, 5e-324),
+        (el.exponential_less_one, -inf, -1.0),
+        (el.exponential_less_one, inf, inf),
+        (el.logarithm, 0.0, -inf),
+        (el.logarithm, 1.0, 0.0),
+        (el.logarithm, inf, inf),
+        (el.logarithm, -1.0, nan),
+        (el.logarithm, 5e-324, math.log(5e-324)),
+        (el.hyperbolic_tangent, -inf, -1.0),
+        (el.hyperbolic_secant, inf, 0.0),
+        (el.inverse_hyperbolic_tangent, 1.0, inf),
+        (el.inverse_hyperbolic_tangent, 1.5, nan),
+        (el.inverse_tangent, -inf, -0.5 * math.pi),
+        (el.cube_root, -inf, -inf),
+        (el.cube_root, 27.0, 3.0),
+    ):
+        assert f(x) == y or (math.isnan(y) and math.isnan(f(x))), (f, x)
+    for f in (function for function, _, _ in FUNCTIONS.values()):
+        assert math.isnan(f(nan))
+    for y in (0.0, -0.0, 1.0, -1.0, inf, -inf):
+        for x in (0.0, -0.0, 1.0, -1.0, inf, -inf):
+            assert math.isclose(el.inverse_tangent_of(y, x), math.atan2(y, x), rel_tol=1e-15), (y, x)
+            assert math.copysign(1.0, el.inverse_tangent_of(y, x)) == math.copysign(1.0, math.atan2(y, x))
