@@ -21,7 +21,7 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
-DRAWN_MS = 120
+DRAWN_MS = 200
 """[ms] Between two pictures: each is 30 ms of a core's time in software WebGL, which would draw as often as it is let."""
 
 SAID_S = 0.06
