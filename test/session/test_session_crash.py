@@ -186,7 +186,7 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
 
 @pytest.mark.parametrize(
     "seed, ending",
-    [(0, ".mcap"), *(pytest.param(seed, ".rrd", marks=needs_rerun) for seed in (0, 1))],
+    [(0, ".mcap"), pytest.param(1, ".rrd", marks=needs_rerun)],
 )
 def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment, tmp_path, ending, seed):
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.3, 3.0))
@@ -199,6 +199,6 @@ def test_a_node_killed_as_soon_as_it_flies_leaves_a_recording_with_its_scene(ros
 
 @pytest.mark.stress
 @pytest.mark.parametrize("ending", ENDINGS)
-@pytest.mark.parametrize("seed", range(1, 21))
+@pytest.mark.parametrize("seed", range(21))
 def test_a_node_killed_at_more_random_moments(ros_environment, tmp_path, ending, seed):
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.0, 6.0))
