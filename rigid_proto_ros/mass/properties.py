@@ -10,17 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.compilation import njit
 from ..base.errors import InputError, MeshError, TensorError
+from .closed_form import given_mass, is_plainly_good, spread_mass
 from .moments import Moments, box_moments, point_moments, solid_moments
 from .moments_shell import shell_moments
-from .tensor import (
-    MAX_MOMENT_RATIO,
-    TRIANGLE_SLACK_COMPUTED,
-    check_tensor,
-    principal_axes_kernel,
-    tensor_from_six,
-)
+from .tensor import check_tensor, tensor_from_six
 
 INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
 """How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
@@ -78,72 +72,6 @@ def _checked_ballast(ballast: Iterable) -> np.ndarray:
 
 
 _NO_BALLAST = np.empty((0, 4))
-
-
-@njit(cache=True, nogil=True)
-def loaded(
-    mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
-
-    mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
-    mesh coordinates, ``stretch`` and ``reference`` (3,) in mesh coordinates bring them there. Each point mass adds by
-    the parallel-axis theorem, so that nothing cancels.
-    """
-    total = mass
-    moved = mass * center
-    offset = np.empty(3)
-    for p in range(points.shape[0]):
-        total += points[p, 0]
-        for k in range(3):
-            moved[k] += points[p, 0] * stretch[k] * (points[p, 1 + k] - reference[k])
-    if points.shape[0]:
-        moved /= total
-    else:
-        moved[:] = center
-    gathered = second.copy()
-    for p in range(-1, points.shape[0]):
-        if points.shape[0] == 0:
-            break
-        m = mass if p < 0 else points[p, 0]
-        for k in range(3):
-            place = center[k] if p < 0 else stretch[k] * (points[p, 1 + k] - reference[k])
-            offset[k] = place - moved[k]
-        for i in range(3):
-            for j in range(3):
-                gathered[i, j] += m * (offset[i] * offset[j])  # symmetric to the bit
-    inertia = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            inertia[i, j] = 0.0 - gathered[i, j]  # no -0
-        inertia[i, i] = gathered[(i + 1) % 3, (i + 1) % 3] + gathered[(i + 2) % 3, (i + 2) % 3]
-    return total, moved, inertia, principal_axes_kernel(inertia)[0]
-
-
-@njit(cache=True, nogil=True)
-def stretched(
-    left: np.ndarray,
-    center: np.ndarray,
-    center_low: np.ndarray,
-    reference: np.ndarray,
-    second: np.ndarray,
-    per_measure: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
-    a unit of measure."""
-    place = np.empty(3)
-    base = np.empty(3)
-    com = np.empty(3)
-    matrix = np.empty((3, 3))
-    slot = 0
-    for i in range(3):
-        base[i] = left[i] * reference[i] + 0.0  # no -0
-        place[i] = left[i] * center[i]
-        com[i] = base[i] + (place[i] + left[i] * center_low[i])
-        for j in range(i, 3):
-            matrix[i, j] = matrix[j, i] = second[slot] * (left[i] * left[j]) * per_measure
-            slot += 1
-    return place, base, com, matrix
 
 
 class MeshMoments:
@@ -263,26 +191,16 @@ class MeshMoments:
         if com == "solid":
             solid = self.moments("solid")
             place, low, base = ((s / left) * of for of in (solid.center, solid.center_low, solid.reference))
-        center, reference, center_of_mass, second = stretched(
-            left, place, low, base, moments.second, own / moments.measure
+        total, center_of_mass, inertia, principal, reference, center = spread_mass(
+            own, moments.measure, s, left, place, low, base, moments.second, points
         )
-        unscaled = base * (left / s) if model == "shell" else base
-        total, center, inertia, principal = loaded(own, center, second, s, unscaled, points)
-        if len(points):
-            center_of_mass = reference + center
         warnings = ()
-        if not _plainly_good(principal):
+        if not is_plainly_good(principal):
             try:
                 warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
             except TensorError as error:
                 raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
         return MassProperties(total, center_of_mass, inertia, warnings, reference, center)
-
-
-def _plainly_good(moments: np.ndarray) -> bool:
-    """Principal moments (3,) about which ``check_tensor`` would say nothing."""
-    a, b, c = moments.tolist()
-    return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
 
 
 def explicit_mass_properties(
@@ -306,9 +224,7 @@ def explicit_mass_properties(
     inertia = tensor_from_six(tensor6)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor")
     points = _checked_ballast(ballast)
-    if not len(points):
-        return MassProperties(float(mass), s * center, inertia, warnings, s * center, np.zeros(3))
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    total, moved, inertia, _ = loaded(float(mass), np.zeros(3), second, s, center, points)
-    warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
-    return MassProperties(total, s * center + moved, inertia, warnings, s * center, moved)
+    total, center_of_mass, inertia, _, reference, moved = given_mass(float(mass), center, inertia, s, points)
+    if len(points):
+        warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
+    return MassProperties(total, center_of_mass, inertia, warnings, reference, moved)

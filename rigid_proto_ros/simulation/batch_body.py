@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Bodies of many variations, compiled: from a row of settings and a mesh's ten numbers to what a flight needs.
 
-Every operation stands in the order in which ``scenario``, ``mass/properties.py`` and ``motion/body.py`` do it, so the
-bits are theirs. Whatever is out of the ordinary (a bound, a doubtful tensor) makes no body: the caller then goes their
-way, which knows what to say about it.
+Every operation stands in the order in which ``scenario`` does it, so the bits are its own. Whatever is out of the
+ordinary (a bound, a doubtful tensor) makes no body: the caller then asks the simulation, which knows what to say.
 """
 
 from __future__ import annotations
@@ -14,12 +13,9 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
-from ..mass.properties import SCALE_LIMITS, loaded, stretched
-from ..mass.tensor import (
-    MAX_MOMENT_RATIO,
-    TRIANGLE_SLACK_COMPUTED,
-    principal_axes_kernel,
-)
+from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
+from ..mass.properties import SCALE_LIMITS
+from ..mass.tensor import principal_axes_kernel
 from ..motion.body import COM, LENGTH, MASS, fill_body
 from ..motion.state import fill_initial_row
 
@@ -61,11 +57,6 @@ EXPLICIT, ORDINARY, SHELL = 0, 1, 2
 
 
 @njit(cache=True, error_model="numpy")
-def _plainly_good(a: float, b: float, c: float) -> bool:
-    return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
-
-
-@njit(cache=True, error_model="numpy")
 def _points_with_mass(ballast: np.ndarray) -> tuple[np.ndarray, bool]:
     """The rows of ``ballast`` (k, 4) with a mass; and whether all are in order."""
     count = 0
@@ -97,18 +88,9 @@ def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> tuple[
     inertia[1, 2] = inertia[2, 1] = given[4]
     mass = settings[GIVEN_MASS]
     center = settings[GIVEN_CENTER : GIVEN_CENTER + 3].copy()
-    com = s * center
-    principal = principal_axes_kernel(inertia)[0]
-    if not (0.0 < mass < math.inf and _plainly_good(principal[0], principal[1], principal[2])):
-        return mass, com, inertia, False
-    if points.shape[0] == 0:
-        return mass, com, inertia, True
-    second = -inertia
-    half_trace = 0.5 * (inertia[0, 0] + inertia[1, 1] + inertia[2, 2])
-    for k in range(3):
-        second[k, k] = half_trace - inertia[k, k]
-    total, moved, gathered, principal = loaded(mass, np.zeros(3), second, s, center, points)
-    return total, com + moved, gathered, _plainly_good(principal[0], principal[1], principal[2])
+    good = 0.0 < mass < math.inf and is_plainly_good(principal_axes_kernel(inertia)[0])
+    total, com, gathered, principal, _, _ = given_mass(mass, center, inertia, s, points)
+    return total, com, gathered, good and is_plainly_good(principal)
 
 
 @njit(cache=True, error_model="numpy")
@@ -116,10 +98,9 @@ def _spread(
     s: np.ndarray, settings: np.ndarray, points: np.ndarray, constants: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray, bool]:
     """The same for a model whose mass is spread over a mesh."""
-    measure = constants[SOLID_MEASURE]
     mass = settings[BODY_MASS]
     if not mass > 0.0:
-        mass = settings[DENSITY] * measure * abs(s[0] * s[1] * s[2])
+        mass = settings[DENSITY] * constants[SOLID_MEASURE] * abs(s[0] * s[1] * s[2])
     left = s.copy()
     uniform = True
     if constants[MODEL] == SHELL:
@@ -130,14 +111,10 @@ def _spread(
     center = constants[CENTER : CENTER + 3].copy()
     low = constants[CENTER_LOW : CENTER_LOW + 3].copy()
     second = constants[SECOND : SECOND + 6].copy()
-    place, base, com, matrix = stretched(left, center, low, reference, second, mass / constants[MEASURE])
-    if constants[MODEL] == SHELL:
-        reference = reference * (left / s)
-    total, moved, inertia, principal = loaded(mass, place, matrix, s, reference, points)
-    if points.shape[0]:
-        com = base + moved
-    good = uniform and 1e-300 < mass < math.inf and _plainly_good(principal[0], principal[1], principal[2])
-    return total, com, inertia, good
+    total, com, inertia, principal, _, _ = spread_mass(
+        mass, constants[MEASURE], s, left, center, low, reference, second, points
+    )
+    return total, com, inertia, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal)
 
 
 @njit(cache=True, error_model="numpy")

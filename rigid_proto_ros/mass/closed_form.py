@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""Mass, COM and inertia in closed form from a mesh's ten numbers or from given ones, ballast included; compiled, for
+one body and for the many of a sweep.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..base.compilation import njit
+from .tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
+
+
+@njit(cache=True, nogil=True)
+def loaded(
+    mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
+
+    mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
+    mesh coordinates, ``stretch`` and ``reference`` (3,) in mesh coordinates bring them there. Each point mass adds by
+    the parallel-axis theorem, so that nothing cancels.
+    """
+    total = mass
+    moved = mass * center
+    offset = np.empty(3)
+    for p in range(points.shape[0]):
+        total += points[p, 0]
+        for k in range(3):
+            moved[k] += points[p, 0] * stretch[k] * (points[p, 1 + k] - reference[k])
+    if points.shape[0]:
+        moved /= total
+    else:
+        moved[:] = center
+    gathered = second.copy()
+    for p in range(-1, points.shape[0]):
+        if points.shape[0] == 0:
+            break
+        m = mass if p < 0 else points[p, 0]
+        for k in range(3):
+            place = center[k] if p < 0 else stretch[k] * (points[p, 1 + k] - reference[k])
+            offset[k] = place - moved[k]
+        for i in range(3):
+            for j in range(3):
+                gathered[i, j] += m * (offset[i] * offset[j])  # symmetric to the bit
+    inertia = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            inertia[i, j] = 0.0 - gathered[i, j]  # no -0
+        inertia[i, i] = gathered[(i + 1) % 3, (i + 1) % 3] + gathered[(i + 2) % 3, (i + 2) % 3]
+    return total, moved, inertia, principal_axes_kernel(inertia)[0]
+
+
+@njit(cache=True, nogil=True)
+def stretched(
+    left: np.ndarray,
+    center: np.ndarray,
+    center_low: np.ndarray,
+    reference: np.ndarray,
+    second: np.ndarray,
+    per_measure: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
+    a unit of measure."""
+    place = np.empty(3)
+    base = np.empty(3)
+    com = np.empty(3)
+    matrix = np.empty((3, 3))
+    slot = 0
+    for i in range(3):
+        base[i] = left[i] * reference[i] + 0.0  # no -0
+        place[i] = left[i] * center[i]
+        com[i] = base[i] + (place[i] + left[i] * center_low[i])
+        for j in range(i, 3):
+            matrix[i, j] = matrix[j, i] = second[slot] * (left[i] * left[j]) * per_measure
+            slot += 1
+    return place, base, com, matrix
+
+
+@njit(cache=True, nogil=True)
+def spread_mass(  # noqa: PLR0913 - a kernel
+    mass: float,
+    measure: float,
+    scale: np.ndarray,
+    left: np.ndarray,
+    center: np.ndarray,
+    center_low: np.ndarray,
+    reference: np.ndarray,
+    second: np.ndarray,
+    points: np.ndarray,
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of a mass [kg] spread over a mesh: total, COM (3,), inertia (3, 3), principal moments (3,), the scaled reference
+    (3,) and the COM from it (3,).
+
+    measure, reference, center and center_low (3,), second (6,): the moments at unit density. scale (3,) of the mesh;
+    left (3,): what of it the moments don't have in them yet. points (k, 4): ballast in mesh coordinates.
+    """
+    place, base, com, matrix = stretched(left, center, center_low, reference, second, mass / measure)
+    total, moved, inertia, principal = loaded(mass, place, matrix, scale, reference * (left / scale), points)
+    if points.shape[0]:
+        com = base + moved
+    return total, com, inertia, principal, base, moved
+
+
+@njit(cache=True, nogil=True)
+def given_mass(
+    mass: float, center: np.ndarray, inertia: np.ndarray, scale: np.ndarray, points: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The same of a given mass [kg], COM (3,) in mesh coordinates and inertia (3, 3) about it, which ``scale`` doesn't
+    touch; the COM is the reference.
+    """
+    base = scale * center
+    if points.shape[0] == 0:
+        return mass, base, inertia, principal_axes_kernel(inertia)[0], base, np.zeros(3)
+    half_trace = 0.5 * (inertia[0, 0] + inertia[1, 1] + inertia[2, 2])
+    second = -inertia
+    for k in range(3):
+        second[k, k] = half_trace - inertia[k, k]
+    total, moved, gathered, principal = loaded(mass, np.zeros(3), second, scale, center, points)
+    return total, base + moved, gathered, principal, base, moved
+
+
+@njit(cache=True, error_model="numpy")
+def is_plainly_good(principal: np.ndarray) -> bool:
+    """Whether ``check_tensor`` would say nothing about principal moments (3,)."""
+    a, b, c = principal[0], principal[1], principal[2]
+    return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)
