@@ -15,11 +15,13 @@ from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
 
 from ..base.errors import InputError
 from ..messages import cdr
 from ..messages.session_messages import PROJECTIONS, StampedRows
 from ..scene.command_codec import MARKS, ScriptCommand, frame_names, in_words, of_event
+from ..scene.sensor_noise import sensor_noise
 from ..session.playback import sorted_states
 from ..session.recorded_session import RecordedSession
 from ..session.replay import recorded_parameters
@@ -84,7 +86,7 @@ def session_commands(session: RecordedSession) -> list[ScriptCommand]:
 
 
 def publish_states(session: RecordedSession, speed: float) -> int:
-    """Publish the recorded states on the topics that they came from, with their stamps; returns the exit status."""
+    """Publish the recorded states on their topics, with their stamps, which go out on /clock, too; returns the status."""
     if not len(session.times):
         raise InputError("session", "the session has no states to publish")
     with _context():
@@ -102,6 +104,7 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
     for name in streams:
         publisher = node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE)
         senders[name] = (publisher, _template(name, session))
+    clock = node.create_publisher(Clock, "/clock", qos.CLOCK)
     deadline = time.monotonic() + WAIT_FOR_SUBSCRIBERS_S
     while time.monotonic() < deadline and not any(p.get_subscription_count() for p, _ in senders.values()):
         rclpy.spin_once(node, timeout_sec=0.05)
@@ -110,10 +113,14 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
         key=lambda message: message[0],
     )
     first_ns, begin = merged[0][0], time.monotonic()
+    told_ns = -1
     for time_ns, k, name in merged:
         rest_s = begin + 1e-9 * (time_ns - first_ns) / speed - time.monotonic()
         if rest_s > 0.0:
             time.sleep(rest_s)
+        if time_ns != told_ns:
+            told_ns = time_ns
+            clock.publish(cdr.time(time_ns))
         publisher, pack = senders[name]
         publisher.publish(pack(time_ns, streams[name].rows[k].tolist()))
     for publisher, _ in senders.values():
@@ -121,13 +128,17 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
 
 
 def _streams(session: RecordedSession) -> dict[str, StampedRows]:
-    """What is to be published: the very numbers where a bag holds them, else what the node makes of a state."""
-    if session.published:
+    """What is to be published: the numbers that a bag holds, else what the node makes of a state, with its noise."""
+    noise = sensor_noise(recorded_parameters(session))
+    if session.published and not (noise and session.made_with):
         return {name: rows for name, rows in session.published.items() if len(rows)}
     states = list(sorted_states(session))
     times = np.array([time_ns for time_ns, _ in states], dtype=np.int64)
     return {
-        name: StampedRows(times, np.array([project(row.tolist()) for _, row in states]))
+        name: StampedRows(
+            times,
+            np.array([project(noise.told(name, t, row.tolist()) if noise else row.tolist()) for t, row in states]),
+        )
         for name, project in PROJECTIONS.items()
     }
 

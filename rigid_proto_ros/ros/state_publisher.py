@@ -18,6 +18,16 @@ from ..base.rotation import rotate
 from ..messages import cdr
 from ..motion.state import State
 from ..scene.parameters import Parameters
+from ..scene.sensor_noise import (
+    ACCELEROMETER,
+    ANGULAR_VELOCITY,
+    GYROSCOPE,
+    LINEAR_VELOCITY,
+    ORIENTATION,
+    POSITION,
+    SensorNoise,
+    sensor_noise,
+)
 from . import qos
 
 Topics = list[tuple[Publisher, Callable[[int, list[float]], Any]]]
@@ -53,9 +63,12 @@ class StatePublisher:
         self._made_tf: Publisher | None = None
         self._tf_message: Any = None
         self._wanted: Topics = []
+        self._noise: SensorNoise | None = None
+        self._has_covariances = False
 
     def configure(self, parameters: Parameters) -> None:
-        """Switch /clock and /tf on and off; runs on the executor's thread."""
+        """Switch /clock, /tf and noise on and off; runs on the executor's thread."""
+        self._noise = sensor_noise(parameters)
         # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched
         # off.
         if parameters.publish_clock and self._made_clock is None:
@@ -92,6 +105,10 @@ class StatePublisher:
         for _, message in self._topics():
             message(state.time_ns, state.row.tolist())
 
+    def _told(self, topic: str, time_ns: int, row: list[float]) -> list[float]:
+        """The state (13,) with its noise."""
+        return row if self._noise is None else self._noise.told(topic, time_ns, row)
+
     def _topics(self) -> Topics:
         topics: Topics = [(self._pose, self._pose_message), (self._twist, self._twist_message)]
         topics += [(self._odom, self._odom_message), (self._imu, self._imu_message)]
@@ -102,26 +119,52 @@ class StatePublisher:
         return topics
 
     def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
+        row = self._told("pose", time_ns, row)
         return bytes(self._pose_template.pack(time_ns, row[:7]))
 
     def _twist_message(self, time_ns: int, row: list[float]) -> bytes:
+        row = self._told("twist", time_ns, row)
         return bytes(self._twist_template.pack(time_ns, [*row[7:10], *rotate(*row[3:7], *row[10:13])]))
 
     def _odom_message(self, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
+        row = self._told("odom", time_ns, row)
         self._odom_template.pack(time_ns, row[:7])
+        for at, covariance in self._odom_covariances(time_ns):
+            self._odom_template.pack(time_ns, covariance, at=at)
         v_body = rotate(-row[3], -row[4], -row[5], row[6], *row[7:10])
         return bytes(self._odom_template.pack(time_ns, [*v_body, *row[10:13]], at=cdr.ODOMETRY_TWIST_AT))
 
+    def _odom_covariances(self, time_ns: int) -> list[tuple[int, list[float]]]:
+        """Numbers of the doubles where the two covariances (36,) begin, and they, where they aren't what was there."""
+        noise = self._noise
+        if noise is None and not self._has_covariances:
+            return []
+        self._has_covariances = noise is not None
+        found = []
+        sides = ((7, POSITION, ORIENTATION), (cdr.ODOMETRY_TWIST_AT + 6, LINEAR_VELOCITY, ANGULAR_VELOCITY))
+        for at, linear, angular in sides:
+            variances = (
+                [0.0, 0.0] if noise is None else [noise.variance(sensor, time_ns) for sensor in (linear, angular)]
+            )
+            found.append((at, np.diag(np.repeat(variances, 3)).ravel().tolist()))
+        return found
+
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
-        """Attitude, angular velocity and exact specific force, both in body axes, at the contact that was chosen."""
+        """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
         message = Imu()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
         message.header.frame_id = self._frames[1]
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
-        o.x, o.y, o.z, o.w = row[3:7]
-        rate.x, rate.y, rate.z = row[10:13]
-        felt.x, felt.y, felt.z = self._specific_force().tolist()
+        o.x, o.y, o.z, o.w = self._told("pose", time_ns, row)[3:7]
+        noise, turns, force = self._noise, row[10:13], self._specific_force().tolist()
+        if noise is not None:
+            turns, force = noise.imu(time_ns, turns, force)
+            message.orientation_covariance = _isotropic(noise.variance(ORIENTATION, time_ns))
+            message.angular_velocity_covariance = _isotropic(noise.variance(GYROSCOPE, time_ns))
+            message.linear_acceleration_covariance = _isotropic(noise.variance(ACCELEROMETER, time_ns))
+        rate.x, rate.y, rate.z = turns
+        felt.x, felt.y, felt.z = force
         return message
 
     def _transform(self, time_ns: int, row: list[float]) -> Any:
@@ -129,5 +172,11 @@ class StatePublisher:
         transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
         transform.header.frame_id, transform.child_frame_id = self._frames
         t, r = transform.transform.translation, transform.transform.rotation
+        # Where the body is drawn: without noise.
         t.x, t.y, t.z, r.x, r.y, r.z, r.w = row[:7]
         return self._tf_message(transforms=[transform])
+
+
+def _isotropic(variance: float) -> list[float]:
+    """A covariance (9,) alike in all directions."""
+    return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]

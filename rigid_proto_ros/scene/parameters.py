@@ -99,6 +99,54 @@ class StringParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class ImuNoise:
+    """What ~/imu errs: of gyroscope and accelerometer density, bias, its walk, range and resolution."""
+
+    gyroscope_density: float = number(
+        0.0, "White noise of ~/imu's angular velocity.", "rad/s/√Hz", lower=0.0, upper=HUGE
+    )
+    gyroscope_bias: Vector = numbers(ZERO, "Constant bias of it, body axes.", "rad/s")
+    gyroscope_bias_walk: float = number(0.0, "Random walk of its bias.", "rad/s²/√Hz", lower=0.0, upper=HUGE)
+    gyroscope_range: float = number(0.0, "Largest that an axis shows; 0 for any.", "rad/s", lower=0.0, upper=HUGE)
+    gyroscope_resolution: float = number(0.0, "Step of what it shows; 0 for none.", "rad/s", lower=0.0, upper=HUGE)
+    accelerometer_density: float = number(
+        0.0, "White noise of ~/imu's specific force.", "m/s²/√Hz", lower=0.0, upper=HUGE
+    )
+    accelerometer_bias: Vector = numbers(ZERO, "Constant bias of it, body axes.", "m/s²")
+    accelerometer_bias_walk: float = number(0.0, "Random walk of its bias.", "m/s³/√Hz", lower=0.0, upper=HUGE)
+    accelerometer_range: float = number(0.0, "Largest that an axis shows; 0 for any.", "m/s²", lower=0.0, upper=HUGE)
+    accelerometer_resolution: float = number(0.0, "Step of what it shows; 0 for none.", "m/s²", lower=0.0, upper=HUGE)
+
+
+@dataclass(frozen=True, slots=True)
+class PoseNoise:
+    """What ~/pose, ~/twist, ~/odom and the attitude of ~/imu err."""
+
+    position_density: float = number(
+        0.0, "White noise of the position in ~/pose and ~/odom.", "m/√Hz", lower=0.0, upper=HUGE
+    )
+    position_bias: Vector = numbers(ZERO, "Constant bias of it, world axes.", "m")
+    position_bias_walk: float = number(0.0, "Random walk of its bias.", "m/s/√Hz", lower=0.0, upper=HUGE)
+    position_range: float = number(0.0, "Largest that an axis shows; 0 for any.", "m", lower=0.0, upper=HUGE)
+    position_resolution: float = number(0.0, "Step of what it shows; 0 for none.", "m", lower=0.0, upper=HUGE)
+    orientation_density: float = number(
+        0.0,
+        "White noise of the attitude in ~/pose, ~/odom and ~/imu, about each body axis.",
+        "rad/√Hz",
+        lower=0.0,
+        upper=1.0,
+    )
+    orientation_bias: Vector = numbers(ZERO, "Constant bias of it, a rotation vector in body axes.", "rad")
+    orientation_bias_walk: float = number(0.0, "Random walk of its bias.", "rad/s/√Hz", lower=0.0, upper=1.0)
+    linear_velocity_density: float = number(
+        0.0, "White noise of the velocity in ~/twist and ~/odom.", "m/s/√Hz", lower=0.0, upper=HUGE
+    )
+    angular_velocity_density: float = number(
+        0.0, "White noise of the angular velocity in ~/twist and ~/odom.", "rad/s/√Hz", lower=0.0, upper=HUGE
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class GhostParameters:
     """What differs of the ghost; it is shown where one is given."""
 
@@ -214,6 +262,9 @@ class Parameters:
     publish_clock: bool = switch(False, "Publish simulated time on /clock.")
     publish_tf: bool = switch(False, "Publish the body's frame on /tf (where tf2_msgs is installed).")
     imu_contact: str = text("", "Contact at which ~/imu measures; empty means the centre of mass.")
+    imu_noise: ImuNoise = ImuNoise()
+    pose_noise: PoseNoise = PoseNoise()
+    noise_seed: int = whole(0, "Of the noise: the same seed errs alike at the same stamps.", lower=0, upper=2**62)
     ghost: GhostParameters = GhostParameters()
     world_frame: str = text("world", "Name of the world frame in published messages.", changes=READ_ONLY)
     body_frame: str = text(

@@ -101,10 +101,10 @@ class Scenario:
 
 
 def scene_text(values: Mapping[str, Value], mesh_sha256: str = "") -> str:
-    """Parameters by name as a parameter file, the hash of the mesh's file in a comment."""
+    """Parameters by name as a parameter file for a node of any name, the hash of the mesh's file in a comment."""
     lines = [f"    {name}: {yaml_value(value)}" for name, value in sorted(values.items())]
     mesh = [f"# mesh_sha256: {mesh_sha256}"] if mesh_sha256 else []
-    return "\n".join([*mesh, "rigid_body:", "  ros__parameters:", *lines, ""])
+    return "\n".join([*mesh, "/**:", "  ros__parameters:", *lines, ""])
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:

@@ -16,7 +16,7 @@ from ..messages.session_messages import PROJECTIONS
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Observer
 from .recorded_session import RecordedSession
-from .replay import Resimulation, mesh_finder, resimulation, session_scenario
+from .replay import Resimulation, as_told, mesh_finder, resimulation, session_scenario
 from .runs import decode_event
 
 BITS_DEPEND_ON = ("rigid_proto_ros", "numpy", "numba", "cpu")
@@ -78,7 +78,9 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         compared = len(lines.lines)
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
-        difference = _row_difference(time_ns, name, row, computed)
+        difference = _row_difference(
+            time_ns, name, row, as_told(session, again.scenario.parameters, name, time_ns, computed)
+        )
         if difference is not None:
             if count == 0 and not recorded and time_ns > 0:
                 # Nothing in it says that it is complete.
@@ -172,7 +174,8 @@ def _begins_at_its_start(session: RecordedSession, events: list) -> bool:
         return False
     time_ns, name, row = first
     again = Resimulation(session_scenario(session), [], None, mesh_finder(session), session.node_name)
-    return _row_difference(time_ns, name, row, again.advance(time_ns)) is None
+    told = as_told(session, again.scenario.parameters, name, time_ns, again.advance(time_ns))
+    return _row_difference(time_ns, name, row, told) is None
 
 
 def _began_later(session: RecordedSession) -> BeganLaterError:

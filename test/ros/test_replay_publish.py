@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,19 +21,25 @@ from scripts import EVERY_KIND
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.messages.session_messages import read_state
+from rigid_proto_ros.messages.session_messages import PROJECTIONS, StampedRows, read_state
 from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene.parameters import Parameters
+from rigid_proto_ros.scene.sensor_noise import sensor_noise
+from rigid_proto_ros.session.check import verify
 
 
-@pytest.fixture(scope="module")
-def session(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("flown")
+def flown_session(folder, *settings: str):
     (folder / "script.yaml").write_text(EVERY_KIND)
     bag = folder / "s.mcap"
     arguments = ["simulate", "t_handle", "--script", str(folder / "script.yaml"), "--duration", "2"]
     recorded = [] if "rerun" in MISSING else ["--record", str(folder / "s.rrd")]
-    assert main([*arguments, "--bag", str(bag), *recorded]) == 0
+    assert main([*arguments, "--bag", str(bag), *recorded, *settings]) == 0
     return bag
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    return flown_session(tmp_path_factory.mktemp("flown"))
 
 
 def states_of(messages, name: str) -> tuple[list[int], list[list[float]]]:
@@ -71,6 +78,36 @@ def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tm
         assert len(stamps) > 20
         assert stamps == recorded.times.tolist()[first:]
         assert np.array(rows).tobytes() == recorded.published[name].rows[first:].tobytes()
+
+
+def test_states_go_out_with_the_noise_that_the_node_gave_them_and_their_stamps_on_the_clock(ros_environment, tmp_path):
+    noise = {"pose_noise.position_density": 1e-3, "pose_noise.angular_velocity_density": 1e-2}
+    session = flown_session(tmp_path, *(word for name, value in noise.items() for word in ("--set", f"{name}={value}")))
+    (exact,) = read_runs(session)
+    own = sensor_noise(Parameters().replaced(noise))
+    told = {
+        name: [
+            PROJECTIONS[name](own.told(name, t, row.tolist()))
+            for t, row in zip(exact.times.tolist(), exact.rows, strict=True)
+        ]
+        for name in ("pose", "twist")
+    }
+    assert verify(exact) is None
+    # As somebody else's recorder has it, who heard the topics.
+    heard = replace(
+        exact, made_with={}, published={n: StampedRows(exact.times, np.array(rows)) for n, rows in told.items()}
+    )
+    assert verify(heard) is None
+    recorder = BagRecorder(ros_environment)
+    with RosClient(ros_environment) as client:
+        client.do("listen", topic="/clock", type="Clock", wait=False, best_effort=True)
+        done = run("rigid_proto", "replay", session, "--publish", "states", "--speed", "4", environment=ros_environment)
+        clock = [tick["clock"] for tick in client.do("heard", topic="/clock")]
+    assert done.returncode == 0, done.stderr
+    stamps, rows = states_of(recorder.close(), "pose")
+    first = exact.times.tolist().index(stamps[0])
+    assert len(stamps) > 20 and rows == [list(row) for row in told["pose"][first:]]
+    assert len(clock) > 20 and {t["sec"] * SECOND + t["nanosec"] for t in clock} <= set(exact.times.tolist())
 
 
 def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environment, tmp_path):
