@@ -86,7 +86,7 @@ def session_commands(session: RecordedSession) -> list[ScriptCommand]:
 
 
 def publish_states(session: RecordedSession, speed: float) -> int:
-    """Publish the recorded states on their topics, with their stamps, which go out on /clock, too; returns the status."""
+    """Publish the recorded states on their topics, with their stamps, which go out on /clock, too; the exit status."""
     if not len(session.times):
         raise InputError("session", "the session has no states to publish")
     with _context():
