@@ -16,13 +16,21 @@ from ..base.errors import InputError
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import shooting as sh
+from . import possible_bodies as pb
 from .local_motion import high_rate, least_noise, local_start, noise_by_differences
+from .momentum_balance import balanced_values
 from .unknowns import Unknowns, Values
 
 FIRST_ANGLE = 3.0
 """Turn of the first segments [rad]: within it even the flight of a wrong body stays near enough for
 Gauss-Newton steps.
 """
+BALANCED_ANGLES = (6.0, 3.0)
+"""The same where the balance of momentum has told the body to some hundredths [rad]: the next one where the one before
+leaves more than noise.
+"""
+FITS = 2.0
+"""Departures so many times what neighbouring samples say are no noise."""
 MOST_SEGMENTS = 40
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 6
@@ -43,6 +51,11 @@ HUBER = 1.5
 """
 OFFSET_MARGIN_S = 0.05
 """The largest difference of two clocks that is looked for."""
+ROUGH = 1e-3
+"""Tolerance of a stage that only leads on to the next one."""
+MOST_RIM_STEPS = 6
+SMALL_STEP = 0.03
+"""Of all residuals together, in standard deviations: such a step is the last one."""
 WIDER = 8.0
 """Of steps of difference quotients: of what is rounding alone so much less is left."""
 
@@ -109,11 +122,11 @@ def fit_flights(
     whole = 2.0 * max(flight.duration_s for flight in flights)
     if known is not None:
         segments = _segments(work, whole)
-        return _estimate(work, segments, _solved(work, segments, known.starts, 30, 1e-8))
+        return _estimate(work, segments, _solved(work, segments, known.starts, 30, 1e-7))
     starts = _approached(work, whole)
     for turn in range(4):
         segments = _segments(work, whole)
-        starts = _solved(work, segments, starts, 60, 1e-8)
+        starts = _solved(work, segments, starts, 60, 1e-7)
         before = dict(work.sigmas)
         if robust:
             work.weights = _huber_weights(work, segments, starts)
@@ -125,16 +138,38 @@ def fit_flights(
 
 def _approached(work: _Work, whole: float) -> np.ndarray:
     """Bring ``work`` near by ever longer segments; returns starts of one segment for each flight."""
-    length = _first_length(work.flights)
+    values, sigmas = work.values, work.sigmas
+    balanced = balanced_values(work.flights, work.unknowns, values)
+    for angle in () if balanced is None else BALANCED_ANGLES:
+        work.values, work.sigmas = balanced, sigmas
+        length = min(_first_length(work.flights, angle), whole)
+        segments = _segments(work, length)
+        starts = _solved(work, segments, _local_starts(segments), 12, 1e-2)
+        work.sigmas = _noise(work, segments, starts)
+        if all(work.sigmas[key] < FITS * sigmas[key] for key in sigmas):
+            return _lengthened(work, segments, starts, length, whole)
+    work.values, work.sigmas = values, sigmas
+    length = min(_first_length(work.flights, FIRST_ANGLE), whole)
     segments = _segments(work, length)
-    starts = np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
+    starts = _local_starts(segments)
     free = [k for k, segment in enumerate(segments) if not len(segment.wrenches.commands)]
     if free and len(free) < len(segments):
         # Shape and centre of mass first, where no load hides them: what a load does then tells mass and size at once.
-        starts[free] = _solved(work, [segments[k] for k in free], starts[free], 12, 1e-2)
+        starts[free] = _solved(work, [segments[k] for k in free], starts[free], 12, 1e-2, far=True)
     work.values = _scanned(work, segments, starts)
-    starts = _solved(work, segments, starts, 12, 1e-2)
+    starts = _solved(work, segments, starts, 12, 1e-2, far=True)
     work.sigmas = _noise(work, segments, starts)
+    return _lengthened(work, segments, starts, length, whole)
+
+
+def _local_starts(segments: Sequence[sh.Segment]) -> np.ndarray:
+    return np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
+
+
+def _lengthened(
+    work: _Work, segments: list[sh.Segment], starts: np.ndarray, length: float, whole: float
+) -> np.ndarray:
+    """Join segments step by step; returns starts of one segment for each flight."""
     factor = LENGTHENING
     while length < whole:
         values, sigmas = work.values, work.sigmas
@@ -150,11 +185,11 @@ def _approached(work: _Work, whole: float) -> np.ndarray:
     return starts
 
 
-def _first_length(flights: Sequence[ms.MeasuredFlight]) -> float:
+def _first_length(flights: Sequence[ms.MeasuredFlight], angle: float) -> float:
     total = sum(flight.duration_s for flight in flights)
     samples = sum(len(flight.series[0].times_ns) for flight in flights)
     rate = max(high_rate(flight) for flight in flights)
-    turning = FIRST_ANGLE / rate if rate > 0.0 else total
+    turning = angle / rate if rate > 0.0 else total
     return max(turning, total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
 
 
@@ -226,9 +261,15 @@ def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) ->
     return values
 
 
-def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, most: int, tolerance: float) -> np.ndarray:
-    """Improve ``work.values``; returns the starts that go with them."""
-    problem = sh.Problem(segments, starts, work.values, work.unknowns, central=tolerance < 1e-3)
+def _solved(
+    work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, most: int, tolerance: float, far: bool = False
+) -> np.ndarray:
+    """Improve ``work.values``; returns the starts that go with them.
+
+    far: step in log-Cholesky coordinates, in which no step from far away is impossible, else in the tensor itself.
+    """
+    unknowns = work.unknowns if far else work.unknowns.physical
+    problem = sh.Problem(segments, starts, work.values, unknowns)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
         raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
     # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may
@@ -243,8 +284,34 @@ def _solved(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, mos
     )
     work.evaluations += int(found.nfev)
     numbers = problem.first + widths * (found.x - away)
-    work.values = problem.values(numbers)
-    return problem.starts(numbers)
+    work.values, starts = _possible(problem.values(numbers)), problem.starts(numbers)
+    if tolerance > ROUGH or pb.is_possible(problem.values(numbers).body.inertia):
+        return starts
+    return _along_the_rim(work, segments, starts)
+
+
+def _possible(values: Values) -> Values:
+    """The same in log-Cholesky coordinates, where the tensor is outside of what can exist the nearest on its rim."""
+    body = values.body
+    theta = mp.parameters_of(body.mass, body.center_of_mass, mp.possible_tensor(body.inertia, 0.0))
+    return replace(values, theta=theta, tensor_change=np.zeros(6))
+
+
+def _along_the_rim(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+    """Improve ``work.values`` among the bodies that can exist, where the best of all tensors is none of these."""
+    unknowns = work.unknowns.physical
+    first = unknowns.slots.index(("tensor_change", 0))
+    for _ in range(MOST_RIM_STEPS):
+        problem = sh.Problem(segments, starts, work.values, unknowns)
+        jacobian = problem.jacobian(problem.first)
+        step = pb.possible_step(
+            jacobian, problem.residuals(problem.first), slice(first, first + 6), work.values.body
+        )
+        work.evaluations += 1
+        work.values, starts = _possible(problem.values(problem.first + step)), problem.starts(problem.first + step)
+        if np.linalg.norm(jacobian @ step) < SMALL_STEP:
+            break
+    return starts
 
 
 def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> dict[int, np.ndarray]:

@@ -59,7 +59,7 @@ def mass_of(theta: np.ndarray) -> MassEstimate:
     mass = math.exp(2.0 * theta[MASS])
     V = _upper(theta)
     second = mass * (V @ V.T)
-    return MassEstimate(mass, theta[COM].copy(), np.trace(second) * np.eye(3) - second)
+    return MassEstimate(mass, theta[COM].copy(), tensor_of(second))
 
 
 def parameters_of(mass: float, center_of_mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
@@ -67,7 +67,7 @@ def parameters_of(mass: float, center_of_mass: np.ndarray, inertia: np.ndarray) 
     check_tensor(inertia)
     if not 0.0 < mass < math.inf:
         raise InputError("mass", mass, "a finite number above 0 [kg]")
-    second = (0.5 * np.trace(inertia) * np.eye(3) - inertia) / mass
+    second = second_moments(inertia) / mass
     values, vectors = np.linalg.eigh(second)
     second = (vectors * np.maximum(values, 1e-12 * values[2])) @ vectors.T
     # Upper triangular: Cholesky of the matrix turned end for end.
@@ -80,6 +80,24 @@ def parameters_of(mass: float, center_of_mass: np.ndarray, inertia: np.ndarray) 
     theta[4:7] = np.array([V[0, 1], V[1, 2], V[0, 2]]) * math.exp(-size)
     theta[COM] = center_of_mass
     return theta
+
+
+def second_moments(inertia: np.ndarray) -> np.ndarray:
+    """∫ x xᵀ dm (3, 3) [kg m²] of a tensor: a body can have it where none of its eigenvalues is below 0."""
+    return 0.5 * np.trace(inertia) * np.eye(3) - inertia
+
+
+def tensor_of(second: np.ndarray) -> np.ndarray:
+    """The tensor (3, 3) of second moments."""
+    return np.trace(second) * np.eye(3) - second
+
+
+def possible_tensor(inertia: np.ndarray, thinnest: float) -> np.ndarray:
+    """The nearest tensor of a body whose least second moment is at least ``thinnest`` of the largest."""
+    values, axes = np.linalg.eigh(second_moments(inertia))
+    if values[0] >= thinnest * values[2]:
+        return inertia
+    return tensor_of((axes * np.maximum(values, thinnest * values[2])) @ axes.T)
 
 
 def _upper(theta: np.ndarray) -> np.ndarray:

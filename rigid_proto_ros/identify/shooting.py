@@ -18,6 +18,7 @@ from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
 from .sensors import departure, predicted
+from .triangles import upper_triangle
 from .unknowns import Unknowns, Values
 
 START = 12
@@ -250,27 +251,9 @@ def _fill_offset(
             column[segment.wrenches.is_near_edge(times, round(2e9 * OFFSET_STEP_S))] = 0.0
 
 
-def upper_triangle(matrix: np.ndarray) -> np.ndarray:
-    """R of Q R."""
-    return np.asarray(np.linalg.qr(matrix, mode="r"))
-
-
 def compressed(found: Sequence[np.ndarray], jacobian: np.ndarray) -> np.ndarray:
-    """[J r] as an upper triangle (k, columns + 1) with the same products of its columns.
-
-    In slices: small ones are done where they are, and a busy machine's cores don't wait for one another.
-    """
-    whole = np.column_stack([jacobian, np.concatenate([part.ravel() for part in found])])
-    width = whole.shape[1]
-    triangle = np.zeros((0, width))
-    for first in range(0, len(whole), SLICE):
-        triangle = upper_triangle(np.vstack([triangle, whole[first : first + SLICE]]))
-    short = width - len(triangle)
-    return np.vstack([triangle, np.zeros((short, width))]) if short > 0 else triangle
-
-
-SLICE = 400
-"""Rows of a QR decomposition at a time."""
+    """[J r] as an upper triangle (k, k), k the columns of J and one, with the same products of its columns."""
+    return upper_triangle(np.vstack([jacobian.T, np.concatenate([part.ravel() for part in found])]))
 
 
 PRIOR_STEPS = 1.0 / mp.STEP
@@ -288,9 +271,9 @@ class Problem:
     """
 
     def __init__(
-        self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns, central: bool
+        self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns
     ) -> None:
-        self.segments, self.unknowns, self._given, self._central = segments, unknowns, values, central
+        self.segments, self.unknowns, self._given = segments, unknowns, values
         self.first = unknowns.read(values)
         self.widths = PRIOR_STEPS * unknowns.steps(values)
         self._base: _Linearized | None = None
@@ -336,7 +319,7 @@ class Problem:
         triangles: list[np.ndarray] = []
         prior = ((numbers - self.first) / self.widths, np.diag(1.0 / self.widths))
         for segment, start in zip(self.segments, starts, strict=True):
-            flown = linearized(segment, start, values, self.unknowns, self._central)
+            flown = linearized(segment, start, values, self.unknowns, central=False)
             if flown is None:
                 rows = len(self.segments) * (free + 1)
                 failed = np.concatenate([np.full(rows, FAILED), prior[0]])

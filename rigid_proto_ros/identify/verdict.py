@@ -167,12 +167,10 @@ def _withstands(estimate: Estimate, direction: np.ndarray, sd: float) -> bool:
     """Whether the flights contradict a body far away along a direction of the physical unknowns, whatever
     their starts were.
     """
-    problem = sh.Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical, central=False)
+    problem = sh.Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
     best = problem.residuals(problem.first)
     for side in (1.0, -1.0):
-        tried = sh.Problem(
-            estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical, central=False
-        )
+        tried = sh.Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
         there = tried.residuals(tried.first + side * min(TRIED * sd, MOST_RELATIVE) * direction)
         if there @ there - best @ best < LEAST_RISE:
             return False
