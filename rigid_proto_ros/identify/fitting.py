@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 from ..base.errors import InputError
 from . import mass_parameters as mp
 from . import measurements as ms
-from . import shooting as sh
 from . import possible_bodies as pb
+from . import shooting as sh
 from .local_motion import high_rate, least_noise, local_start, noise_by_differences
 from .momentum_balance import balanced_values
 from .unknowns import Unknowns, Values
@@ -54,6 +54,8 @@ OFFSET_MARGIN_S = 0.05
 ROUGH = 1e-3
 """Tolerance of a stage that only leads on to the next one."""
 MOST_RIM_STEPS = 6
+THINNEST = 1e-9
+"""Least second moment of an estimate, of the largest: of none at all there may be a rod, whose least moment is 0."""
 SMALL_STEP = 0.03
 """Of all residuals together, in standard deviations: such a step is the last one."""
 WIDER = 8.0
@@ -140,7 +142,9 @@ def _approached(work: _Work, whole: float) -> np.ndarray:
     """Bring ``work`` near by ever longer segments; returns starts of one segment for each flight."""
     values, sigmas = work.values, work.sigmas
     balanced = balanced_values(work.flights, work.unknowns, values)
-    for angle in () if balanced is None else BALANCED_ANGLES:
+    for angle in BALANCED_ANGLES:
+        if balanced is None:
+            break
         work.values, work.sigmas = balanced, sigmas
         length = min(_first_length(work.flights, angle), whole)
         segments = _segments(work, length)
@@ -166,9 +170,7 @@ def _local_starts(segments: Sequence[sh.Segment]) -> np.ndarray:
     return np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
 
 
-def _lengthened(
-    work: _Work, segments: list[sh.Segment], starts: np.ndarray, length: float, whole: float
-) -> np.ndarray:
+def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, length: float, whole: float) -> np.ndarray:
     """Join segments step by step; returns starts of one segment for each flight."""
     factor = LENGTHENING
     while length < whole:
@@ -293,7 +295,7 @@ def _solved(
 def _possible(values: Values) -> Values:
     """The same in log-Cholesky coordinates, where the tensor is outside of what can exist the nearest on its rim."""
     body = values.body
-    theta = mp.parameters_of(body.mass, body.center_of_mass, mp.possible_tensor(body.inertia, 0.0))
+    theta = mp.parameters_of(body.mass, body.center_of_mass, mp.possible_tensor(body.inertia, THINNEST))
     return replace(values, theta=theta, tensor_change=np.zeros(6))
 
 
@@ -304,9 +306,7 @@ def _along_the_rim(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarr
     for _ in range(MOST_RIM_STEPS):
         problem = sh.Problem(segments, starts, work.values, unknowns)
         jacobian = problem.jacobian(problem.first)
-        step = pb.possible_step(
-            jacobian, problem.residuals(problem.first), slice(first, first + 6), work.values.body
-        )
+        step = pb.possible_step(jacobian, problem.residuals(problem.first), slice(first, first + 6), work.values.body)
         work.evaluations += 1
         work.values, starts = _possible(problem.values(problem.first + step)), problem.starts(problem.first + step)
         if np.linalg.norm(jacobian @ step) < SMALL_STEP:

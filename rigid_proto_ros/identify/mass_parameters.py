@@ -95,9 +95,10 @@ def tensor_of(second: np.ndarray) -> np.ndarray:
 def possible_tensor(inertia: np.ndarray, thinnest: float) -> np.ndarray:
     """The nearest tensor of a body whose least second moment is at least ``thinnest`` of the largest."""
     values, axes = np.linalg.eigh(second_moments(inertia))
-    if values[0] >= thinnest * values[2]:
+    least = thinnest * np.abs(values).max()
+    if values[0] >= least:
         return inertia
-    return tensor_of((axes * np.maximum(values, thinnest * values[2])) @ axes.T)
+    return tensor_of((axes * np.maximum(values, least)) @ axes.T)
 
 
 def _upper(theta: np.ndarray) -> np.ndarray:

@@ -41,7 +41,6 @@ MOST_LEFT_OUT = 0.3
 """Part of the rates that may be left out because a load begins or ends within them."""
 
 
-
 @dataclass(frozen=True)
 class _Poses:
     """What a flight's poses say. seconds (n,) from its begin, positions (n, 3) or None, attitudes (n, 4) xyzw."""
@@ -102,7 +101,10 @@ def balanced_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, va
     names = {mp.MASS: "mass", 7: "com", 8: "com", 9: "com"}
     free = {name for name, _ in unknowns.slots} | {names.get(index, "shape") for _, index in unknowns.theta_columns}
     body = values.body
-    com, mass, drag = _from_path(poses, pushes, values, free)
+    com, mass, drag = values.theta[mp.COM], body.mass, float(values.damping[0])
+    for _ in range(2 if drag > 0.0 or "damping" in free else 1):
+        # Drag is that of the centre of mass, whose path has to be known for it.
+        com, mass, drag = _from_path(poses, pushes, values, com, free)
     inertia, damping = body.inertia * (mass / body.mass), float(values.damping[1])
     if "shape" in free:
         inertia, damping = _from_turns(poses, pushes, values, inertia, com, "damping" in free)
@@ -142,10 +144,10 @@ def _pushes(poses: _Poses) -> _Pushes:
 
 
 def _from_path(
-    poses: Sequence[_Poses], pushes: Sequence[_Pushes], values: Values, free: set[str]
+    poses: Sequence[_Poses], pushes: Sequence[_Pushes], values: Values, com: np.ndarray, free: set[str]
 ) -> tuple[np.ndarray, float, float]:
     """Centre of mass [m, tracked frame], mass [kg] and linear damping [N s/m]."""
-    body, com, drag = values.body, values.theta[mp.COM].copy(), float(values.damping[0])
+    body, drag = values.body, float(values.damping[0])
     shared = [("com", 3), ("mass", 1), ("damping", 1), ("gravity", 3)]
     loaded = any(len(push.seconds) for push in pushes)
     asked = [(n, k) for n, k in shared if n in free and (n != "mass" or loaded or drag > 0.0)]
@@ -179,9 +181,9 @@ def _from_path(
     if not blocks or not asked:
         return com, body.mass, drag
     size = float(np.sqrt(np.trace(body.inertia) / body.mass))
-    prior = np.zeros((3 if "com" in free else 0, blocks[0].shape[1]))
-    prior[:, : len(prior)] = np.eye(len(prior)) / (LOOSE * size)
-    found, sds = _solved(np.concatenate(blocks), np.concatenate(rights), prior, prior[:, : len(prior)] @ com[: len(prior)])
+    assumed = values.theta[mp.COM] if "com" in free else np.zeros(0)
+    prior = np.eye(len(assumed), blocks[0].shape[1]) / (LOOSE * size)
+    found, sds = _solved(np.concatenate(blocks), np.concatenate(rights), prior, assumed / (LOOSE * size))
     numbers, errors = {}, {}
     at = 0
     for name, width in asked:

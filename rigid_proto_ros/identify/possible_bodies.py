@@ -59,5 +59,6 @@ def possible_step(
     found = least_squares(lambda r: own @ change(r) - aim, root, slopes, method="lm", xtol=1e-10, ftol=1e-10)
     step = np.empty(width)
     step[tensor] = change(found.x)
-    step[order[:first]] = np.linalg.solve(triangle[:first, :first], right[:first] - triangle[:first, first:] @ step[tensor])
+    others = right[:first] - triangle[:first, first:] @ step[tensor]
+    step[order[:first]] = np.linalg.solve(triangle[:first, :first], others)
     return step

@@ -270,9 +270,7 @@ class Problem:
     (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative).
     """
 
-    def __init__(
-        self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns
-    ) -> None:
+    def __init__(self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns) -> None:
         self.segments, self.unknowns, self._given = segments, unknowns, values
         self.first = unknowns.read(values)
         self.widths = PRIOR_STEPS * unknowns.steps(values)

@@ -11,7 +11,9 @@ import pytest
 from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify.identification import Known, identify
-from rigid_proto_ros.identify.unknowns import GROUPS, make_unknowns
+from rigid_proto_ros.identify.mass_parameters import second_moments
+from rigid_proto_ros.identify.momentum_balance import balanced_values
+from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, GROUPS, make_unknowns
 
 POKE = (0.5, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.5, 2.0), (0.0, 0.0, 0.01))
 
@@ -62,6 +64,39 @@ def test_a_poked_throw_tells_all_ten_parameters() -> None:
     assert found.mass.sd < 0.01 * found.mass.value
     assert all(check.is_white for check in found.checks)
     assert not found.remarks
+
+
+def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
+    truth = _body()
+    poke = (8.0, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.0, 0.3), (0.0, 0.0, 0.0))
+    found = identify([mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 10.0, load=mf.acting(poke))])
+    assert not found.hidden
+    assert abs(found.mass.value - 0.5) < 4.0 * found.mass.sd  # 1.2
+    assert np.mean(study.normalised_errors(found, truth) ** 2) < 2.5  # 0.25
+
+
+def test_the_balance_of_momentum_needs_no_guess_of_the_body() -> None:
+    truth = _body((0.05, 0.0))
+    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 3.0, load=mf.acting(POKE))
+    guess = mf.values_of(70.0, (1.0, 0.0, 0.0), np.eye(3), study.EARTH, (0.05, 0.0))
+    found = balanced_values([flight], make_unknowns(DEFAULT_FIT, ["/mocap/pose"]), guess)
+    assert found is not None
+    body, true = found.body, truth.body
+    assert abs(body.mass - true.mass) < 0.01 * true.mass  # measured 0.002
+    assert np.abs(body.center_of_mass - true.center_of_mass).max() < 1e-3  # 4e-5
+    assert np.abs(body.inertia - true.inertia).max() < 0.03 * true.inertia.max()  # 0.008
+
+
+def test_a_sheet_of_no_thickness_ends_on_the_rim_of_what_can_exist() -> None:
+    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), np.diag([1.0, 2.0, 3.0]) * 1e-3, study.EARTH)
+    ends = []
+    for seed in range(4):
+        flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(seed), 2.0, load=mf.acting(POKE))
+        found = identify([flight])
+        ends.append(np.linalg.eigvalsh(second_moments(found.estimate.mass.inertia))[0] / 3e-3)
+        assert ends[-1] > -1e-12
+        assert np.mean(study.normalised_errors(found, truth) ** 2) < 2.5
+    assert min(ends) < 1e-8  # every other one would have less than no thickness
 
 
 def test_several_throws_tell_more_than_one() -> None:
