@@ -45,7 +45,7 @@ ALLOWED = {
     "PIL": ("rerun_view",),
     "pygltflib": ("export.gltf",),
     "pxr": ("export.usd",),
-    "scipy": ("mesh.hull", "sweep.sampling", "identify.fitting", "identify.comparison", "identify.residual_checks"),
+    "scipy": ("mesh.hull", "sweep.sampling", "identify"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
