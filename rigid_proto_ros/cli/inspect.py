@@ -18,7 +18,7 @@ from ..mass.properties import scale_vector
 from ..mesh.locate import resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .inspect_report import print_report
-from .inspect_robot import NEEDS_COMPARE, add_robot_arguments, compare, given, number_or_link
+from .inspect_robot import add_robot_arguments, check_robot_options, compare, given, lump, number_or_link
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
@@ -39,6 +39,10 @@ EXAMPLES = (
     (
         "rigid_proto inspect --compare robot.urdf --fix fixed.urdf --total-mass 12",
         "the same file with right inertials, for a robot of 12 kg",
+    ),
+    (
+        "rigid_proto inspect --lump robot.urdf --joint elbow=0.5 --as-scene robot.yaml",
+        "the robot with its joints held, as one body to fly",
     ),
 )
 
@@ -126,11 +130,11 @@ def run(args: argparse.Namespace) -> int:
     scale_vector(scale)
     if args.max_triangles < 1:
         raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
+    check_robot_options(args, mesh_name)
+    if args.lump is not None:
+        return lump(args)
     if args.compare is not None:
         return compare(args, mesh_name, scale, given_mass, given_density)
-    for name in NEEDS_COMPARE:
-        if getattr(args, name) not in (None, []):
-            raise InputError(f"--{name.replace('_', '-')}", "takes --compare ROBOT with it")
     if given_mass.by_link or given_density.by_link:
         named = next(iter({**given_mass.by_link, **given_density.by_link}))
         raise InputError(

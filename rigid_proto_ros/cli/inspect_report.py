@@ -16,6 +16,7 @@ from .terminal import SEVERITY_STYLES, Text, line, table
 if TYPE_CHECKING:
     from ..mass.diagnosis import LinkDiagnosis
     from ..mass.robot_fix import FixedLink
+    from ..mass.robot_lump import Lump
 
 _STATUS_STYLES = {"ok": "green", "off": "bold red"}
 SHOWN_ZERO = 5e-7
@@ -53,10 +54,7 @@ def print_report(inspection: Inspection, report: dict) -> None:
     rows.append(("mass", f"{chosen.mass: .9g}", f"kg{density}"))
     diagonal = float(np.linalg.norm(size))
     rows.append(("centre of mass", _row(shown_zero(chosen.center_of_mass, diagonal)), "m"))
-    largest = float(np.abs(chosen.inertia).max())
-    for number, row in enumerate(chosen.inertia):
-        label, unit = ("inertia", "kg m^2, about the centre of mass") if number == 0 else ("", "")
-        rows.append((label, _row(shown_zero(row, largest)), unit))
+    rows += _tensor_rows(chosen.inertia)
     moments, axes = principal_axes(chosen.inertia)
     rows.append(("principal moments", _row(moments), "kg m^2"))
     rows += [
@@ -170,6 +168,31 @@ def print_fixed_links(links: list[FixedLink], out: str) -> None:
             line((link.before.link, "bold"), ": written, but ", doubt)
     written, left = (sum(map(bool, column)) for column in zip(*((x.written, x.left) for x in links), strict=True))
     line(f"{out}: {written} of {len(links)} inertials rewritten, {left} left as they are")
+
+
+def print_lump(whole: Lump, written: tuple[str, ...]) -> None:
+    """What ``--lump`` prints."""
+    properties = whole.properties
+    moments, axes = principal_axes(properties.inertia)
+    rows: list[tuple[Text, ...]] = [("links", f" {len(whole.links)}", ""), ("mass", f"{properties.mass: .9g}", "kg")]
+    rows.append(("centre of mass", _row(properties.center_of_mass), "m"))
+    rows += _tensor_rows(properties.inertia)
+    rows.append(("principal moments", _row(moments), "kg m^2"))
+    rows += [(f"principal axis {k + 1}", _row(shown_zero(axes[:, k], 1.0)), "") for k in range(3)]
+    table(rows)
+    if whole.massless:
+        line(f"without an inertial, and so without mass: {', '.join(whole.massless)}")
+    for kind, texts in (("not in the mesh", whole.absent), ("doubt", whole.doubts)):
+        for text in texts:
+            line((kind, "yellow"), f": {text}")
+    for name in written:
+        line(f"wrote {name}")
+
+
+def _tensor_rows(inertia: np.ndarray) -> list[tuple[Text, ...]]:
+    labels = [("inertia", "kg m^2, about the centre of mass"), ("", ""), ("", "")]
+    largest = float(np.abs(inertia).max())
+    return [(label, _row(shown_zero(row, largest)), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
 
 
 def _print_expected(d: LinkDiagnosis) -> None:

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto inspect`` of a whole robot: ``--compare`` judges its inertials, ``--fix`` rewrites them."""
+"""``rigid_proto inspect`` of a whole robot: ``--compare`` judges its inertials, ``--fix`` rewrites them, ``--lump``
+takes it as one rigid body.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,14 +16,16 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.output_file import whole_file
-from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links
+from ..mass.tensor import principal_axes, six_from_tensor
+from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links, print_lump
 
 if TYPE_CHECKING:
     from ..mass.diagnosis import LinkDiagnosis, Options
     from ..mass.robot_fix import FixedLink
+    from ..mass.robot_lump import Lump
 
-NEEDS_COMPARE = ("link", "package_path", "fix", "total_mass", "tolerance")
-"""Options that say nothing without ``--compare``."""
+_COMPARES = ("link", "fix", "total_mass", "tolerance")
+_LUMPS = ("joint", "as_scene")
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,14 @@ def number_or_link(text: str) -> tuple[str, float]:
     """``7850`` or ``arm=7850`` as the link's name, or "", and the number; raises ValueError for others."""
     link, _, number = text.rpartition("=")
     return link, float(number)
+
+
+def joint_value(text: str) -> tuple[str, float]:
+    """``elbow=0.5`` as name and number; raises ValueError for others."""
+    name, number = number_or_link(text)
+    if not name or not math.isfinite(number):
+        raise ValueError(f"{text!r} instead of NAME=VALUE")
+    return name, number
 
 
 def given(option: str, values: list[tuple[str, float]] | None) -> Given:
@@ -53,7 +66,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--link", metavar="NAME", help="with --compare: this link alone")
     parser.add_argument(
         "--package-path", type=Path, action="append", default=[], metavar="DIR",
-        help="with --compare: a folder that holds the packages or models that the file names; may be repeated",
+        help="with --compare or --lump: a folder that holds packages or models that the file names; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=float, metavar="T",
@@ -66,6 +79,26 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
         "--total-mass", type=float, metavar="M",
         help="with --compare: links without --mass or --density are of one density, the robot weighs M kg",
     )  # fmt: skip
+    parser.add_argument("--lump", metavar="ROBOT", help="a URDF, SDF or MJCF with its joints held, as one rigid body")
+    parser.add_argument(
+        "--joint", type=joint_value, action="append", metavar="NAME=VALUE",
+        help="with --lump: where a joint is held, in rad or m (default 0); may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--as-scene", metavar="FILE.yaml", help="with --lump: write a scene that flies it, and its mesh"
+    )
+
+
+def check_robot_options(args: argparse.Namespace, mesh: str | None) -> None:
+    """Refuse options that need a robot, or another of its uses."""
+    for names, use in ((_COMPARES, "compare"), (_LUMPS, "lump")):
+        for name in names:
+            if getattr(args, use) is None and getattr(args, name) not in (None, []):
+                raise InputError(f"--{name.replace('_', '-')}", f"takes --{use} ROBOT with it")
+    if args.package_path and args.compare is None and args.lump is None:
+        raise InputError("--package-path", "takes --compare ROBOT or --lump ROBOT with it")
+    if args.lump is not None and (args.compare is not None or mesh is not None):
+        raise InputError("--lump", args.lump, "a robot by itself, without MESH and --compare")
 
 
 def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
@@ -89,6 +122,67 @@ def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass
     # A check that judged nothing must not look like one that found nothing.
     off, unknown = (sum(d.status == status for d in diagnoses) for status in (OFF, UNKNOWN))
     return 1 if off or unknown == len(diagnoses) else 0
+
+
+def lump(args: argparse.Namespace) -> int:
+    """``inspect --lump ROBOT``: the robot as one body, printed, and written as a scene where it is asked for."""
+    from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
+    from ..mass.robot_lump import lump_robot
+
+    for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback"):
+        if getattr(args, flag):
+            raise InputError(f"--{flag}", "can't be used with --lump, which takes the robot's own inertials")
+    whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path))
+    written = _write_scene(whole, args.as_scene) if args.as_scene else ()
+    exports = {"urdf": urdf_inertial, "sdf": sdf_inertial, "mjcf": mjcf_inertial}
+    export = next((export for name, export in exports.items() if getattr(args, name)), None)
+    if args.json:
+        print(json.dumps(_lump_as_dict(args, whole)))
+    elif export is not None:
+        print(export(whole.properties, args.frame), end="")
+    else:
+        print_lump(whole, written)
+    return 0
+
+
+def _lump_as_dict(args: argparse.Namespace, whole: Lump) -> dict:
+    moments, axes = principal_axes(whole.properties.inertia)
+    return {
+        "lump": args.lump,
+        "joints": dict(args.joint or []),
+        "mass": whole.properties.mass,
+        "center_of_mass": whole.properties.center_of_mass.tolist(),
+        "inertia": whole.properties.inertia.tolist(),
+        "principal_moments": moments.tolist(),
+        "principal_axes": axes.tolist(),
+        "links": dict(whole.links),
+        "massless": list(whole.massless),
+        "absent": list(whole.absent),
+        "doubts": list(whole.doubts),
+        "vertices": len(whole.vertices),
+        "triangles": len(whole.triangles),
+    }
+
+
+def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
+    """Write the scene, and beside it the mesh, which carries the picture alone; returns what was written."""
+    from ..mass.robot_lump import obj_text
+    from ..scene.scenario import scene_text
+
+    with whole_file("--as-scene", name) as scene:
+        mesh = Path(name).absolute().with_suffix(".obj")
+        values: dict = {
+            "mesh": str(mesh) if len(whole.triangles) else "",
+            "inertia_model": "explicit",
+            "explicit_inertia.mass": whole.properties.mass,
+            "explicit_inertia.center_of_mass": whole.properties.center_of_mass.tolist(),
+            "explicit_inertia.tensor": list(six_from_tensor(whole.properties.inertia)),
+        }
+        if len(whole.triangles):
+            with whole_file("--as-scene", mesh) as file:
+                file.write_text(obj_text(whole.vertices, whole.triangles), encoding="utf-8")
+        scene.write_text(scene_text(values), encoding="utf-8")
+    return (name, str(mesh)) if len(whole.triangles) else (name,)
 
 
 def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> None:

@@ -156,10 +156,13 @@ def read_robot(path: Path) -> list[LinkInertial]:
     """The links of a robot file that have an inertial or a shape, xacro expanded; raises InputError when the file can't
     be read.
     """
+    return links_of(robot_root(path), path)
+
+
+def robot_root(path: Path) -> ElementTree.Element:
+    """The root of a robot file, xacro expanded; raises InputError when the file can't be read."""
     root = parse_xml(read_bounded(path, MAX_BYTES, "compare", "a URDF, SDF or MJCF file"), path)
-    if is_xacro(root, path):
-        root = parse_xml(_expanded(path), path)
-    return links_of(root, path)
+    return parse_xml(_expanded(path), path) if is_xacro(root, path) else root
 
 
 def links_of(root: ElementTree.Element, path: Path) -> list[LinkInertial]:

@@ -34,7 +34,7 @@ _Attributes = Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class _Model:
+class Model:
     """What holds for all bodies: angles in degrees, Euler sequence, mesh assets by name, attributes by class, tag."""
 
     degrees: bool
@@ -92,7 +92,8 @@ def _defaults(root: Element) -> dict[str, dict[str, _Attributes]]:
     return found
 
 
-def _model(root: Element) -> _Model:
+def mjcf_model(root: Element) -> Model:
+    """What holds for all bodies of a model whose included files have been put in."""
     compiler: dict[str, str] = {}
     for element in root.findall("compiler"):
         compiler.update(element.attrib)
@@ -100,7 +101,7 @@ def _model(root: Element) -> _Model:
         raise InputError(
             "compare", f"coordinate={compiler['coordinate']!r}", "local coordinates, as MuJoCo since 2.3.4"
         )
-    model = _Model(
+    model = Model(
         compiler.get("angle", "degree") != "radian",
         compiler.get("eulerseq", "xyz"),
         {},
@@ -116,9 +117,9 @@ def _model(root: Element) -> _Model:
     return model
 
 
-def _rotation(attributes: _Attributes, degrees: bool, sequence: str) -> np.ndarray:
+def element_rotation(attributes: _Attributes, model: Model) -> np.ndarray:
     """Orientation of an MJCF element: quat, axisangle, xyaxes, zaxis or euler."""
-    turn = math.pi / 180.0 if degrees else 1.0
+    turn = math.pi / 180.0 if model.degrees else 1.0
     if attributes.get("axisangle"):
         x, y, z, angle = floats(attributes["axisangle"], "", 4)
         axis = np.array([x, y, z]) / np.linalg.norm([x, y, z])
@@ -134,7 +135,7 @@ def _rotation(attributes: _Attributes, degrees: bool, sequence: str) -> np.ndarr
         return _turn_to(floats(attributes["zaxis"], "", 3))
     if attributes.get("euler"):
         rotation = np.eye(3)
-        for letter, angle in zip(sequence, floats(attributes["euler"], "", 3) * turn, strict=True):
+        for letter, angle in zip(model.sequence, floats(attributes["euler"], "", 3) * turn, strict=True):
             axis = np.eye(3)["xyz".index(letter.lower())]
             single = rotation_from_wxyz([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * axis)])
             rotation = rotation @ single if letter.islower() else single @ rotation  # intrinsic, or extrinsic
@@ -148,13 +149,13 @@ def _turn_to(direction: np.ndarray) -> np.ndarray:
     return rotation_from_wxyz([1.0 + z[2], -z[1], z[0], 0.0] if z[2] > -1.0 else [0.0, 1.0, 0.0, 0.0])
 
 
-def _geom(geom: Element, model: _Model, childclass: str) -> Shape | None:
+def _geom(geom: Element, model: Model, childclass: str) -> Shape | None:
     """The shape of a geom in its parent's frame; None for those that are no solid (planes, height fields)."""
     attributes = model.attributes(geom, childclass)
     touches = attributes.get("contype", "1") != "0" or attributes.get("conaffinity", "1") != "0"
     role = COLLISION if touches else VISUAL
     kind = attributes.get("type", "sphere")
-    rotation = _rotation(attributes, model.degrees, model.sequence)
+    rotation = element_rotation(attributes, model)
     position = floats(attributes.get("pos"), "0 0 0", 3)
     if kind in ("plane", "hfield"):
         return None
@@ -185,7 +186,7 @@ def _geom(geom: Element, model: _Model, childclass: str) -> Shape | None:
         raise ValueError(f"size={attributes.get('size')!r} of a {kind}") from None
 
 
-def _mesh(shape: Shape, name: str, model: _Model) -> Shape:
+def _mesh(shape: Shape, name: str, model: Model) -> Shape:
     if name not in model.meshes:
         return replace(shape, file=name, problem=f"mesh {name!r}, which no <asset> declares")
     mesh = model.meshes[name]
@@ -198,7 +199,7 @@ def _mesh(shape: Shape, name: str, model: _Model) -> Shape:
     return replace(shape, file=str(Path(model.folder) / bare), scale=floats(mesh.get("scale"), "1 1 1", 3))
 
 
-def _shapes(body: Element, model: _Model, childclass: str) -> Iterator[Shape]:
+def _shapes(body: Element, model: Model, childclass: str) -> Iterator[Shape]:
     """The shapes of a body's geoms, those in its frames included, in the body's frame."""
     for child in body:
         if child.tag == "geom":
@@ -206,7 +207,7 @@ def _shapes(body: Element, model: _Model, childclass: str) -> Iterator[Shape]:
             if shape is not None:
                 yield shape
         elif child.tag == "frame":
-            rotation = _rotation(child.attrib, model.degrees, model.sequence)
+            rotation = element_rotation(child.attrib, model)
             position = floats(child.get("pos"), "0 0 0", 3)
             for shape in _shapes(child, model, child.get("childclass") or childclass):
                 yield placed(shape, rotation, position)
@@ -225,14 +226,14 @@ def _bodies(element: Element, childclass: str) -> Iterator[tuple[Element, str]]:
 def read_mjcf(root: Element, path: Path) -> list[LinkInertial]:
     """Bodies of an MJCF that have an inertial; of the others MuJoCo computes it itself."""
     _with_includes(root, path)
-    model = _model(root)
+    model = mjcf_model(root)
     links = []
     for world in root.findall("worldbody"):
         for body, childclass in _bodies(world, ""):
             inertial = body.find("inertial")
             if inertial is None:
                 continue
-            rotation = _rotation(inertial.attrib, model.degrees, model.sequence)
+            rotation = element_rotation(inertial.attrib, model)
             words = inertial.get("fullinertia", "").split()
             if words:
                 xx, yy, zz, xy, xz, yz = words

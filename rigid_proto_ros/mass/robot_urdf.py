@@ -26,12 +26,13 @@ def _get(element: Element | None, name: str) -> str | None:
     return None if element is None else element.get(name)
 
 
-def _urdf_pose(element: Element | None) -> tuple[np.ndarray, np.ndarray]:
+def urdf_pose(element: Element | None) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and position (3,) of an <origin>."""
     return rotation_from_rpy(*floats(_get(element, "rpy"), "0 0 0", 3)), floats(_get(element, "xyz"), "0 0 0", 3)
 
 
 def _urdf_shape(role: str, element: Element) -> Shape | None:
-    rotation, position = _urdf_pose(element.find("origin"))
+    rotation, position = urdf_pose(element.find("origin"))
     geometry = element.find("geometry")
     shape = next(iter(geometry), None) if geometry is not None else None
     if shape is None:
@@ -64,13 +65,13 @@ def read_urdf(root: Element, _path: Path) -> list[LinkInertial]:
             links.append(without_inertial(name, shapes, "an <inertial> without mass or inertia", link))
             continue
         six = [tensor.get(entry, "0") for entry in _SIX]
-        rotation, _ = _urdf_pose(origin)
+        rotation, _ = urdf_pose(origin)
         links.append(link_inertial(name, mass.get("value", ""), _get(origin, "xyz"), six, rotation, shapes, inertial))
     return links
 
 
-def _sdf_pose(element: Element) -> tuple[np.ndarray, str]:
-    """Rotation, and the position's words."""
+def sdf_pose(element: Element) -> tuple[np.ndarray, str]:
+    """Rotation (3, 3) of an element's <pose>, and the position's words."""
     pose = element.find("pose")
     values = floats(pose.text if pose is not None else None, "0 0 0 0 0 0", 6)
     if pose is not None and pose.get("degrees", "false") in ("true", "1"):
@@ -80,7 +81,7 @@ def _sdf_pose(element: Element) -> tuple[np.ndarray, str]:
 
 
 def _sdf_shape(role: str, element: Element, link: str) -> Shape | None:
-    rotation, words = _sdf_pose(element)
+    rotation, words = sdf_pose(element)
     position = floats(words, "", 3)
     geometry = element.find("geometry")
     shape = next((child for child in geometry if child.tag != "empty"), None) if geometry is not None else None
@@ -124,6 +125,6 @@ def read_sdf(root: Element, _path: Path) -> list[LinkInertial]:
             links.append(without_inertial(name, shapes, "an <inertial> without mass or inertia", link))
             continue
         six = [tensor.findtext(entry, "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in _SIX]
-        rotation, position = _sdf_pose(inertial)
+        rotation, position = sdf_pose(inertial)
         links.append(link_inertial(name, mass, position, six, rotation, shapes, inertial))
     return links

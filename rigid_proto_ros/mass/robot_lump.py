@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: MIT
+"""A robot whose joints are held, as one rigid body: mass properties from its inertials, and one mesh of its links."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..mesh.hull import box_surface
+from ..mesh.locate import Search
+from ..mesh.reading import MAX_TRIANGLES, load_mesh
+from .properties import MassProperties
+from .robot_files import COLLISION, VISUAL, LinkInertial, Shape, links_of, robot_root
+from .robot_tree import Pose, link_poses
+from .tensor import check_tensor
+
+SEGMENTS = 48
+"""Corners of a round shape's circle: what a picture needs, for no mass is taken of it."""
+
+
+@dataclass(frozen=True)
+class Lump:
+    """``properties``: of all links together. vertices (n, 3), triangles (m, 3): their shapes. links: names and masses
+    of those that count. massless: names of links without an inertial; absent: why a shape isn't in the mesh;
+    doubts: links whose tensor no body has."""
+
+    properties: MassProperties
+    vertices: np.ndarray
+    triangles: np.ndarray
+    links: tuple[tuple[str, float], ...]
+    massless: tuple[str, ...]
+    absent: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+
+def lump_robot(path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = ()) -> Lump:
+    """The robot at joint values [rad or m] by name, the others at 0, in the frame of its root link (URDF), of the model
+    (SDF) or of the world (MJCF).
+
+    Raises InputError for a file without inertials, for joints that it doesn't have, and for links that make no tree.
+    """
+    root = robot_root(path)
+    links = links_of(root, path)
+    if root.tag == "mujoco":
+        _require_inertials(root)
+    poses = link_poses(root, path, joints)
+    parents = {id(child): parent for parent in root.iter() for child in parent}
+    placed = [(link, poses.get(_link_id(link, parents))) for link in links]
+    reached = [(link, pose) for link, pose in placed if pose is not None]
+    if len(reached) < len(placed):
+        lost = next(link.link for link, pose in placed if pose is None)
+        raise InputError("lump", f"link {lost!r} hangs on no other; accepted: one tree of links")
+    heavy = [(link, pose) for link, pose in reached if not link.problem]
+    properties = _together(heavy, path)
+    check_tensor(properties.inertia, source=f"tensor of {path.name} as one body")
+    vertices, triangles, absent = _merged(reached, Search(path.parent, folders))
+    return Lump(
+        properties,
+        vertices,
+        triangles,
+        tuple((link.link, link.mass) for link, _ in heavy),
+        tuple(link.link for link, _ in reached if link.problem),
+        absent,
+        tuple(filter(None, (_doubt(link) for link, _ in heavy))),
+    )
+
+
+def _doubt(link: LinkInertial) -> str:
+    """What is wrong with a link's own tensor; that of a point mass is 0."""
+    try:
+        if np.any(link.inertia):
+            check_tensor(link.inertia, source=f"link {link.link}")
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _link_id(link: LinkInertial, parents: Mapping[int, Element]) -> int:
+    """The id of the element of the link, of which the inertial may be what was kept."""
+    element = link.element
+    if element is not None and element.tag == "inertial":
+        element = parents[id(element)]
+    return id(element)
+
+
+def _require_inertials(root: Element) -> None:
+    """Refuse an MJCF of which MuJoCo takes masses from geoms."""
+    compiler = {key: value for element in root.iter("compiler") for key, value in element.attrib.items()}
+    if compiler.get("inertiafromgeom", "auto") == "true":
+        raise InputError("lump", "inertiafromgeom='true'", "an MJCF whose bodies have an <inertial>")
+    for body in root.iter("body"):
+        if body.find("inertial") is None and body.find("geom") is not None:
+            name = body.get("name", "?")
+            raise InputError("lump", f"body {name!r} without an <inertial>", "an MJCF whose bodies with geoms have one")
+
+
+def _together(links: list[tuple[LinkInertial, Pose]], path: Path) -> MassProperties:
+    """Mass, COM and tensor of all links by the parallel axis theorem, about the common COM."""
+    for link, _ in links:
+        if not 0.0 <= link.mass < math.inf or not np.isfinite(link.inertia).all():
+            raise InputError("lump", f"mass {link.mass:g} of link {link.link}", "finite masses >= 0 and finite tensors")
+    masses = np.array([link.mass for link, _ in links])
+    centers = np.array([pose.rotation @ link.center_of_mass + pose.position for link, pose in links]).reshape(-1, 3)
+    mass = float(masses.sum())
+    if not mass > 0.0:
+        raise InputError("lump", path.name, "a robot file with inertials")
+    center = masses @ centers / mass
+    inertia = np.zeros((3, 3))
+    for (link, pose), own in zip(links, centers, strict=True):
+        offset = own - center
+        inertia += pose.rotation @ link.inertia @ pose.rotation.T
+        inertia += link.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return MassProperties(mass, center, 0.5 * (inertia + inertia.T))
+
+
+def _merged(links: list[tuple[LinkInertial, Pose]], search: Search) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Vertices, triangles, and what is missing, of what the links show; of those that show nothing what they collide
+    with.
+    """
+    parts: list[tuple[np.ndarray, np.ndarray]] = []
+    absent = []
+    for link, pose in links:
+        shown = [shape for shape in link.shapes if shape.role == VISUAL]
+        for shape in shown or [shape for shape in link.shapes if shape.role == COLLISION]:
+            try:
+                vertices, triangles = _surface(shape, search)
+            except InputError as error:
+                absent.append(f"{link.link}: {error}")
+                continue
+            whole = pose @ Pose(shape.rotation, shape.position)
+            parts.append((vertices @ whole.rotation.T + whole.position, triangles))
+    if not parts:
+        return np.zeros((0, 3)), np.zeros((0, 3), np.int64), tuple(absent)
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    triangles = [part + start for (_, part), start in zip(parts, starts[:-1], strict=True)]
+    return np.concatenate([vertices for vertices, _ in parts]), np.concatenate(triangles), tuple(absent)
+
+
+def _surface(shape: Shape, search: Search) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of a shape in its own frame; raises InputError for one that can't be had."""
+    if shape.problem:
+        raise InputError(shape.file or shape.kind, shape.problem)
+    if shape.kind == "mesh":
+        mesh = load_mesh(shape.file, max_triangles=MAX_TRIANGLES, search=search)
+        used, local = np.unique(mesh.triangles, return_inverse=True)
+        vertices = mesh.vertices[used] * shape.scale
+        if not np.isfinite(vertices).all():
+            raise InputError(shape.file, "vertices that are not finite")
+        triangles = local.reshape(-1, 3)
+        return vertices, triangles[:, ::-1] if np.prod(shape.scale) < 0.0 else triangles
+    size = np.array(shape.size)
+    if shape.kind == "box":
+        return box_surface(-0.5 * size, 0.5 * size)
+    arc = np.linspace(-0.5 * math.pi, 0.5 * math.pi, SEGMENTS // 2 + 1)
+    if shape.kind in ("sphere", "ellipsoid"):
+        vertices, triangles = _revolved(np.cos(arc), np.sin(arc))
+        return vertices * (size if shape.kind == "ellipsoid" else float(size[0])), triangles
+    r, half = float(size[0]), 0.5 * float(size[1])
+    if shape.kind == "cylinder":
+        return _revolved(np.array([0.0, r, r, 0.0]), np.array([-half, -half, half, half]))
+    arc = np.insert(arc, len(arc) // 2, 0.0)
+    return _revolved(r * np.cos(arc), r * np.sin(arc) + np.repeat([-half, half], len(arc) // 2))
+
+
+def _revolved(radius: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The closed surface that a profile (k,), from the axis below to the axis above, leaves around z."""
+    angle = 2.0 * math.pi / SEGMENTS * np.arange(SEGMENTS)
+    x, y = (np.outer(radius[1:-1], turn(angle)) for turn in (np.cos, np.sin))
+    rings = np.stack([x, y, np.repeat(height[1:-1, None], SEGMENTS, axis=1)], axis=2)
+    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, height[0]], [0.0, 0.0, height[-1]]]])
+    near = np.arange(SEGMENTS)
+    far = np.roll(near, -1)
+    last, bottom, top = (len(rings) - 1) * SEGMENTS, len(vertices) - 2, len(vertices) - 1
+    triangles = [np.stack([np.full(SEGMENTS, bottom), far, near], axis=1)]
+    for start in range(0, last, SEGMENTS):
+        a, b, c, d = start + near, start + far, start + SEGMENTS + far, start + SEGMENTS + near
+        triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    triangles.append(np.stack([last + near, last + far, np.full(SEGMENTS, top)], axis=1))
+    return vertices, np.concatenate(triangles)
+
+
+def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:
+    """A mesh as an .obj file, with all digits."""
+    points = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
+    return points + "".join(f"f {a} {b} {c}\n" for a, b, c in (triangles + 1).tolist())

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: MIT
+"""A robot with its joints held is one rigid body: that of MuJoCo's kinematics, in a mesh of its links, flown as a scene."""
+
+import json
+import os
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mesh_files import CUBE_VERTICES, stl
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.link_shapes import primitive_solid
+from rigid_proto_ros.mass.robot_lump import lump_robot
+from rigid_proto_ros.mesh.reading import Mesh
+
+TENSOR = 'ixx="0.03" ixy="0.001" ixz="-0.002" iyy="0.02" iyz="0.003" izz="0.025"'
+
+
+def link(name: str, mass: float, xyz: str, shape: str = "") -> str:
+    inertial = f'<inertial><origin xyz="{xyz}" rpy="0.1 0.2 0.3"/><mass value="{mass}"/><inertia {TENSOR}/></inertial>'
+    return f'<link name="{name}">{inertial}{shape}</link>'
+
+
+def joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/><origin xyz="0.3 -0.1 0.2" rpy="0.4 0.5 -0.6"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{more}</joint>'
+
+
+BOX = '<visual><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+URDF = (
+    '<robot name="r">'
+    + link("base", 3.0, "0.1 0 0", BOX)
+    + link("arm", 2.0, "0 0.2 0", '<collision><geometry><cylinder radius="0.1" length="0.5"/></geometry></collision>')
+    + link("slide", 1.0, "0 0 0.1")
+    + link("hand", 0.5, "0.05 0 0")
+    + link("finger", 0.2, "0 0.01 0")
+    + '<link name="eye">' + BOX + "</link>"
+    + joint("shoulder", "revolute", "base", "arm", '<axis xyz="1 2 3"/><limit lower="-1" upper="1" effort="1" velocity="1"/>')
+    + joint("lift", "prismatic", "arm", "slide", '<axis xyz="0 1 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>')
+    + joint("wrist", "continuous", "slide", "hand")
+    + joint("grip", "continuous", "hand", "finger", '<axis xyz="0 0 1"/><mimic joint="wrist" multiplier="-0.5" offset="0.1"/>')
+    + joint("mount", "fixed", "hand", "eye")
+    + "</robot>"
+)  # fmt: skip
+
+
+def for_mujoco(urdf: str):
+    """MuJoCo's model of a URDF's inertials alone, on a free joint, without which it drops the root's mass."""
+    mujoco = pytest.importorskip("mujoco")
+    root = ElementTree.fromstring(urdf)
+    for part in root.iter("link"):
+        for shape in [*part.findall("visual"), *part.findall("collision")]:
+            part.remove(shape)
+        if part.find("inertial") is None:
+            root.remove(part)
+            root.remove(next(j for j in root.findall("joint") if j.find("child").get("link") == part.get("name")))
+    children = {found.find("child").get("link") for found in root.findall("joint")}
+    base = next(part.get("name") for part in root.findall("link") if part.get("name") not in children)
+    free = (
+        '<r><link name="world"/><joint name="free" type="floating"><parent link="world"/><child link="{}"/></joint></r>'
+    )
+    root.extend(ElementTree.fromstring(free.format(base)))
+    root.append(ElementTree.fromstring('<mujoco><compiler fusestatic="false" inertiafromgeom="false"/></mujoco>'))
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+
+
+def as_one_body(model, values: dict[str, float]):
+    """Mass, COM and tensor of all bodies of a MuJoCo model at joint values."""
+    mujoco = pytest.importorskip("mujoco")
+    data = mujoco.MjData(model)
+    for name, value in values.items():
+        data.qpos[model.jnt_qposadr[model.joint(name).id]] = value
+    mujoco.mj_kinematics(model, data)
+    mass = model.body_mass.sum()
+    center = model.body_mass @ data.xipos / mass
+    inertia = np.zeros((3, 3))
+    for body in range(model.nbody):
+        R, d = data.ximat[body].reshape(3, 3), data.xipos[body] - center
+        inertia += R @ np.diag(model.body_inertia[body]) @ R.T
+        inertia += model.body_mass[body] * (d @ d * np.eye(3) - np.outer(d, d))
+    return mass, center, inertia
+
+
+def assert_same(lump, expected) -> None:
+    mass, center, inertia = expected
+    assert lump.properties.mass == pytest.approx(mass, rel=1e-14)
+    assert lump.properties.center_of_mass == pytest.approx(center, abs=1e-13)  # measured 2e-16
+    assert lump.properties.inertia == pytest.approx(inertia, abs=1e-13)  # measured 4e-16
+
+
+VALUES = {"shoulder": 0.7, "lift": -0.2, "wrist": 1.3}
+
+
+def test_a_urdf_is_the_body_that_mujoco_makes_of_it(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(URDF)
+    # MuJoCo takes a mimic joint as free: it gets the value that follows.
+    assert_same(lump_robot(path, VALUES), as_one_body(for_mujoco(URDF), {**VALUES, "grip": -0.55}))
+    assert_same(lump_robot(path, {**VALUES, "grip": 0.3}), as_one_body(for_mujoco(URDF), {**VALUES, "grip": 0.3}))
+    lump = lump_robot(path, {})
+    assert lump.massless == ("eye",) and len(lump.links) == 5
+
+
+MJCF = """<mujoco><compiler angle="degree"/><default><joint axis="0 1 0"/><default class="c"><joint type="slide" pos="9 9 9"/></default></default>
+<worldbody><frame pos="0 0 1" euler="10 0 0"><body name="a" pos="1 2 3" euler="20 30 40">
+  <inertial pos="0.1 0 0" mass="2" diaginertia="0.02 0.03 0.04"/><joint name="first" pos="0.1 0.2 0.3" axis="1 1 0" ref="30"/><joint name="second" pos="-0.1 0 0"/>
+  <geom type="capsule" fromto="0 0 0 0.3 0.2 0.1" size="0.05"/>
+  <body pos="0.5 0 0" childclass="c"><joint name="third" ref="0.1"/><inertial pos="0 0.1 0" mass="1" fullinertia="0.02 0.03 0.04 0.001 0 0"/>
+  </body></body></frame></worldbody></mujoco>"""
+
+
+def test_an_mjcf_is_the_body_that_mujoco_makes_of_it(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "robot.xml"
+    path.write_text(MJCF)
+    values = {"first": 0.9, "second": -0.4, "third": 0.35}
+    lump = lump_robot(path, values)
+    assert_same(lump, as_one_body(mujoco.MjModel.from_xml_string(MJCF), values))
+    assert_same(
+        lump_robot(path, {}),
+        as_one_body(mujoco.MjModel.from_xml_string(MJCF), {"first": np.radians(30.0), "third": 0.1}),
+    )
+    assert len(lump.triangles) and not lump.absent
+    path.write_text(MJCF.replace('<inertial pos="0.1 0 0" mass="2" diaginertia="0.02 0.03 0.04"/>', ""))
+    with pytest.raises(InputError, match="body 'a' without an <inertial>"):
+        lump_robot(path, {})
+
+
+SDF = """<sdf version="1.9"><model name="m">
+<link name="base"><inertial><mass>3</mass><inertia><ixx>0.03</ixx><iyy>0.02</iyy><izz>0.04</izz></inertia></inertial></link>
+<frame name="mount" attached_to="base"><pose>0.3 -0.1 0.2 0.4 0.5 -0.6</pose></frame>
+<link name="arm"><pose relative_to="turn">0.1 0 0 0 0 0</pose><inertial><pose>0 0.2 0 0 0 0</pose><mass>2</mass>
+  <inertia><ixx>0.03</ixx><iyy>0.02</iyy><izz>0.04</izz></inertia></inertial></link>
+<joint name="turn" type="revolute"><pose relative_to="mount"/><parent>base</parent><child>arm</child><axis><xyz>1 2 3</xyz></axis></joint>
+</model></sdf>"""
+
+
+def test_an_sdfs_frames_are_followed(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text(SDF)
+    # The same robot as a URDF, whose link begins at the joint.
+    same = tmp_path / "same.urdf"
+    inertial = '<inertial><origin xyz="{}"/><mass value="{}"/><inertia ixx="0.03" iyy="0.02" izz="0.04"/></inertial>'
+    same.write_text(
+        f'<robot name="r"><link name="base">{inertial.format("0 0 0", 3)}</link><link name="arm">{inertial.format("0.1 0.2 0", 2)}</link>'
+        + joint("turn", "revolute", "base", "arm", '<axis xyz="1 2 3"/>') + "</robot>"
+    )  # fmt: skip
+    for values in ({}, {"turn": 0.8}):
+        expected = lump_robot(same, values).properties
+        assert_same(lump_robot(path, values), (expected.mass, expected.center_of_mass, expected.inertia))
+
+
+@pytest.mark.parametrize(
+    ("kind", "attributes", "size"),
+    [
+        ("box", 'size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
+        ("cylinder", 'radius="0.1" length="0.5"', (0.1, 0.5)),
+        ("capsule", 'radius="0.1" length="0.5"', (0.1, 0.5)),
+        ("sphere", 'radius="0.1"', (0.1,)),
+    ],
+)
+def test_primitives_are_closed_surfaces_of_their_size(tmp_path, kind, attributes, size):
+    path = tmp_path / "robot.urdf"
+    shape = f"<visual><geometry><{kind} {attributes}/></geometry></visual>"
+    path.write_text(f'<robot name="r">{link("a", 1.0, "0 0 0", shape)}</robot>')
+    lump = lump_robot(path, {})
+    body = mesh_body(Mesh(kind, f"/{kind}.obj", lump.vertices, lump.triangles, None, kind))
+    assert body.verdict.closed and not body.verdict.inward
+    volume, _ = primitive_solid(kind, size)
+    assert 0.985 * volume < body.moments.moments("solid").measure <= (1.0 + 1e-12) * volume
+
+
+def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cube.stl").write_bytes(stl(CUBE_VERTICES))
+    cube = '<visual><geometry><mesh filename="cube.stl" scale="-0.1 0.1 0.1"/></geometry></visual>'
+    (tmp_path / "robot.urdf").write_text(URDF.replace("</inertial></link>", f"</inertial>{cube}</link>", 1))
+    arguments = ["inspect", "--lump", "robot.urdf", "--joint", "shoulder=0.7", "--joint", "lift=-0.2"]
+    assert main([*arguments, "--as-scene", "flown.yaml", "--json"]) == 0
+    lump = json.loads(capsys.readouterr().out)
+    assert lump["mass"] == pytest.approx(6.7) and lump["massless"] == ["eye"]
+    spin = "initial.angular_velocity=[0.1, 2.0, 0.3]"
+    assert main(["simulate", "flown.yaml", "--duration", "1", "--set", spin, "--json"]) == 0
+    flown = json.loads(capsys.readouterr().out)
+    omega = np.array([0.1, 2.0, 0.3])
+    assert flown["angular_momentum"] == pytest.approx(np.array(lump["inertia"]) @ omega, rel=1e-9)
+    assert flown["kinetic_energy"] == pytest.approx(0.5 * omega @ np.array(lump["inertia"]) @ omega, rel=1e-9)
+    assert main(arguments) == 0
+    assert "without mass: eye" in capsys.readouterr().out
+    assert main([*arguments, "--urdf"]) == 0
+    assert "<inertial>" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--lump", "robot.urdf", "--joint", "elbow=1"], "did you mean shoulder?|one of shoulder"),
+        (["--lump", "robot.urdf", "--joint", "mount=1"], "fixed"),
+        (["--lump", "robot.urdf", "--mass", "1"], "--mass"),
+        (["--lump", "robot.urdf", "--compare", "robot.urdf"], "by itself"),
+        (["hammer", "--joint", "a=1"], "--lump ROBOT"),
+        (["hammer", "--as-scene", "x.yaml"], "--lump ROBOT"),
+        (["--lump", "none.urdf"], "none.urdf"),
+        (["--lump", "two.urdf"], "2 root links"),
+        (["--lump", "loop.urdf"], "hangs on two joints"),
+        (["--lump", "empty.urdf"], "inertials"),
+    ],
+)
+def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robot.urdf").write_text(URDF)
+    (tmp_path / "two.urdf").write_text(f'<robot name="r">{link("a", 1, "0 0 0")}{link("b", 1, "0 0 0")}</robot>')
+    again = joint("again", "fixed", "base", "hand")
+    (tmp_path / "loop.urdf").write_text(URDF.replace("</robot>", f"{again}</robot>"))
+    (tmp_path / "empty.urdf").write_text(f'<robot name="r"><link name="a">{BOX}</link></robot>')
+    assert main(["inspect", *arguments]) == 2
+    refusal = capsys.readouterr().err
+    assert refusal.count("\n") == 1 and any(word in refusal for word in words.split("|"))
+
+
+ROBOTS = os.environ.get("RIGID_PROTO_ROBOTS", "")
+
+
+@pytest.mark.stress
+@pytest.mark.skipif(not ROBOTS, reason="RIGID_PROTO_ROBOTS, a folder of robot descriptions, is not set")
+def test_real_robots_are_the_bodies_that_mujoco_makes_of_them():
+    pytest.importorskip("mujoco")
+    compared = 0
+    random = np.random.default_rng(1)
+    for path in sorted(Path(ROBOTS).rglob("*.urdf")):
+        try:
+            model = for_mujoco(path.read_text("utf-8"))
+            lump_robot(path, {})
+        except (InputError, ValueError):  # MuJoCo refuses tensors that no body has, we a file of two trees
+            continue
+        values = {
+            model.joint(k).name: float(random.uniform(-1.0, 1.0)) for k in range(model.njnt) if model.jnt_type[k] > 1
+        }
+        mass, center, inertia = as_one_body(model, values)
+        lump = lump_robot(path, values)
+        if lump.properties.mass == pytest.approx(mass, rel=1e-12):  # it gives bodies without mass a little
+            assert lump.properties.center_of_mass == pytest.approx(center, abs=1e-9), path
+            assert lump.properties.inertia == pytest.approx(inertia, abs=1e-9 * np.abs(inertia).max()), path
+            compared += 1
+    assert compared > 10
