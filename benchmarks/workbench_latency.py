@@ -116,7 +116,7 @@ def measure() -> tuple[dict[str, list[float]], dict[str, tuple[float, str]]]:
     loop = server.get_event_loop()
     running = asyncio.run_coroutine_threadsafe(page.run(), loop)
     asyncio.run_coroutine_threadsafe(page._on_connect(None), loop).result()
-    asyncio.run_coroutine_threadsafe(page.known(), loop).result(60)
+    asyncio.run_coroutine_threadsafe(page.scenes.known(), loop).result(60)
     listener = Listener()
     publishers = (page.link._publishers["poke"], page.link._publishers["string/target"])
     while page.follower.state is None or any(publisher.get_subscription_count() < 2 for publisher in publishers):

@@ -40,6 +40,9 @@ from rigid_proto_ros.scene.lessons import lesson, lessons
 from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "benchmarks"))
+
+from work_precision_ratios import time_at_error  # noqa: E402 (not of the package)
 
 _MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -133,11 +136,46 @@ def _error(text: str) -> str:
     return "refuses" if math.isnan(value) else f"{value:.0e}"
 
 
-def motions(short: bool = False) -> str:
-    """Motion here and elsewhere: each tool's most accurate run of a problem, from the last benchmark's own numbers. short: without
-    versions and date."""
+def _measured_motions() -> list[dict[str, str]]:
     with (ROOT / "benchmarks" / "results" / "work_precision.csv").open(encoding="utf-8", newline="") as file:
-        measured = [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
+        return [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
+
+
+def motions_at_equal_error() -> str:
+    """Motion here and elsewhere: the time that each tool takes to our error, by its best integrator; where it doesn't reach
+    that, its most accurate run."""
+    measured, ours = _measured_motions(), "rigid_proto, auto"
+    default = {
+        row["problem"]: row
+        for row in measured
+        if (row["tool"], row["integrator"], row["step_or_tolerance"]) == ("ours", "auto", "1e-09")
+    }
+    tools = list(dict.fromkeys(row["tool"] for row in measured if not row["tool"].startswith("ours")))
+    rows = [[ours, *(_milliseconds(float(default[problem]["median_s"])) for problem in _MOTIONS)]]
+    for tool in tools:
+        rows.append([_TOOLS[tool].partition(",")[0]])
+        for problem in _MOTIONS:
+            runs = [row for row in measured if (row["tool"], row["problem"]) == (tool, problem)]
+            rows[-1].append(_at_error(runs, _attitude_error(default[problem])))
+    heads = (f"{title}, to {_attitude_error(default[problem]):.0e} rad" for problem, title in _MOTIONS.items())
+    return _table(("tool", *heads), rows)
+
+
+def _at_error(runs: list[dict[str, str]], target: float) -> str:
+    if not runs:
+        return "not run"
+    curves: dict[str, list[dict[str, float]]] = {}
+    for row in runs:
+        numbers = {"median_s": float(row["median_s"] or "nan"), "attitude_error_rad": _attitude_error(row)}
+        curves.setdefault(row["integrator"], []).append(numbers)
+    times = [time_at_error(sorted(curve, key=lambda run: run["median_s"]), target) for curve in curves.values()]
+    reached = [time for time in times if math.isfinite(time)]
+    return _milliseconds(min(reached)) if reached else _best_run(min(runs, key=_attitude_error))
+
+
+def motions() -> str:
+    """Motion here and elsewhere: each tool's most accurate run of a problem, from the last benchmark's own numbers."""
+    measured = _measured_motions()
     ours = [row for row in measured if row["tool"] == "ours" and row["integrator"] == "auto"]
     best = {("rigid_proto, auto", row["problem"]): row for row in ours if row["step_or_tolerance"] == "1e-09"}
     versions = {"rigid_proto, auto": __version__}
@@ -152,8 +190,6 @@ def motions(short: bool = False) -> str:
         (_TOOLS.get(tool, tool), versions[tool], *(_best_run(best.get((tool, problem))) for problem in _MOTIONS))
         for tool in versions
     ]
-    if short:
-        return _table(("tool", *_MOTIONS.values()), ((tool, *cells) for tool, _, *cells in rows))
     newest = max(measured, key=lambda row: row["date"])
     sentence = f"Measured {newest['date'][:10]} on one {newest['cpu']}, in one process, medians of whole runs."
     return f"{sentence}\n\n{_table(('tool', 'version', *_MOTIONS.values()), rows)}"
@@ -182,9 +218,12 @@ def _best_run(row: dict[str, str] | None) -> str:
     error = _attitude_error(row)
     if error > 0.1:
         return "error > 0.1 rad"
-    milliseconds = 1e3 * float(row["median_s"])
-    time = f"{milliseconds:.0f}" if milliseconds >= 10.0 else f"{milliseconds:.2g}"
-    return f"{error:.0e} rad in {time} ms"
+    return f"{error:.0e} rad in {_milliseconds(float(row['median_s']))}"
+
+
+def _milliseconds(seconds: float) -> str:
+    milliseconds = 1e3 * seconds
+    return f"{milliseconds:.0f} ms" if milliseconds >= 10.0 else f"{milliseconds:.2g} ms"
 
 
 def _attitude_error(row: dict[str, str]) -> float:
@@ -224,7 +263,7 @@ TABLES = {
     "bodies": bodies,
     "lessons": lesson_table,
     "motions": motions,
-    "motions_short": lambda: motions(short=True),
+    "motions_at_equal_error": motions_at_equal_error,
 }
 
 
