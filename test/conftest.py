@@ -29,28 +29,19 @@ collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 
 LONG = (
+    *("workbench_page", "time_in_flight", "readme", "poke_client", "sweep_runs", "session_crash"),
     *(
-        "time_in_flight",
-        "stress_extremes",
-        "readme",
-        "replay_publish",
-        "mass_exactness",
-        "node_flight",
-        "workbench_page",
-    ),
-    *(
-        "session_crash",
         "conventions_of_the_node",
-        "string_pendulum",
-        "commands_node",
+        "replay_publish",
+        "node_signals",
         "commands_refused",
-        "poke_client",
+        "mass_exactness",
+        "commands_node",
     ),
-    *("node_signals", "sweep_bits", "demo", "commands_flood", "stress_auto", "order_of_commands", "string_scenes"),
-    *("rerun_live", "rerun_slow_viewers", "snapshot", "packaging", "workbench_script_node", "session_bag"),
-    *("simulate_bad_input", "rerun_crash", "node_work", "interface", "lockstep", "fitting", "mesh_fuzz"),
-    # They need kernels that test_sweep_bits compiles.
-    *("sweep_runs", "sweep_cluster"),
+    *("string_scenes", "node_flight", "stress_free_body", "lockstep", "demo", "stress_auto", "commands_flood"),
+    *("order_of_commands", "string_pendulum", "rerun_live", "rerun_slow_viewers", "snapshot", "packaging", "fitting"),
+    *("rerun_crash", "simulate_bad_input", "session_bag", "node_work", "interface", "node_warnings", "sweep_cluster"),
+    *("workbench_lessons", "workbench_script_node", "mesh_fuzz", "architecture", "stress_extremes", "sweep_bits"),
 )
 """Files that take longest, waiting and computing ones by turns: workers begin with them, so that none has one left at the end."""
 
