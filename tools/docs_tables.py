@@ -131,6 +131,29 @@ _INERTIA_ERRORS = (
 """Mesh and place of the errors shown; times are those of the first."""
 
 
+def readers() -> str:
+    """Our own readers of mesh files and trimesh's, from the last benchmark's own numbers."""
+    with (ROOT / "benchmarks" / "results" / "mesh_readers.csv").open(encoding="utf-8", newline="") as file:
+        measured = list(csv.DictReader(file))
+    found = {(row["what"], row["format"], row["file"], row["tool"]): row for row in measured}
+    rows = []
+    for what, ending, name in dict.fromkeys(key[:3] for key in found):
+        own, other = (found[what, ending, name, tool] for tool in ("rigid_proto", "trimesh"))
+        if what == "time":
+            ratio = float(other["best_ms"]) / float(own["best_ms"])
+            cells = (f"{float(own['best_ms']):.0f} ms", f"{float(other['best_ms']):.0f} ms, {ratio:.1f} times")
+        elif own["result"].split()[0] == other["result"].split()[0]:
+            continue
+        else:
+            cells = (own["result"], other["result"])
+        rows.append((f"`{ending}`", name, *cells))
+    row = measured[0]
+    versions = {row["tool"]: row["version"] for row in measured}
+    sentence = f"Measured {row['date'][:10]} on one {row['cpu']}, in one process, shortest of seven; {int(float(row['triangles'])):,}"
+    head = ("format", "file", "rigid_proto", f"trimesh {versions['trimesh']}")
+    return f"{sentence} triangles where a time stands.\n\n{_table(head, rows)}"
+
+
 def _error(text: str) -> str:
     value = float(text)
     return "refuses" if math.isnan(value) else f"{value:.0e}"
@@ -260,6 +283,7 @@ TABLES = {
     "integrators": integrators,
     "masses": masses,
     "masses_short": lambda: masses(short=True),
+    "readers": readers,
     "bodies": bodies,
     "lessons": lesson_table,
     "motions": motions,

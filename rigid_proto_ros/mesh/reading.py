@@ -27,8 +27,8 @@ from .ply import read_ply
 from .stl import is_ascii_stl, read_stl
 
 OWN_FORMATS = ("obj", "off", "ply", "stl")
-"""Formats read here: trimesh 5.2 misreads some of them (interleaved negative .obj indices, tab-separated .obj, quad
-.off, strips in .ply), joins polygons' triangles, and takes several times as long."""
+"""Formats read here: trimesh 5.2 takes 2.5 to 20 times as long, and misreads or refuses some files of each but .off
+(tab-separated .obj, negative indices, strips in .ply, cut .stl): benchmarks/mesh_readers.py."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae", "zae")
 """All readable formats; those beyond OWN_FORMATS go through trimesh, which takes the extra [meshes] for
 the last three.
