@@ -67,6 +67,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robust", action="store_true", help="give samples that lie far off less weight")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--urdf", action="store_true", help="print a URDF <inertial>")
+    parser.add_argument(
+        "--record",
+        metavar="FILE.rrd",
+        help="for Rerun: measured tracks, fitted flights, what is left, and the tensors",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,6 +88,10 @@ def run(args: argparse.Namespace) -> int:
     known, candidates = _known(args, choice, scenes)
     fit = [word.strip() for word in args.fit.split(",") if word.strip()]
     found = identify(flights, fit, known, candidates, args.robust)
+    if args.record is not None:
+        from .identify_recording import record
+
+        record(args.record, found, scenes, candidates, _mesh_body(args.mesh) if args.mesh is not None else None)
     if args.json:
         print(json.dumps(as_json(found)))
     elif args.urdf:

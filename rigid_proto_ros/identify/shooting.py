@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.errors import InputError
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import rotations as rot
@@ -156,6 +157,18 @@ def departures(segment: Segment, start: np.ndarray, values: Values) -> list[np.n
     if not shown:
         return None
     return [departure(p.series.kind, s[0], p.values) for p, s in zip(segment.pieces, shown, strict=True)]
+
+
+def flown_poses(segment: Segment, start: np.ndarray, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (n,) [ns from the segment's begin] of all samples, and what the tracked frame's poses are there: positions
+    (n, 3) [m] and attitudes (n, 4) xyzw; raises InputError where the flight failed.
+    """
+    times, _ = _times(segment, values.offsets)
+    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
+    if not good.all():
+        raise InputError("identify", "the estimate can't be flown; see --from and --to")
+    attitudes = samples[0, :, 3:7]
+    return times, samples[0, :, :3] - rot.turned(attitudes, values.theta[mp.COM]), attitudes
 
 
 def _variations(

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from rerun.chunk import RrdReader
 
 from rigid_proto_ros.cli.main import main
 
@@ -93,3 +94,24 @@ def test_bad_input_is_one_line_and_exit_2(
     assert len(said) == 1
     assert said[0].startswith("rigid_proto identify: ")
     assert message in said[0]
+
+
+def test_a_recording_shows_measured_and_fitted_flight_what_is_left_and_both_tensors(
+    flight: tuple, capsys: pytest.CaptureFixture
+) -> None:
+    bag, known = flight
+    file = known["folder"] / "shown.rrd"
+    assert main(["identify", str(bag), "--record", str(file)]) == 0
+    assert "mass" in capsys.readouterr().out
+    rows: dict[str, int] = {}
+    for chunk in RrdReader(str(file)).stream():
+        rows[chunk.entity_path] = max(rows.get(chunk.entity_path, 0), chunk.num_rows)
+    assert {"/world/measured_1/mesh", "/world/fitted_1/mesh", "/ellipsoids/0", "/ellipsoids/1", "/report"} <= set(rows)
+    shown = [rows[entity] for entity in ("/world/measured_1", "/world/fitted_1", "/residuals/1_1", "/residuals/1_2")]
+    assert shown == [151] * 4  # 1.5 s at 100 Hz
+
+
+def test_a_recording_that_cannot_be_written_is_one_line(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    capsys.readouterr()
+    assert main(["identify", str(flight[0]), "--to", "0.3", "--record", "shown.txt"]) == 2
+    assert "ends in .rrd" in capsys.readouterr().err

@@ -12,9 +12,13 @@ import numpy as np
 
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.identify import mass_parameters as mp
+from rigid_proto_ros.identify import shooting as sh
+from rigid_proto_ros.identify.fitting import Estimate, topics_of
 from rigid_proto_ros.identify.identification import Known, identify
+from rigid_proto_ros.identify.measurements import ATTITUDE, POSITION, MeasuredFlight
 from rigid_proto_ros.identify.report import Identification
-from rigid_proto_ros.identify.unknowns import Values
+from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, Values, make_unknowns
+from rigid_proto_ros.identify.verdict import Quantity, Visibility
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.tensor import six_from_tensor
 
@@ -23,11 +27,15 @@ EARTH = (0.0, 0.0, -9.81)
 
 @dataclass(frozen=True)
 class Throw:
-    """errors: of every number that is told, in its standard deviations; failed: another minimum, or none."""
+    """errors: of every number that is told, in its standard deviations; failed: another minimum, or none.
+
+    against_bound: the same errors by name, in the standard deviations of the Cramér-Rao bound, which is the truth's.
+    """
 
     body: str
     errors: np.ndarray
     failed: bool
+    against_bound: dict[str, float]
 
 
 def bundled_truth(name: str) -> tuple[Values, float]:
@@ -58,19 +66,42 @@ def throw(number: int, poked: bool, first: str = "ball", seconds: float = 2.0) -
     flight = mf.mocap(truth, start, rng, seconds, load=load)
     found = identify([flight], known=Known(theta=_first(first, truth, rng), length=size))
     failed = any(check.noise > 1.5 * sd for check, sd in zip(found.checks, mf.MOCAP, strict=True))
-    return Throw(name, normalised_errors(found, truth), failed)
+    return Throw(name, normalised_errors(found, truth), failed, _against_bound(found, flight, truth, start, size))
+
+
+def _against_bound(
+    found: Identification, flight: MeasuredFlight, truth: Values, start: np.ndarray, size: float
+) -> dict[str, float]:
+    unknowns = make_unknowns(DEFAULT_FIT, topics_of([flight]))
+    sigmas = dict(zip((POSITION, ATTITUDE), mf.MOCAP, strict=True))
+    [segment] = sh.cut([flight], 1e9, topics_of([flight]), lambda s: sigmas[s.kind], lambda s: np.ones(len(s.times_ns)))
+    triangle = sh.compressed(*sh.linearized(segment, start, truth, unknowns.physical))
+    root = triangle[sh.START : -1, sh.START : -1]
+    ideal = Estimate(truth, unknowns, [segment], start[None], {}, root, root, 0.0, 0)
+    bound = Identification([flight], ideal, Visibility(ideal, size), [], [], [])
+    names, told, true = _numbers(found, truth)
+    sds = _numbers(bound, truth)[1]
+    return {
+        name: (one.value - x) / sd.sd
+        for name, one, sd, x in zip(names, told, sds, true, strict=True)
+        if one.value is not None and sd.sd is not None
+    }
 
 
 def normalised_errors(found: Identification, truth: Values) -> np.ndarray:
     """Of mass, centre of mass and tensor, or its shape, as far as they are told."""
+    _, told, true = _numbers(found, truth)
+    return np.array([(one.value - x) / one.sd for one, x in zip(told, true, strict=True) if one.value is not None])
+
+
+def _numbers(found: Identification, truth: Values) -> tuple[list[str], list[Quantity], list[float]]:
     body = truth.body
     six = np.array(six_from_tensor(body.inertia))
-    tensor = found.inertia
+    tensor, names = found.inertia, ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
     if any(one.value is None for one in tensor):
-        tensor, six = found.shape, six / np.trace(body.inertia)
+        tensor, six, names = found.shape, six / np.trace(body.inertia), [f"{name} of the trace" for name in names]
     told = [found.mass, *found.center_of_mass, *tensor]
-    true = [body.mass, *body.center_of_mass, *six]
-    return np.array([(one.value - x) / one.sd for one, x in zip(told, true, strict=True) if one.value is not None])
+    return ["mass", "x", "y", "z", *names], told, [body.mass, *body.center_of_mass, *six]
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:

@@ -129,6 +129,9 @@ def test_a_thousand_throws_are_as_far_off_as_they_say() -> None:
     assert sum(throw.failed for throw in throws) <= 10
     assert 0.9 < np.mean(errors**2) < 1.1
     assert np.mean(np.abs(errors) < 2.0) > 0.945
+    for name in sorted({name for throw in throws for name in throw.against_bound}):
+        found = [throw.against_bound[name] for throw in throws if name in throw.against_bound and not throw.failed]
+        assert np.sqrt(np.mean(np.square(found))) < 1.1, name
 
 
 @pytest.mark.stress

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: MIT
+"""A picture of an estimate from measured flights: each measured track with the fitted flight over it as a ghost, what
+is left between the two, and the ellipsoids of the given and of the found tensor.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from . import appearance
+from . import entities as e
+from .columns import scalar_columns, time_columns
+from .inertia_shapes import PrincipalFrame
+from .statics import drawn_mesh
+from .streams import FileStream, Stream
+from .surface_normals import shaded_surface
+
+ELLIPSOIDS = "ellipsoids"
+REPORT = "report"
+TRACK_SAMPLES_MAX = 20_000
+"""Points of a drawn path."""
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """title: what was measured, with the size of the noise. times_ns (n,) from the flight's begin; scaled (n, 3) in
+    standard deviations.
+    """
+
+    title: str
+    times_ns: np.ndarray
+    scaled: np.ndarray
+
+
+@dataclass(frozen=True)
+class TrackedFlight:
+    """Poses of the tracked frame, times_ns (n,) from the flight's begin: positions (n, 3) [m], attitudes (n, 4) xyzw.
+
+    measured_*: what was measured of them, either may be empty.
+    """
+
+    name: str
+    measured_times_ns: np.ndarray
+    measured_positions: np.ndarray
+    measured_attitudes: np.ndarray
+    times_ns: np.ndarray
+    positions: np.ndarray
+    attitudes: np.ndarray
+    residuals: Sequence[Residuals]
+
+
+@dataclass(frozen=True)
+class DrawnTensor:
+    """label, mass [kg], center_of_mass (3,) [m, tracked frame] and inertia (3, 3) [kg m², about it]."""
+
+    label: str
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+
+
+def record_identification(
+    path: str,
+    flights: Sequence[TrackedFlight],
+    tensors: Sequence[DrawnTensor],
+    mesh: tuple[np.ndarray, np.ndarray] | None,
+    report: str,
+) -> None:
+    """Write an .rrd file; raises InputError where that can't be. mesh: vertices (n, 3) [m, tracked frame], triangles.
+
+    tensors: the found one first.
+    """
+    stream = FileStream(Path(path), str(uuid.uuid4()), "identified from motion")
+    try:
+        stream.recording.send_blueprint(_blueprint(flights))
+        stream.log_static(e.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        stream.log_static(REPORT, rr.TextDocument(report, media_type="text/plain"))
+        size = _size(tensors, mesh)
+        for number, flight in enumerate(flights, 1):
+            _send_flight(stream, number, flight, mesh, size)
+        _send_ellipsoids(stream, tensors)
+    finally:
+        stream.close()
+
+
+def _size(tensors: Sequence[DrawnTensor], mesh: tuple[np.ndarray, np.ndarray] | None) -> float:
+    """Of the body, about [m]."""
+    if mesh is not None:
+        return float(np.linalg.norm(np.ptp(mesh[0], axis=0)))
+    if not tensors:
+        return 0.2
+    return 2.0 * float(PrincipalFrame.of(tensors[0].inertia).ellipsoid_semi_axes(tensors[0].mass).max())
+
+
+def _send_flight(
+    stream: Stream, number: int, flight: TrackedFlight, mesh: tuple[np.ndarray, np.ndarray] | None, size: float
+) -> None:
+    measured, fitted = f"{e.WORLD}/measured_{number}", f"{e.WORLD}/fitted_{number}"
+    # The pose as it came, with the mesh on it, and the fitted one drawn through it.
+    if len(flight.measured_positions) and len(flight.measured_attitudes):
+        times = time_columns(flight.measured_times_ns, flight.measured_times_ns)
+        poses = rr.Transform3D.columns(translation=flight.measured_positions, quaternion=flight.measured_attitudes)
+        stream.send(measured, times, poses)
+        _send_body(stream, measured, mesh, (*appearance.BODY_COLOUR, 255), size)
+    if len(flight.measured_positions):
+        every = 1 + len(flight.measured_positions) // TRACK_SAMPLES_MAX
+        points = rr.Points3D(flight.measured_positions[::every], colors=[appearance.TRAIL_COLOUR], radii=[0.01 * size])
+        stream.log_static(f"{e.WORLD}/measured_track_{number}", points)
+    times = time_columns(flight.times_ns, flight.times_ns)
+    stream.send(fitted, times, rr.Transform3D.columns(translation=flight.positions, quaternion=flight.attitudes))
+    _send_body(stream, fitted, mesh, (*appearance.GHOST_COLOUR, 110), size)
+    every = 1 + len(flight.positions) // TRACK_SAMPLES_MAX
+    line = rr.LineStrips3D([flight.positions[::every]], colors=[appearance.GHOST_COLOUR], radii=[0.005 * size])
+    stream.log_static(f"{e.WORLD}/fitted_track_{number}", line)
+    for k, left in enumerate(flight.residuals):
+        entity = _plot(number, k)
+        names = rr.SeriesPoints(
+            names=["x", "y", "z"], colors=appearance.AXES_COLOURS, marker_sizes=[2.0] * 3, markers=["circle"] * 3
+        )
+        stream.log_static(entity, names)
+        stream.send(entity, time_columns(left.times_ns, left.times_ns), scalar_columns(left.scaled))
+
+
+def _send_body(
+    stream: Stream, entity: str, mesh: tuple[np.ndarray, np.ndarray] | None, colour: tuple[int, ...], size: float
+) -> None:
+    if mesh is not None:
+        stream.log_static(f"{entity}/mesh", drawn_mesh(shaded_surface(*mesh), colour))
+        return
+    axes = rr.Arrows3D(
+        vectors=0.5 * size * np.eye(3),
+        colors=[(*axis, colour[3]) for axis in appearance.AXES_COLOURS],
+        radii=0.02 * size,
+    )
+    stream.log_static(f"{entity}/axes", axes)
+
+
+def _send_ellipsoids(stream: Stream, tensors: Sequence[DrawnTensor]) -> None:
+    stream.log_static(ELLIPSOIDS, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    colours = (appearance.GHOST_COLOUR, appearance.ORANGE, appearance.VIOLET, appearance.GREY)
+    for number, tensor in enumerate(tensors):
+        frame = PrincipalFrame.of(tensor.inertia)
+        entity = f"{ELLIPSOIDS}/{number}"
+        stream.log_static(entity, rr.Transform3D(translation=tensor.center_of_mass, mat3x3=frame.axes))
+        shape = rr.Ellipsoids3D(
+            half_sizes=[frame.ellipsoid_semi_axes(tensor.mass)],
+            colors=[colours[min(number, len(colours) - 1)]],
+            fill_mode="majorwireframe",
+            labels=[tensor.label],
+            show_labels=True,
+        )
+        stream.log_static(entity, shape)
+
+
+def _plot(flight: int, series: int) -> str:
+    return f"residuals/{flight}_{series + 1}"
+
+
+def _blueprint(flights: Sequence[TrackedFlight]) -> rrb.Blueprint:
+    plots = [
+        rrb.TimeSeriesView(origin="/" + _plot(number, k), name=left.title)
+        for number, flight in enumerate(flights, 1)
+        for k, left in enumerate(flight.residuals)
+    ]
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(origin="/" + e.WORLD, name="measured, and the fitted flight as a ghost"),
+            rrb.Vertical(
+                rrb.Spatial3DView(origin="/" + ELLIPSOIDS, name="ellipsoids of inertia, tracked frame"),
+                rrb.Tabs(*plots, name="left over, in standard deviations"),
+                rrb.TextDocumentView(origin="/" + REPORT, name="what the motion tells"),
+            ),
+            column_shares=[3, 2],
+        ),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
+    )
