@@ -27,6 +27,8 @@ MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 # Motion for other tools: tables, glTF, USD, films.
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
+# Films; pygfx needs a Vulkan driver.
+VIDEO = ["pygfx>=0.17", "imageio-ffmpeg>=0.5"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
@@ -79,7 +81,7 @@ setup(
     python_requires=">=3.11",
     install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0"],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *EXPORT, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *EXPORT, *VIDEO, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
         "rerun": RERUN,
@@ -87,6 +89,7 @@ setup(
         "workbench": WORKBENCH,
         "sweep": SWEEP,
         "export": EXPORT,
+        "video": VIDEO,
         "terminal": TERMINAL,
         "test": TEST,
     },

@@ -247,8 +247,8 @@ def install_beside_ros(python, stage):
         requirements = ["numpy" if normalized(re.split("[<>=]", line)[0]) == "numpy" else line for line in requirements]
     if old_numpy:
         # It asks for numpy 2 and runs with 1.26: tools/fresh_machine tries it.
-        requirements = [line for line in requirements if not line.startswith(("rerun-sdk", "pyarrow"))]
-        # pyarrow 26 refuses numpy 1.
+        requirements = [line for line in requirements if not line.startswith(("rerun-sdk", "pyarrow", "pygfx"))]
+        # pyarrow 26 refuses numpy 1, and so does pygfx: no films there.
         requirements += ["attrs", "pillow", "psutil>=7", "pyarrow>=18,<22", "typing_extensions"]
     limits.write_text("\n".join(lines) + "\n", encoding="utf-8")
     install(python, "-c", limits, *requirements)

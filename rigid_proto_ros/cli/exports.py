@@ -11,12 +11,19 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError, one_of
 from ..base.output_file import output_file
 from ..base.progress import Progress
+from .options import pixels
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
     from ..export.looks import Looks
 
-ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "gltf": (".glb",), "usd": (".usda", ".usdc")}
+ENDINGS = {
+    "csv": (".csv",),
+    "parquet": (".parquet",),
+    "gltf": (".glb",),
+    "usd": (".usda", ".usdc"),
+    "video": (".mp4", ".gif"),
+}
 """Options that take a file, and how its name may end."""
 
 HELP = {
@@ -24,9 +31,20 @@ HELP = {
     "parquet": "write the states as a table",
     "gltf": "write the motion for Blender, Unreal, three.js and others that read glTF",
     "usd": "write the motion, with mass properties, for Omniverse, Houdini and others that read USD",
+    "video": "write a film, without a display; needs a Vulkan driver, of which mesa-vulkan-drivers will do",
 }
 
 PARTS = ("ghost", "trail")
+
+FOR = {
+    "tolerance": ("gltf", "usd"),
+    "fps": ("gltf", "usd", "video"),
+    "with": ("gltf", "usd"),
+    "size": ("video",),
+    "from": ("video",),
+    "to": ("video",),
+}
+"""Options, and the files that they are of."""
 
 
 def add_exports(parser: argparse.ArgumentParser) -> None:
@@ -34,18 +52,20 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("for other tools")
     for name, endings in ENDINGS.items():
         group.add_argument(f"--{name}", metavar=f"FILE{endings[0]}", help=HELP[name])
+    of = {name: f"of {' and '.join(f'--{file}' for file in files)}" for name, files in FOR.items()}
     group.add_argument(
         "--tolerance",
         type=float,
         metavar="T",
-        help="of --gltf and --usd: keys err by at most T body sizes and 100 T degrees (default 1e-3)",
+        help=f"{of['tolerance']}: keys err by at most T body sizes and 100 T degrees (default 1e-3)",
     )
     group.add_argument(
-        "--fps", type=float, metavar="N", help="of --gltf and --usd: N evenly spaced keys a second instead"
+        "--fps", type=float, metavar="N", help="N evenly spaced keys a second instead; of --video pictures (default 30)"
     )
-    group.add_argument(
-        "--with", dest="parts", metavar="PART,..", help=f"of --gltf and --usd: draw {', '.join(PARTS)} too"
-    )
+    group.add_argument("--with", metavar="PART,..", help=f"{of['with']}: draw {', '.join(PARTS)} too")
+    group.add_argument("--size", metavar="WxH", help=f"{of['size']}: pixels (default 960x540)")
+    group.add_argument("--from", type=float, metavar="T", help=f"{of['from']}: simulated time [s] that it begins at")
+    group.add_argument("--to", type=float, metavar="T", help=f"{of['to']}: simulated time [s] that it ends at")
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
@@ -61,40 +81,62 @@ def check_exports(args: argparse.Namespace) -> None:
             raise InputError(f"--{name}", file, f"a file that ends in {' or '.join(ENDINGS[name])}")
         output_file(f"--{name}", file)
     _check_numbers(args, files)
-    if "parquet" in files:
+    for name in files:
+        _check_library(name)
+
+
+def _check_library(name: str) -> None:
+    """Raise InputError where what writes such a file isn't installed."""
+    if name == "parquet":
         from ..export.table import check_parquet
 
         check_parquet()
-    if "gltf" in files:
+    elif name == "gltf":
         from ..export.gltf import check_gltf
 
         check_gltf()
-    if "usd" in files:
+    elif name == "usd":
         from ..export.usd import check_usd
 
         check_usd()
+    elif name == "video":
+        from ..export.film import check_film
+
+        check_film()
 
 
 def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
-    for option in ("tolerance", "fps", "parts"):
+    for option, of in FOR.items():
         given = getattr(args, option)
-        if given is not None and not {"gltf", "usd"} & set(files):
-            raise InputError(
-                "--with" if option == "parts" else f"--{option}", given, "it together with --gltf or --usd"
-            )
+        if given is not None and not set(of) & set(files):
+            raise InputError(f"--{option}", given, f"it together with {' or '.join(f'--{name}' for name in of)}")
     if args.tolerance is not None and not (math.isfinite(args.tolerance) and 1e-9 <= args.tolerance <= 0.5):
         raise InputError("--tolerance", args.tolerance, "a share of the body's size from 1e-9 to 0.5")
     if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
-        raise InputError("--fps", args.fps, "keys a second, from 1e-3 to 1e5")
+        raise InputError("--fps", args.fps, "pictures or keys a second, from 1e-3 to 1e5")
     if args.fps is not None and args.tolerance is not None:
         raise InputError("--tolerance", args.tolerance, "either it or --fps")
     for part in _parts(args):
         if part not in PARTS:
             raise InputError("--with", part, one_of(part, PARTS))
+    for option in ("from", "to"):
+        given = getattr(args, option)
+        if given is not None and not (math.isfinite(given) and 0.0 <= given <= 1e9):
+            raise InputError(f"--{option}", given, "seconds from 0 to 1e9")
+    if args.size is not None:
+        _film_size(args)
+
+
+def _film_size(args: argparse.Namespace) -> tuple[int, int]:
+    width, height = pixels(args.size or "960x540", 64)
+    if width % 2 or height % 2:
+        raise InputError("--size", args.size, "even numbers of pixels, as video codecs have it")
+    return width, height
 
 
 def _parts(args: argparse.Namespace) -> list[str]:
-    return args.parts.split(",") if args.parts is not None else []
+    parts = getattr(args, "with")
+    return parts.split(",") if parts is not None else []
 
 
 def write_exports(
@@ -116,6 +158,8 @@ def write_exports(
                 say(f"{files[name]}: {len(record.times_ns)} states")
     if "gltf" in files or "usd" in files:
         _write_animations(args, files, record, looks, say)
+    if "video" in files:
+        _write_film(args, files["video"], record, looks, say)
 
 
 def _write_animations(
@@ -144,3 +188,16 @@ def _write_animations(
                 write_usd(files[name], record, made.motion, made.keys, args.fps, trail)
         for line in made.report:
             say(f"{files[name]}: {line}")
+
+
+def _write_film(
+    args: argparse.Namespace, file: str, record: FlightRecord, looks: Looks | None, say: Callable[[str], None]
+) -> None:
+    from ..export.film import film_motion, write_film
+
+    fps = args.fps or 30.0
+    begin_s, end_s = (getattr(args, option) for option in ("from", "to"))
+    motion = film_motion(record, looks, fps, begin_s, end_s)
+    with Progress(f"drawing {file}", unit="pictures") as progress:
+        write_film(file, record, motion, fps, _film_size(args), progress.fraction)
+    say(f"{file}: {len(motion.times_ns)} pictures, {fps:g} a second")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.progress import Progress
-from .options import add_session
+from .options import add_session, pixels
 
 EXAMPLES = (
     ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Take the picture; InputError says what was wrong with the request."""
     from ..rerun_view.session_files import is_bag
 
-    size = _size(args.size)
+    size = pixels(args.size, 200)
     if not is_bag(Path(args.session)):
         _draw(args, args.session, size)
         return 0
@@ -73,13 +73,3 @@ def _drawn(args: argparse.Namespace, folder: Path) -> Path:
     with Progress("reading the bag") as progress:
         record([session], path, given_scene(args.scene), progress.fraction)
     return path
-
-
-def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError:
-        width = height = 0
-    if not (200 <= width <= 8000 and 200 <= height <= 8000):
-        raise InputError("--size", text, "WIDTHxHEIGHT in pixels, each 200 to 8000")
-    return width, height
