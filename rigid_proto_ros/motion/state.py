@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
+from ..base.rotation import Numbers, matrix_elements, matrix_from_quaternion, rotate, times, to_unit
 
 
 @dataclass(slots=True)
@@ -52,6 +53,23 @@ class State:
     def angular_velocity(self) -> np.ndarray:
         """ω in world axes [rad/s]."""
         return times(self.rotation, self.angular_velocity_body)
+
+    def moved(self, values: Mapping[str, Numbers]) -> State:
+        """With another position, orientation_xyzw, linear_velocity or angular_velocity, all in world axes; the others
+        stay, ω in the world, too.
+        """
+        row = np.empty(13)
+        attitude = values.get("orientation_xyzw", self.orientation_xyzw)
+        velocity = values.get("linear_velocity", self.linear_velocity)
+        spin = values.get("angular_velocity", self.angular_velocity)
+        position = values.get("position", self.position)
+        x, q, v, w = (np.array(numbers, dtype=float) for numbers in (position, attitude, velocity, spin))
+        fill_initial_row(x, q, v, w, row)
+        if "orientation_xyzw" not in values:
+            row[3:7] = self.orientation_xyzw
+            if "angular_velocity" not in values:
+                row[10:13] = self.angular_velocity_body
+        return State(self.time_ns, row)
 
     def kinetic_energy(self, mass: float, inertia: np.ndarray) -> float:
         """½ m|v|² + ½ ωᵀIω [J]."""

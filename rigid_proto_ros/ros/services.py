@@ -50,7 +50,7 @@ class Services:
         if not self._loop.timekeeping.paused:
             raise InputError("step", "the simulation is running; pause it first")
         self._take_all()
-        reached_ns = step_over(self._call, self._loop, self._loop.scenario.parameters.step_periods)
+        reached_ns = step_over(self._call, self._loop, self._loop.periods_of_a_step)
         return f"simulated time is {reached_ns / 1e9:.9g} s; {self._intake.received.total()} commands received"
 
     def _take_all(self) -> None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The standard simulator services (simulation_interfaces), where that package is installed.
 
-Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps. There is one body
-and no world, so nothing is spawned, loaded or deleted.
+Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps, and what there is
+to know of the body and to set of its state (entity_services.py). There is one body and no world, so nothing is spawned,
+loaded or deleted.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import Any
 from rclpy.node import Node
 
 from ..base.errors import InputError
+from . import entity_services
+from .entity_services import EntityServices
 from .physics_thread import Call, step_over
 from .simulation_loop import SimulationLoop
 
@@ -29,16 +32,19 @@ MAX_STEPS = 1_000_000
 class SimulationInterfaces:
     """Answers the standard services for one node; call ``offer`` once."""
 
-    def __init__(self, loop: SimulationLoop, call: Call, messages: Any) -> None:
+    def __init__(self, loop: SimulationLoop, call: Call, messages: Any, entity: EntityServices) -> None:
         self._loop = loop
         self._call = call
         self._messages = messages
+        self._entity = entity
         self._stopped = False
 
     def offer(self, node: Node, services: Any) -> None:
         """Create the services, private to the node."""
         for service_type, name in SERVICES:
             node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
+        for service_type, name in entity_services.SERVICES:
+            node.create_service(getattr(services, service_type), f"~/{name}", self._entity.answers[name])
 
     def get_simulator_features(self, _: Any, response: Any) -> Any:
         """What is really supported, and nothing else: a feature of a single scope would mean that a reset
@@ -46,6 +52,7 @@ class SimulationInterfaces:
         """
         features = self._messages.SimulatorFeatures
         response.features.features = [
+            *self._entity.features(),
             features.SIMULATION_RESET,
             features.SIMULATION_STATE_GETTING,
             features.SIMULATION_STATE_SETTING,
@@ -137,5 +144,6 @@ def offer_simulation_interfaces(node: Node, loop: SimulationLoop, call: Call) ->
         from simulation_interfaces import msg, srv
     except ImportError:
         return False
-    SimulationInterfaces(loop, call, msg).offer(node, srv)
+    entity = EntityServices(loop, call, msg, node.get_name(), loop.scenario.parameters.world_frame)
+    SimulationInterfaces(loop, call, msg, entity).offer(node, srv)
     return True

@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 from ..base.errors import InputError
 from ..motion.state import State
-from ..scene.scenario import Scenario
+from ..scene.scenario import Scenario, nanoseconds
 from ..scene.scenario_run import ScenarioRun
 from ..simulation.observer import Observer
 from ..simulation.setup import Setup
-from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Timekeeping, WorkBudget
+from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Timekeeping, WorkBudget, publications_until
 
 ACTIVE_DRAIN_NS = 500_000
 """Between publications at most this often, while commands come in [ns of wall time]."""
@@ -148,6 +148,16 @@ class SimulationLoop(ScenarioRun):
         self._step_on()
         return not self.stepping
 
+    @property
+    def periods_of_a_step(self) -> int:
+        """How many publications a step makes, as the parameters say."""
+        parameters = self.scenario.parameters
+        reached, last = (
+            publications_until(time_ns, parameters.publish_rate)
+            for time_ns in (self.simulation.time_ns, nanoseconds(parameters.step_until))
+        )
+        return last - reached if last > reached else parameters.step_periods
+
     def _end_steps(self) -> None:
         self._steps_left = self._steps_requested = 0
 
@@ -248,7 +258,7 @@ class SimulationLoop(ScenarioRun):
         self._commands_come = self._take_commands(now_ns, False)
         if self._steps_requested and not self.stepping:
             self._steps_requested -= 1
-            self.step(self.scenario.parameters.step_periods)
+            self.step(self.periods_of_a_step)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._check_listeners()

@@ -30,6 +30,7 @@ from ..simulation.commands import (
     MoveString,
     Rank,
     ReleaseString,
+    SetState,
     ThrusterCommand,
     TieString,
     WrenchCommand,
@@ -50,7 +51,7 @@ MARKS = ("reset", "pause", "step", "timeout")
 
 KINDS = (
     *("wrench", "poke", "string_target", "string_attach", "string_release"),
-    *("thrusters", "inertia", "set", "clear_wrench", *MARKS),
+    *("thrusters", "state", "inertia", "set", "clear_wrench", *MARKS),
 )
 """Kinds of events."""
 
@@ -80,7 +81,8 @@ class ScriptCommand:
 
     kind ``wrench`` or ``poke``: frame_id, force (3,), torque (3,). ``string_target``, ``string_attach``: frame_id and
     point (3,), or the name of a contact to attach to. ``inertia``: frame_id, inertia (10,): mass, com, ixx ixy ixz iyy
-    iyz izz. ``thrusters``: forces. ``set``: changes. ``clear_wrench``, ``string_release``: nothing.
+    iyz izz. ``thrusters``: forces. ``state``: state, by name. ``set``: changes. The others:
+    nothing.
     """
 
     t_ns: int
@@ -93,6 +95,7 @@ class ScriptCommand:
     contact: str = ""
     inertia: tuple[float, ...] = ()
     forces: tuple[float, ...] = ()
+    state: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     entry: int = field(default=0, compare=False)
 
     @property
@@ -154,6 +157,9 @@ def of_event(time_ns: int, kind: str, content: Mapping) -> ScriptCommand:
             return ScriptCommand(time_ns, kind, _text(content["frame_id"]), inertia=numbers)
         if kind == "thrusters":
             return ScriptCommand(time_ns, kind, forces=tuple(map(float, content["forces"])))
+        if kind == "state":
+            values = {_text(name): tuple(map(float, numbers)) for name, numbers in content.items()}
+            return ScriptCommand(time_ns, kind, state=values)
         if kind == "set":
             return ScriptCommand(time_ns, kind, changes={_text(name): value for name, value in content.items()})
     except (KeyError, TypeError, ValueError, AttributeError):
@@ -230,6 +236,8 @@ def core_command(
         return Change(changes, _applying(change, changes), message or b"")
     if kind == "thrusters":
         return ThrusterCommand(command.forces, command.message(stamp_ns) if message is None else message)
+    if kind == "state":
+        return SetState(command.state, command.message(stamp_ns) if message is None else message)
     return ClearWrench(message or b"") if kind == "clear_wrench" else ReleaseString(message or b"")
 
 
@@ -328,6 +336,8 @@ def entry_of(command: ScriptCommand, frames: tuple[str, str] = _WORDS) -> dict:
         return {"set": command.changes}
     if kind == "thrusters":
         return {kind: list(command.forces)}
+    if kind == "state":
+        return {kind: {name: list(numbers) for name, numbers in command.state.items()}}
     if kind == "clear_wrench":
         return {"service": kind}
     if kind == "string_release":

@@ -241,6 +241,13 @@ class Parameters:
         1.0, "Simulated seconds per second of the wall clock; 0 runs as fast as possible.", lower=0.0, upper=1e6
     )
     step_periods: int = whole(1, "Publication periods that ~/step advances by.", lower=1, upper=1_000_000)
+    step_until: float = number(
+        0.0,
+        "~/step advances to the last publication up to this simulated time, where one lies ahead.",
+        "s",
+        lower=0.0,
+        upper=1e9,
+    )
     lockstep: bool = switch(
         False,
         "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; "

@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from ..base.errors import InputError, did_you_mean
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, SLOT_NAME, parse_frame, point_text
+from ..simulation.commands import STATE_VALUES
 from .command_codec import MAX_SCHEDULED, MESH_FRAME, ScriptCommand
 from .parameters import ZERO, Vector
 from .scenario import nanoseconds
@@ -43,7 +44,7 @@ ENTRY_KEYS: Mapping[str, set[str]] = {
     "poke": _POKE_KEYS,
     "wrench": _WRENCH_KEYS,
     "string": _STRING_KEYS | {"release"},
-    "other": {"wrench", "thrusters", "string", "set", "service", "script"},
+    "other": {"wrench", "thrusters", "state", "string", "set", "service", "script"},
 }
 """The keys that a script may hold, by the kind of entry."""
 
@@ -164,6 +165,9 @@ def _expand(
     if "thrusters" in entry:
         _check_keys(entry, _TIMING_KEYS | {"thrusters"}, where)
         return [ScriptCommand(t_ns, "thrusters", forces=_forces(entry["thrusters"], f"{where}, thrusters"))]
+    if "state" in entry:
+        _check_keys(entry, _TIMING_KEYS | {"state"}, where)
+        return [ScriptCommand(t_ns, "state", state=_state(entry["state"], f"{where}, state"))]
     if "string" in entry:
         _check_keys(entry, _TIMING_KEYS | {"string"}, where)
         return _expand_string(entry["string"], t_ns, f"{where}, string")
@@ -336,6 +340,18 @@ def _forces(value: Any, field: str) -> tuple[float, ...]:
     if not isinstance(value, list) or not value:
         raise InputError(field, value, "a list of forces [N], one a thruster in the order of their names")
     return tuple(_number(force, field) for force in value)
+
+
+def _state(value: Any, field: str) -> dict[str, tuple[float, ...]]:
+    if not isinstance(value, dict) or not value:
+        raise InputError(field, value, "any of " + ", ".join(STATE_VALUES))
+    _check_keys(value, set(STATE_VALUES), field)
+    state = {}
+    for name, numbers in value.items():
+        if not isinstance(numbers, list) or len(numbers) != STATE_VALUES[name]:
+            raise InputError(f"{field}, {name}", numbers, f"{STATE_VALUES[name]} numbers")
+        state[name] = tuple(_number(number, f"{field}, {name}") for number in numbers)
+    return state
 
 
 def _vector(value: Any, field: str) -> Vector:

@@ -8,7 +8,7 @@ order give one trajectory.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -106,6 +106,34 @@ class ThrusterCommand:
     def content(self) -> dict:
         """What an event line holds of it."""
         return {"forces": list(self.forces)}
+
+
+STATE_VALUES = {"position": 3, "orientation_xyzw": 4, "linear_velocity": 3, "angular_velocity": 3}
+"""What a SetState may set, world axes, and how many numbers it has."""
+
+
+@dataclass(frozen=True)
+class SetState:
+    """Put the body elsewhere at once: any of STATE_VALUES [m, m/s, rad/s, world axes]; the others stay."""
+
+    values: Mapping[str, tuple[float, ...]]
+    message: bytes = b""
+    kind = "state"
+    rank = Rank.CHANGE
+
+    def __post_init__(self) -> None:
+        for name, numbers in self.values.items():
+            if name not in STATE_VALUES or len(numbers) != STATE_VALUES[name]:
+                accepted = ", ".join(f"{name} of {count} numbers" for name, count in STATE_VALUES.items())
+                raise CommandRefused("frame", "state", f"{name} of {len(numbers)} numbers", accepted)
+            _check_point(f"state, {name}", numbers)
+        if not any(self.values.get("orientation_xyzw", (1.0,))):
+            raise CommandRefused("frame", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
+
+    @property
+    def content(self) -> dict:
+        """What an event line holds of it."""
+        return {name: list(numbers) for name, numbers in self.values.items()}
 
 
 @dataclass(frozen=True)
@@ -234,7 +262,7 @@ def order_key(command: Command, listed: Listed | None) -> tuple:
 Listed = tuple[bytes, int]
 """The bytes of the list that a command is an entry of, and its number there."""
 
-Command = WrenchCommand | ThrusterCommand | ClearWrench | Change | TieString | MoveString | ReleaseString
+Command = WrenchCommand | ThrusterCommand | SetState | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ..base.rotation import Numbers, cross, dot, length, transposed_times
+from ..base.rotation import Numbers, cross, dot, length, times, transposed_times
 from ..motion.integrators.error_measure import FLOOR
 from ..motion.loads import LoadSum
 from ..motion.state import State
@@ -165,6 +165,11 @@ class Readings:
         """Nothing moves, acts or is about to."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
         return still and not self._arrays.acts and self.string is None and not self.has_pending
+
+    def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the COM (3,) [m/s²] and angular (3,) [rad/s²], both in world axes, now."""
+        linear, angular = self._arrays.accelerations()
+        return linear, times(self.state.rotation, angular)
 
     def specific_force(self, point: Numbers) -> np.ndarray:
         """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]:

@@ -33,6 +33,7 @@ from .commands import (
     MoveString,
     Pending,
     ReleaseString,
+    SetState,
     ThrusterCommand,
     TieString,
     WrenchCommand,
@@ -320,6 +321,9 @@ class Simulation(Readings):
             self._thrust(self.thrusters.command(command.forces, self.time_ns, self.setup.wrench_timeout_ns))
         elif isinstance(command, Change):
             self._change(command.apply())
+        elif isinstance(command, SetState):
+            self._arrays.row[:] = self.state.moved(command.values).row
+            self.state = self._arrays.state
         elif isinstance(command, TieString):
             self._string.tie_at(command, self.setup, self.state)
         elif isinstance(command, MoveString):

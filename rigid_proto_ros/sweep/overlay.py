@@ -21,7 +21,7 @@ from .templates import Script, Settler, script_of
 
 _VECTORS = {"force": ld.FORCE, "impulse": ld.FORCE, "torque": ld.TORQUE, "angular_impulse": ld.TORQUE}
 _TIMING = {"repeat", "every", "jitter", "seed"}
-_OTHER_KINDS = {"wrench", "thrusters", "string", "set", "service"}
+_OTHER_KINDS = {"wrench", "thrusters", "state", "string", "set", "service"}
 
 
 def fits(study: Study) -> bool:

@@ -13,6 +13,11 @@ pytest.importorskip("rclpy")
 
 MESSAGES = SimpleNamespace(
     SimulatorFeatures=SimpleNamespace(
+        ENTITY_BOUNDS=5,
+        ENTITY_CATEGORIES=8,
+        ENTITY_STATE_GETTING=10,
+        ENTITY_STATE_SETTING=11,
+        ENTITY_INFO_GETTING=12,
         SIMULATION_RESET=20,
         SIMULATION_STATE_GETTING=24,
         SIMULATION_STATE_SETTING=25,
@@ -21,9 +26,12 @@ MESSAGES = SimpleNamespace(
         STEP_SIMULATION_MULTIPLE=32,
     ),
     SimulationState=SimpleNamespace(STATE_STOPPED=0, STATE_PLAYING=1, STATE_PAUSED=2, STATE_QUITTING=3),
-    Result=SimpleNamespace(RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_OPERATION_FAILED=4),
+    Result=SimpleNamespace(RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_NOT_FOUND=2, RESULT_OPERATION_FAILED=4),
+    EntityCategory=SimpleNamespace(CATEGORY_DYNAMIC_OBJECT=4),
+    Bounds=SimpleNamespace(TYPE_EMPTY=0, TYPE_BOX=1, TYPE_CONVEX_HULL=2, TYPE_SPHERE=3),
+    EntityState=lambda: entity_state(),
 )
-OK, UNSUPPORTED, FAILED, ALREADY = 1, 0, 4, 101
+OK, UNSUPPORTED, NOT_FOUND, FAILED, ALREADY, INVALID_POSE = 1, 0, 2, 4, 101, 101
 SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED": 4, "SCOPE_ALL": 255}
 
 
@@ -49,10 +57,12 @@ class Node:
 
 @pytest.fixture
 def services():
+    from rigid_proto_ros.ros.entity_services import EntityServices
     from rigid_proto_ros.ros.simulation_interfaces import SimulationInterfaces
 
     node = Node()
-    yield SimulationInterfaces(node.loop, node.call, MESSAGES), node
+    entity = EntityServices(node.loop, node.call, MESSAGES, "tool", "map")
+    yield SimulationInterfaces(node.loop, node.call, MESSAGES, entity), node
     node.thread.stop()
 
 
@@ -62,6 +72,37 @@ def response():
         state=SimpleNamespace(state=None),
         features=SimpleNamespace(),
         ALREADY_IN_TARGET_STATE=ALREADY,
+        INVALID_POSE=INVALID_POSE,
+        bounds=SimpleNamespace(type=None, points=[]),
+        info=SimpleNamespace(category=SimpleNamespace(category=None)),
+    )
+
+
+def entity_state(position=(0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0, 1.0), linear=(0.0,) * 3, angular=(0.0,) * 3):
+    from geometry_msgs.msg import Accel, Point, Pose, Quaternion, Twist, Vector3
+    from std_msgs.msg import Header
+
+    def three(kind, values):
+        return kind(**dict(zip("xyz", values, strict=True)))
+
+    pose = Pose(position=three(Point, position), orientation=Quaternion(**dict(zip("xyzw", orientation, strict=True))))
+    twist = Twist(linear=three(Vector3, linear), angular=three(Vector3, angular))
+    return SimpleNamespace(header=Header(), pose=pose, twist=twist, acceleration=Accel())
+
+
+def asked(entity="tool", **fields):
+    return SimpleNamespace(entity=entity, set_pose=False, set_twist=False, set_acceleration=False, **fields)
+
+
+def filtered(filter="", categories=(), tags=(), bounds=0, points=()):
+    categories = [SimpleNamespace(category=category) for category in categories]
+    return SimpleNamespace(
+        filters=SimpleNamespace(
+            filter=filter,
+            categories=categories,
+            tags=SimpleNamespace(tags=list(tags)),
+            bounds=SimpleNamespace(type=bounds, points=list(points)),
+        )
     )
 
 
@@ -85,6 +126,13 @@ def test_what_is_listed_is_served_and_nothing_else_is(services):
 
     # What a client that finds the feature listed may call, by the package's definition of the feature.
     calls = {
+        5: lambda: answer._entity.get_entity_bounds(asked(), response()),
+        8: lambda: answer._entity.get_entities(filtered(categories=[4]), response()),
+        10: lambda: answer._entity.get_entity_state(
+            asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})
+        ),
+        11: lambda: answer._entity.set_entity_state(asked(state=entity_state()), response()),
+        12: lambda: answer._entity.get_entity_info(asked(), response()),
         20: lambda: reset(SCOPES["SCOPE_ALL"]),
         21: lambda: reset(SCOPES["SCOPE_TIME"]),
         22: lambda: reset(SCOPES["SCOPE_STATE"]),
@@ -143,3 +191,70 @@ def test_without_the_package_nothing_is_offered(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "simulation_interfaces", None)
     assert offer_simulation_interfaces(None, None, None) is False
+
+
+def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services):
+    from rigid_proto_ros.session.replay import Resimulation
+    from rigid_proto_ros.simulation.observer import Observer
+
+    answer, node = services
+    entity, lines = answer._entity, []
+    told = Observer()
+    told.event = lambda _time_ns, line: lines.append(line)
+    node.call(lambda: node.loop.watch(told))
+    wanted = entity_state((1.0, 2.0, 3.0), (0.0, 0.0, 3.0, 4.0), (0.5, 0.0, 0.0), (0.0, 0.0, 2.0))
+    pose = SimpleNamespace(**vars(asked(state=wanted)) | {"set_pose": True})
+    assert entity.set_entity_state(pose, response()).result.result == OK
+    answer.step_simulation(SimpleNamespace(steps=10), response())
+    reached = node.loop.simulation.state
+    assert reached.position == pytest.approx([1.0, 2.0, 3.0])
+    assert reached.angular_velocity[1] == pytest.approx(3.0, abs=0.2)  # the twist was left alone
+    twist = SimpleNamespace(**vars(asked(state=wanted)) | {"set_twist": True})
+    assert entity.set_entity_state(twist, response()).result.result == OK
+    answer.step_simulation(SimpleNamespace(steps=10), response())
+    heard = entity.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})).state
+    assert heard.header.frame_id == "map" and heard.header.stamp.nanosec == 200_000_000
+    assert heard.pose.position.x == pytest.approx(1.05) and heard.twist.linear.x == 0.5
+    again = Resimulation(node.loop.scenario, lines)
+    assert again.advance(200_000_000).tobytes() == node.loop.simulation.state.row.tobytes()
+    broken = SimpleNamespace(**vars(asked(state=entity_state(orientation=(0.0,) * 4))) | {"set_pose": True})
+    assert entity.set_entity_state(broken, response()).result.result == INVALID_POSE
+    assert entity.set_entity_state(asked("chair", state=wanted), response()).result.result == NOT_FOUND
+
+
+def test_the_only_entity_is_found_by_name_category_and_place(services):
+    answer, node = services
+    find = lambda **filters: answer._entity.get_entities(filtered(**filters), response())  # noqa: E731
+    assert [find(filter=text).entities for text in ("", "^to+l$", "chair")] == [["tool"], ["tool"], []]
+    assert find(categories=[1]).entities == [] and find(categories=[1, 4]).entities == ["tool"]
+    assert find(tags=["red"]).result.result == UNSUPPORTED and find(bounds=1).result.result == UNSUPPORTED
+    assert find(filter="(").result.result == FAILED
+    box = answer._entity.get_entity_bounds(asked(), response()).bounds
+    upper, lower = box.points
+    assert box.type == 1 and lower.x < 0.0 < upper.x and upper.z - lower.z > 0.05
+    place = SimpleNamespace(x=upper.x + 0.1, y=0.0, z=0.0)
+    for radius, found in ((0.09, []), (0.11, ["tool"])):
+        points = [place, SimpleNamespace(x=radius, y=0.0, z=0.0)]
+        assert find(bounds=3, points=points).entities == found
+
+
+def test_a_step_goes_up_to_a_time_where_one_is_given():
+    from rigid_proto_ros.ros.pacing import publications_until
+
+    assert [publications_until(t, 30.0) for t in (0, 33_333_332, 33_333_333, 99_999_999, 100_000_000, 10**9)] == [
+        0,
+        0,
+        1,
+        2,
+        3,
+        30,
+    ]
+    node = Node()
+    try:
+        change = {"step_until": 0.355}
+        node.call(lambda: node.loop.change(change))
+        assert node.call(lambda: node.loop.periods_of_a_step) == 35
+        node.call(lambda: node.loop.step(35))
+        assert node.call(lambda: node.loop.periods_of_a_step) == 1
+    finally:
+        node.thread.stop()
