@@ -69,6 +69,10 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --compare or --lump: a folder that holds packages or models that the file names; may be repeated",
     )  # fmt: skip
     parser.add_argument(
+        "--xacro", action="append", default=[], metavar="NAME:=VALUE",
+        help="with --compare or --lump: an argument of a xacro file; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
         "--tolerance", type=float, metavar="T",
         help="with --compare: one line a link; exit 1 when one is off by more than T, relatively (default 1e-3)",
     )  # fmt: skip
@@ -95,8 +99,12 @@ def check_robot_options(args: argparse.Namespace, mesh: str | None) -> None:
         for name in names:
             if getattr(args, use) is None and getattr(args, name) not in (None, []):
                 raise InputError(f"--{name.replace('_', '-')}", f"takes --{use} ROBOT with it")
-    if args.package_path and args.compare is None and args.lump is None:
-        raise InputError("--package-path", "takes --compare ROBOT or --lump ROBOT with it")
+    for flag, words in (("--package-path", args.package_path), ("--xacro", args.xacro)):
+        if words and args.compare is None and args.lump is None:
+            raise InputError(flag, "takes --compare ROBOT or --lump ROBOT with it")
+    for word in args.xacro:
+        if ":=" not in word:
+            raise InputError("--xacro", word, "NAME:=VALUE, as xacro takes it")
     if args.lump is not None and (args.compare is not None or mesh is not None):
         raise InputError("--lump", args.lump, "a robot by itself, without MESH and --compare")
 
@@ -132,7 +140,7 @@ def lump(args: argparse.Namespace) -> int:
     for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback"):
         if getattr(args, flag):
             raise InputError(f"--{flag}", "can't be used with --lump, which takes the robot's own inertials")
-    whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path))
+    whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path), tuple(args.xacro))
     written = _write_scene(whole, args.as_scene) if args.as_scene else ()
     exports = {"urdf": urdf_inertial, "sdf": sdf_inertial, "mjcf": mjcf_inertial}
     export = next((export for name, export in exports.items() if getattr(args, name)), None)
@@ -224,6 +232,7 @@ def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
         density.by_link,
         args.total_mass or 0.0,
         args.tolerance or LIMIT,
+        tuple(args.xacro),
     )
 
 

@@ -84,7 +84,7 @@ class LinkDiagnosis:
 
 @dataclass(frozen=True)
 class Options:
-    """How shapes are taken, and where their files are looked for.
+    """How shapes are taken, where their files are looked for, and what xacro is told (``name:=value``).
 
     ``mass`` or ``density`` > 0 are the true ones of every link, ``masses`` and ``densities`` those of the links that
     they name; with ``total_mass`` > 0 the links that no mass or density is given for are of one density, at which the
@@ -101,6 +101,7 @@ class Options:
     densities: Mapping[str, float] = field(default_factory=dict)
     total_mass: float = 0.0
     tolerance: float = LIMIT
+    xacro: tuple[str, ...] = ()
 
     def mass_of(self, link: str, volume: float) -> float:
         """The true mass of a link of ``volume`` [m³], 0 where none is given."""
@@ -328,7 +329,7 @@ def compare_robot(
 
     Raises InputError when the file, or nothing in it, can be judged.
     """
-    robot = Robot(path, read_robot(path), options)
+    robot = Robot(path, read_robot(path, options.folders, options.xacro), options)
     if link is not None:
         robot.require(link)
     if mesh is not None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import math
 import re
-import shutil
-import subprocess
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,10 +16,10 @@ from numpy.typing import ArrayLike
 from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
 from ..base.rotation import matrix_from_quaternion
+from ..mesh.locate import Search
+from .robot_xacro import expand_xacro
 
 MAX_BYTES = 50_000_000
-XACRO_TIMEOUT_S = 60.0
-"""The largest descriptions expand in a few seconds."""
 VISUAL, COLLISION = "visual", "collision"
 PRIMITIVES = ("box", "cylinder", "sphere", "capsule", "ellipsoid")
 """Shapes by closed form. ``size``: sides of the box; radius and length of cylinder and capsule (along z, the capsule's
@@ -152,17 +150,21 @@ def is_xacro(root: ElementTree.Element, path: Path) -> bool:
     return path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter())
 
 
-def read_robot(path: Path) -> list[LinkInertial]:
-    """The links of a robot file that have an inertial or a shape, xacro expanded; raises InputError when the file can't
-    be read.
+def read_robot(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()) -> list[LinkInertial]:
+    """The links of a robot file that have an inertial or a shape; arguments and errors of robot_root."""
+    return links_of(robot_root(path, folders, xacro), path)
+
+
+def robot_root(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()) -> ElementTree.Element:
+    """The root of a robot file, xacro expanded with arguments like ``name:=value``, packages looked for upwards from
+    the file and in ``folders``; raises InputError when the file can't be read.
     """
-    return links_of(robot_root(path), path)
-
-
-def robot_root(path: Path) -> ElementTree.Element:
-    """The root of a robot file, xacro expanded; raises InputError when the file can't be read."""
     root = parse_xml(read_bounded(path, MAX_BYTES, "compare", "a URDF, SDF or MJCF file"), path)
-    return parse_xml(_expanded(path), path) if is_xacro(root, path) else root
+    if is_xacro(root, path):
+        return parse_xml(expand_xacro(path, Search(path.parent, folders), xacro), path)
+    if xacro:
+        raise InputError("--xacro", " ".join(xacro), "a file that xacro expands")
+    return root
 
 
 def links_of(root: ElementTree.Element, path: Path) -> list[LinkInertial]:
@@ -195,24 +197,6 @@ def parse_xml(data: bytes, path: Path) -> ElementTree.Element:
         return ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError("compare", path.name, f"well-formed XML ({error})") from None
-
-
-def _expanded(path: Path) -> bytes:
-    """What the installed ``xacro`` makes of the file."""
-    program = shutil.which("xacro")
-    if program is None:
-        raise InputError(
-            "compare", path.name, "plain URDF: expand it first, xacro FILE > robot.urdf (or install xacro)"
-        )
-    try:
-        done = subprocess.run([program, str(path)], capture_output=True, timeout=XACRO_TIMEOUT_S, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise InputError("compare", path.name, f"a file that xacro expands ({error})") from None
-    if done.returncode != 0:
-        lines = done.stderr.decode("utf-8", "replace").split("\n")
-        reason = next((line.strip() for line in reversed(lines) if line.strip()), "no reason given")[:160]
-        raise InputError("compare", path.name, f"a file that xacro expands ({reason})")
-    return done.stdout
 
 
 def placed(shape: Shape, rotation: np.ndarray, position: np.ndarray) -> Shape:

@@ -39,13 +39,15 @@ class Lump:
     doubts: tuple[str, ...]
 
 
-def lump_robot(path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = ()) -> Lump:
+def lump_robot(
+    path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()
+) -> Lump:
     """The robot at joint values [rad or m] by name, the others at 0, in the frame of its root link (URDF), of the model
     (SDF) or of the world (MJCF).
 
     Raises InputError for a file without inertials, for joints that it doesn't have, and for links that make no tree.
     """
-    root = robot_root(path)
+    root = robot_root(path, folders, xacro)
     links = links_of(root, path)
     if root.tag == "mujoco":
         _require_inertials(root)

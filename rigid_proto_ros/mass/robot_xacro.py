@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""xacro files expanded by the installed ``xacro``, also where no ROS is installed.
+
+xacro asks ament_index_python for ``$(find package)``, which stands in no package index but ROS's own. It is given a
+module of that name that knows the packages which mesh names are looked for in, too.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from ..base.errors import InputError
+from ..mesh.locate import Search, package_folder
+
+TIMEOUT_S = 60.0
+"""The largest descriptions expand in a few seconds."""
+MAX_FILES = 2000
+"""Files of all packages together that are searched for names of packages."""
+_FIND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)")
+_INDEX = """
+FOLDERS = {folders!r}
+
+
+class PackageNotFoundError(KeyError):
+    pass
+
+
+def get_package_share_directory(name):
+    if name not in FOLDERS:
+        raise PackageNotFoundError(f"package {{name}} was not found; --package-path DIR says where it is")
+    return FOLDERS[name]
+"""
+
+
+def _packages(path: Path, search: Search) -> dict[str, str]:
+    """Folders of the packages that a file, and the xacro and YAML files of these packages, name."""
+    found: dict[str, str] = {}
+    waiting, seen = [path], 0
+    while waiting and seen < MAX_FILES:
+        file = waiting.pop()
+        seen += 1
+        try:
+            text = file.read_text("utf-8", "replace")
+        except OSError:
+            continue
+        for name in set(_FIND.findall(text)) - found.keys():
+            folder = package_folder(name, search)
+            if folder is not None:
+                found[name] = str(folder)
+                waiting += [part for ending in ("xacro", "urdf") for part in folder.rglob(f"*.{ending}")]
+    return found
+
+
+def expand_xacro(path: Path, search: Search, arguments: Iterable[str] = ()) -> bytes:
+    """What the installed ``xacro`` makes of the file with ``arguments`` like ``name:=value``; raises InputError without
+    it, and with its reason where it fails.
+    """
+    program = shutil.which("xacro")
+    if program is None:
+        accepted = "plain URDF: expand it first, xacro FILE > robot.urdf (or install xacro)"
+        raise InputError("compare", path.name, accepted)
+    with tempfile.TemporaryDirectory() as folder:
+        module = Path(folder) / "ament_index_python"
+        module.mkdir()
+        (module / "__init__.py").write_text("", encoding="utf-8")
+        text = _INDEX.format(folders=_packages(path, search))
+        (module / "packages.py").write_text(text, encoding="utf-8")
+        places = os.pathsep.join(filter(None, [folder, os.environ.get("PYTHONPATH", "")]))
+        try:
+            done = subprocess.run(
+                [program, str(path), *arguments],
+                capture_output=True, timeout=TIMEOUT_S, check=False, env={**os.environ, "PYTHONPATH": places},
+            )  # fmt: skip
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise InputError("compare", path.name, f"a file that xacro expands ({error})") from None
+    if done.returncode != 0:
+        lines = [line.strip() for line in done.stderr.decode("utf-8", "replace").split("\n") if line.strip()]
+        # Its last lines say in which files; the error stands before them.
+        reason = next((line for line in lines if line.startswith("error:")), lines[-1] if lines else "no reason given")
+        raise InputError("compare", path.name, f"a file that xacro expands ({reason[:200]})")
+    return done.stdout
