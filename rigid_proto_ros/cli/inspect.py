@@ -6,6 +6,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 
 from ..base.bundled import body_names
 from ..base.command_line import completes
@@ -13,8 +15,9 @@ from ..base.errors import InputError
 from ..base.progress import Progress
 from ..mass.export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.from_mesh import FALLBACKS, UNION, mesh_body
-from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify
+from ..mass.inspection import JSON_KEYS, MODELS, Inspection, as_json, inspect_mesh, verify
 from ..mass.properties import scale_vector
+from ..mass.verdict import ERROR, Finding
 from ..mesh.locate import resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .inspect_report import print_report
@@ -52,7 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Mass, centre of mass and inertia of a mesh under every model; a mesh that encloses no volume is refused."
     )
-    mesh = parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
+    mesh = parser.add_argument(
+        "mesh", nargs="*", metavar="MESH", help="a path, package:// URI or bundled name; several are inspected in turn"
+    )
     completes(mesh, body_names)
     parser.add_argument(
         "--density", type=number_or_link, action="append", metavar="D",
@@ -93,24 +98,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
 
 
-def _scale_and_mesh(args: argparse.Namespace) -> tuple[list[float], str | None]:
+def _scale_and_meshes(args: argparse.Namespace) -> tuple[list[float], list[str]]:
     """``--scale 2 cow.obj`` leaves the mesh among the scale's words: give it back."""
-    words, mesh = list(args.scale), args.mesh
-    if mesh is None and len(words) > 1 and _as_number(words[-1]) is None:
-        mesh = words.pop()
+    words, meshes = list(args.scale), list(args.mesh)
+    while not meshes and len(words) > 1 and _as_number(words[-1]) is None:
+        numbers = next(k for k, word in enumerate([*words[1:], "end"], 1) if _as_number(word) is None)
+        words, meshes = words[:numbers], words[numbers:]
     scale = [number for word in words if (number := _as_number(word)) is not None]
     if len(scale) != len(words) or len(scale) not in (1, 3):
         raise InputError("scale", " ".join(words), "one or three numbers, each with 1e-9 <= |s| <= 1e9")
-    return scale, mesh
+    return scale, meshes
 
 
-def _repair_and_mesh(args: argparse.Namespace, mesh: str | None) -> tuple[bool | str, str | None]:
+def _repair_and_meshes(args: argparse.Namespace, meshes: list[str]) -> tuple[bool | str, list[str]]:
     """``--repair cow.obj`` leaves the mesh as the repair's kind: give it back."""
-    if args.repair not in (True, False, UNION) and mesh is None:
-        return True, args.repair
-    if args.repair not in (True, False, UNION):
+    if args.repair in (True, False, UNION):
+        return args.repair, meshes
+    if meshes and not Path(args.repair).is_file():
         raise InputError("--repair", args.repair, f"--repair alone, or --repair {UNION}")
-    return args.repair, mesh
+    return True, [args.repair, *meshes]
 
 
 def _as_number(word: str) -> float | None:
@@ -122,54 +128,96 @@ def _as_number(word: str) -> float | None:
 
 def run(args: argparse.Namespace) -> int:
     """Inspect, print, and return the exit status; raises InputError for what is refused."""
-    scale, mesh_name = _scale_and_mesh(args)
-    args.repair, mesh_name = _repair_and_mesh(args, mesh_name)
+    scale, meshes = _scale_and_meshes(args)
+    args.repair, meshes = _repair_and_meshes(args, meshes)
+    args.mesh = meshes
     given_mass, given_density = given("mass", args.mass), given("density", args.density)
     if given_mass.everywhere and given_density.everywhere:
         raise InputError("--density", given_density.everywhere, "--mass or --density, not both")
     scale_vector(scale)
     if args.max_triangles < 1:
         raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
-    check_robot_options(args, mesh_name)
+    check_robot_options(args, meshes)
     if args.lump is not None:
         return lump(args)
     if args.compare is not None:
-        return compare(args, mesh_name, scale, given_mass, given_density)
+        return compare(args, meshes[0] if meshes else None, scale, given_mass, given_density)
     if given_mass.by_link or given_density.by_link:
         named = next(iter({**given_mass.by_link, **given_density.by_link}))
         raise InputError(
             "--mass" if given_mass.by_link else "--density", f"{named}=", "LINK= with --compare ROBOT alone"
         )
     mass, density = given_mass.everywhere or 0.0, given_density.everywhere or DENSITY
-    if mesh_name is None:
+    if not meshes:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
-    path = resolve_mesh(mesh_name)
-    with Progress(f"reading {mesh_name}", path.stat().st_size > LARGE_FILE):
-        mesh = load_mesh(mesh_name, max_triangles=args.max_triangles)
+    if len(meshes) > 1 and args.record:
+        raise InputError("--record", args.record, "one MESH with it")
+    found = [_inspect(args, name, scale, mass, density) for name in meshes]
+    if len(meshes) == 1:
+        one = found[0]
+        if args.json and one.report is not None:
+            print(json.dumps(one.report))
+        if one.refusal is not None:
+            raise one.refusal
+        return one.status
+    if args.json:
+        print(json.dumps({"meshes": [{"name": one.name, **(one.report or _unread(one))} for one in found]}))
+    return max(one.status for one in found)
+
+
+@dataclass(frozen=True)
+class _Inspected:
+    """What became of one mesh: exit status, JSON object (None where it couldn't be read), and what refused it."""
+
+    name: str
+    status: int
+    report: dict | None
+    refusal: InputError | None = None
+
+
+def _unread(one: _Inspected) -> dict:
+    """The JSON object of a mesh that couldn't be read, among others."""
+    return {**dict.fromkeys(JSON_KEYS), "verdict": [Finding("unread", ERROR, str(one.refusal)).as_dict()]}
+
+
+def _inspect(args: argparse.Namespace, name: str, scale: list[float], mass: float, density: float) -> _Inspected:
+    """One mesh inspected and printed, but for JSON; what refuses it goes to stderr where it is one of several."""
+    report = None
+    try:
+        inspection = _inspection(args, name, scale, mass, density)
+        report = as_json(inspection)
+        if inspection.refusal is not None:
+            raise inspection.refusal
+        status = _verify(inspection, report) if args.verify else 0
+        if args.record:
+            from ..rerun_view.inspection import record_inspection
+
+            record_inspection(args.record, inspection)
+    except InputError as error:
+        if len(args.mesh) > 1:
+            print(f"rigid_proto inspect: {' '.join(str(error).split())}", file=sys.stderr)
+        return _Inspected(name, 2, report, error)
+    if not args.json:
+        _print(inspection, report, args)
+    return _Inspected(name, status, report)
+
+
+def _inspection(args: argparse.Namespace, name: str, scale: list[float], mass: float, density: float) -> Inspection:
+    path = resolve_mesh(name)
+    with Progress(f"reading {name}", path.stat().st_size > LARGE_FILE):
+        mesh = load_mesh(name, max_triangles=args.max_triangles)
     with Progress(f"examining {len(mesh.triangles)} triangles", len(mesh.triangles) > LARGE_MESH):
         body = mesh_body(mesh, repair=args.repair, fallback=args.fallback)
-        inspection = inspect_mesh(body, model=args.model, scale=scale, mass=mass, density=density, ballast=args.ballast)
-    report = as_json(inspection)
-    if inspection.refusal is not None:
-        if args.json:
-            print(json.dumps(report))
-        raise inspection.refusal
-    status = _verify(inspection, report, args.json) if args.verify else 0
-    if args.record:
-        from ..rerun_view.inspection import record_inspection
-
-        record_inspection(args.record, inspection)
-    _print(inspection, report, args)
-    return status
+        return inspect_mesh(body, model=args.model, scale=scale, mass=mass, density=density, ballast=args.ballast)
 
 
 def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> None:
     exports = {"urdf": urdf_inertial, "sdf": sdf_inertial, "mjcf": mjcf_inertial}
     export = next((export for name, export in exports.items() if getattr(args, name)), None)
-    if args.json:
-        print(json.dumps(report))
-    elif export is None:
+    if export is None:
         print_report(inspection, report)
+        if len(args.mesh) > 1:
+            print()
     else:
         print(export(inspection.chosen, args.frame), end="")
         for finding in inspection.findings:
@@ -177,19 +225,12 @@ def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> No
                 print(f"{finding.severity}: {finding.message}", file=sys.stderr)
 
 
-def _verify(inspection: Inspection, report: dict, to_json: bool) -> int:
-    """Put the ``verification`` into the report, null (and, as JSON, printed) where it is refused; returns
-    the exit status.
-    """
+def _verify(inspection: Inspection, report: dict) -> int:
+    """Put the ``verification`` into the report, null where it is refused; returns the exit status."""
     report["verification"] = None
     body = inspection.body
-    try:
-        with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
-            report["verification"] = verify(body, inspection.scale, progress.fraction)
-    except InputError:
-        if to_json:
-            print(json.dumps(report))
-        raise
+    with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
+        report["verification"] = verify(body, inspection.scale, progress.fraction)
     if max(report["verification"].values()) <= VERIFIED:
         return 0
     print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)

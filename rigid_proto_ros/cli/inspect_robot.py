@@ -93,7 +93,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_robot_options(args: argparse.Namespace, mesh: str | None) -> None:
+def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
     """Refuse options that need a robot, or another of its uses."""
     for names, use in ((_COMPARES, "compare"), (_LUMPS, "lump")):
         for name in names:
@@ -105,7 +105,9 @@ def check_robot_options(args: argparse.Namespace, mesh: str | None) -> None:
     for word in args.xacro:
         if ":=" not in word:
             raise InputError("--xacro", word, "NAME:=VALUE, as xacro takes it")
-    if args.lump is not None and (args.compare is not None or mesh is not None):
+    if args.compare is not None and len(meshes) > 1:
+        raise InputError("--compare", " ".join(meshes), "one MESH, or none for all links")
+    if args.lump is not None and (args.compare is not None or meshes):
         raise InputError("--lump", args.lump, "a robot by itself, without MESH and --compare")
 
 

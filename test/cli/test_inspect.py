@@ -241,3 +241,22 @@ def test_the_picture_holds_mesh_axes_boxes_and_differences(capsys, tmp_path):
         off = np.max(np.abs(np.array(found["models"][name]["inertia"]) - solid)) / np.max(np.abs(solid))
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {label} |")]
         assert row.endswith(f"| {off:.3g} |")
+
+
+def test_several_meshes_are_inspected_in_turn_and_the_worst_status_counts(tmp_path, capsys):
+    (tmp_path / "open.obj").write_bytes(obj(faces=CUBE_TRIANGLES[:-1]))
+    broken = str(tmp_path / "open.obj")
+    status, out, err = inspect(capsys, "hammer", "book", "--mass", "1")
+    assert status == 0 and out.count("principal axis 1") == 2 and not err
+    status, out, err = inspect(capsys, "--mass", "1", "--scale", "2", "hammer", broken, "nothing.obj", "book")
+    assert status == 2 and out.count("principal axis 1") == 2 and err.count("\n") == 2
+    status, out, _ = inspect(capsys, "hammer", broken, "nothing.obj", "--mass", "1", "--json")
+    first, second, third = json.loads(out)["meshes"]
+    assert status == 2 and first["mass"] == 1.0
+    assert [one["name"] for one in (first, second, third)] == ["hammer", broken, "nothing.obj"]
+    assert second["mass"] is None and second["verdict"][0]["code"] == "open"
+    assert third["mass"] is None and "nothing.obj" in third["verdict"][0]["message"]
+    status, out, _ = inspect(capsys, "--repair", broken, "hammer", "--json")
+    assert status == 0 and [one["watertight"] for one in json.loads(out)["meshes"]] == [True, True]
+    assert inspect(capsys, "hammer", "book", "--record", str(tmp_path / "x.rrd"))[0] == 2
+    assert inspect(capsys, "hammer", "book", "--compare", broken)[0] == 2
