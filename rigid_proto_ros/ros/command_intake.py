@@ -188,13 +188,13 @@ class CommandIntake:
             message.read(scenario)
             quick = not message.is_slow
         if quick:
-            message.judge(scenario, self._apply_changes)
+            message.check(scenario, self._apply_changes)
             return self._take_scheduled(message)
 
         def work() -> None:
             if not message.commands:
                 message.read(scenario)
-            message.judge(scenario, self._apply_changes)
+            message.check(scenario, self._apply_changes)
 
         self._background.give(message, work)
         return 0
@@ -213,7 +213,7 @@ class CommandIntake:
             entries = {e.number for e, (_, counted) in zip(message.entries, times, strict=True) if counted == counter}
             self._count_stamps(counter, len(entries))
         for entry, (when_ns, _) in zip(message.entries, times, strict=True):
-            simulation.submit(entry.command, when_ns, entry.listed, entry.judged)
+            simulation.submit(entry.command, when_ns, entry.listed, entry.checked)
         return message.count
 
     def _when(self, stamp_ns: int) -> int:

@@ -15,7 +15,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..scene.offline import tell_start
+from ..scene.offline import notify_start
 from ..scene.scenario import BodyMesh, Scenario, make_scenario
 from ..simulation.observer import Observer
 from ..simulation.setup import Setup
@@ -79,9 +79,9 @@ class RigidBodyNode(Node):
         Services(self.loop, self.call, self.intake).offer(self)
         offer_simulation_interfaces(self, self.loop, self.call)
         self.diagnostics = Diagnostics(self, self.loop, self.intake, self._watchers)
-        tell_start(self._watchers.observer, scenario)
+        notify_start(self._watchers.observer, scenario)
         self.loop.simulation.announce()
-        self.loop.tell_scene()
+        self.loop.notify_scene()
 
     def close(self) -> None:
         """After the physics thread has ended: whatever the observers hold goes out."""

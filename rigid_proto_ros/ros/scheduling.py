@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Messages of the schedule topic: read, and judged as a whole before any of their entries is taken.
+"""Messages of the schedule topic: read, and checked as a whole before any of their entries is taken.
 
 What takes long (a mesh to load, kernels to compile, a long text) is done on a thread in the background, and the message
 counts as taken when that is done: the motion never waits for it.
@@ -19,9 +19,9 @@ from ..base.errors import CommandRefused, InputError
 from ..scene.command_codec import ScriptCommand, core_command
 from ..scene.scenario import BodyMesh, Scenario
 from ..scene.script import expand_schedule, read_schedule, with_contacts
+from ..simulation.checks import check_command
 from ..simulation.commands import Command, Listed
 from ..simulation.setup import Setup
-from ..simulation.simulation import judge
 from .warm_up import warm_up_change
 
 LONG_TEXT = 20_000
@@ -39,20 +39,20 @@ SLOW = frozenset(
 @dataclass(frozen=True)
 class Entry:
     """A command ready to be submitted: its own time, its place in its list, and what Simulation.submit
-    takes as judged.
+    takes as checked.
     """
 
     command: Command
     t_ns: int
     number: int
     listed: Listed | None
-    judged: tuple[bytes, Setup]
+    checked: tuple[bytes, Setup]
 
 
 @dataclass
 class ScheduleMessage:
-    """One message. count: its entries, as messages are counted. commands: once read. entries: once judged. refusal: why
-    none of it is taken.
+    """One message. count: its entries, as messages are counted. commands: once read. entries: once checked. refusal:
+    why none of it is taken.
     """
 
     data: bytes
@@ -65,18 +65,18 @@ class ScheduleMessage:
 
     @property
     def is_slow(self) -> bool:
-        """Whether it is to be judged in the background."""
+        """Whether it is to be checked in the background."""
         return any(command.changes and SLOW & command.changes.keys() for command in self.commands)
 
     def read(self, scenario: Scenario) -> None:
         """Fill ``commands``."""
         self._keep_refusal(self._read, scenario)
 
-    def judge(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
-        """Fill ``entries``, each judged in the scene that those before it have made of this one; change(changes, mesh
+    def check(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
+        """Fill ``entries``, each checked in the scene that those before it have made of this one; change(changes, mesh
         at hand) is called when a ``set`` acts.
         """
-        self._keep_refusal(self._judge, scenario, change)
+        self._keep_refusal(self._check, scenario, change)
 
     def _keep_refusal(self, work: Callable[..., None], *arguments: Any) -> None:
         """Do the message's work; what it raises becomes the refusal."""
@@ -95,7 +95,7 @@ class ScheduleMessage:
         commands = expand_schedule(listed, scenario.parameters.wrench_timeout)
         self.commands = with_contacts(commands, scenario.setup.contacts)
 
-    def _judge(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
+    def _check(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
         # In order of time; those of one time in the order of the list.
         order = sorted(range(len(self.commands)), key=lambda k: self.commands[k].t_ns)
         for k in order:
@@ -112,9 +112,9 @@ class ScheduleMessage:
                 partial(_with_mesh, change, at_hand),
                 message=b"" if self.is_list else self.data,
             )
-            judged = (judge(own, scenario.setup), scenario.setup)
+            checked = (check_command(own, scenario.setup), scenario.setup)
             listed = (self.data, k) if self.is_list else None
-            self.entries.append(Entry(own, command.t_ns, command.entry, listed, judged))
+            self.entries.append(Entry(own, command.t_ns, command.entry, listed, checked))
 
 
 def _with_mesh(change: Callable[[dict, BodyMesh | None], Setup], at_hand: BodyMesh | None, changes: dict) -> Setup:

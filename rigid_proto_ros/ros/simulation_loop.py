@@ -116,7 +116,7 @@ class SimulationLoop(ScenarioRun):
             self.timekeeping.paused = paused
             self._end_steps()
             self.simulation.log("pause", {"data": paused})
-            self.simulation.tell_status(paused)
+            self.simulation.notify_status(paused)
             self._anchor()
 
     def take_commands(self) -> None:
@@ -277,7 +277,7 @@ class SimulationLoop(ScenarioRun):
         state = self.simulation.state
         self._publications.made()
         self.observer.state(state.time_ns, state.row)
-        self.simulation.tell_status()
+        self.simulation.notify_status()
         if self.ghost is not None:
             self.ghost.advance(state.time_ns)
         self._publish(state)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..scene.offline import tell_start
+from ..scene.offline import notify_start
 from ..scene.scenario import Scenario
 from ..simulation.observer import Observer, Observers
 from .event_publisher import EventPublisher
@@ -46,7 +46,7 @@ class Watchers:
         self.record_to(recorder)
         loop.watch(self.observer)
         if recorder is not None:
-            tell_start(recorder, loop.scenario)
+            notify_start(recorder, loop.scenario)
             recorder.scene_changed(loop.simulation.time_ns, loop.scenario.text)
             loop.simulation.introduce(recorder)
         return finished

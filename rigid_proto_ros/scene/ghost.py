@@ -69,10 +69,10 @@ class Ghost:
         """
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
-        # A change before it in its list may allow what the present setup doesn't: then it is judged when it acts.
-        judged = None if listed is None else (b"", self.simulation.setup)
+        # A change before it in its list may allow what the present setup doesn't: then it is checked when it acts.
+        checked = None if listed is None else (b"", self.simulation.setup)
         try:
-            self.simulation.submit(command, when_ns, listed, judged)
+            self.simulation.submit(command, when_ns, listed, checked)
         except InputError as error:
             self._goes_without(str(error))
 

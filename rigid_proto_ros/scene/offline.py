@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ..base.errors import CommandRefused, InputError
 from ..base.progress import Progress
+from ..simulation.checks import check_command
 from ..simulation.observer import Observer
-from ..simulation.simulation import judge
 from .command_codec import ScriptCommand, core_command
 from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
@@ -60,7 +60,7 @@ def parse_setting(text: str) -> tuple[str, object]:
     return name.strip(), scalar(value.strip())
 
 
-def tell_start(observer: Observer, scenario: Scenario) -> None:
+def notify_start(observer: Observer, scenario: Scenario) -> None:
     """Tell an observer what flies."""
     mesh = scenario.body_mesh
     if mesh is None:
@@ -79,7 +79,7 @@ class OfflineRun(ScenarioRun):
         self._is_observed = observer is not None
         self._next_publication = 0
         if observer is not None:
-            tell_start(observer, scenario)
+            notify_start(observer, scenario)
             self.simulation.announce()
             self.begin_ghost()
         script = with_contacts(script or [], scenario.setup.contacts)
@@ -87,11 +87,11 @@ class OfflineRun(ScenarioRun):
         for number, command in enumerate(script):
             try:
                 core = core_command(command, command.t_ns, scenario.setup.contacts, self.change)
-                # A command is judged in the scene that the script has made by then.
+                # A command is checked in the scene that the script has made by then.
                 if command.kind == "set":
                     planned = planned.with_changes(command.changes)
-                judged = (judge(core, planned.setup), planned.setup)
-                self.simulation.submit(core, command.t_ns, (b"", number), judged)
+                checked = (check_command(core, planned.setup), planned.setup)
+                self.simulation.submit(core, command.t_ns, (b"", number), checked)
             except CommandRefused as refusal:
                 raise InputError(
                     f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
@@ -106,7 +106,7 @@ class OfflineRun(ScenarioRun):
                 if self.simulation.failure:
                     return False
                 self.observer.state(next_ns, state.row)
-                self.simulation.tell_status()
+                self.simulation.notify_status()
                 if self.ghost is not None:
                     self.ghost.advance(next_ns)
                 self._next_publication += 1

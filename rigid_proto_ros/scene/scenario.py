@@ -23,8 +23,8 @@ from ..motion.integrators import check_supported, integrator_named
 from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
+from ..simulation.checks import needs_of
 from ..simulation.setup import Setup
-from ..simulation.simulation import needs_of
 from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
 from .parameters import Parameters, convert_all, parameter_named

@@ -47,9 +47,9 @@ class ScenarioRun:
         # One that isn't there would have missed what was commanded so far: it begins at the next reset.
         if self.ghost is not None:
             self.ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
-        self.tell_scene()
+        self.notify_scene()
         return scenario.setup
 
-    def tell_scene(self) -> None:
+    def notify_scene(self) -> None:
         """Tell the observer the parameters in force."""
         self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)

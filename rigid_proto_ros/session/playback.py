@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..messages.session_messages import PROJECTIONS
-from ..scene.offline import tell_start
+from ..scene.offline import notify_start
 from ..scene.scenario import Scenario
 from ..simulation.observer import BodySnapshot, Observer
 from ..simulation.simulation import Simulation
@@ -33,7 +33,7 @@ def play(
         _play_states(session, observer, given)
         return
     again = resimulation(session, observer)
-    tell_start(observer, again.scenario)
+    notify_start(observer, again.scenario)
     again.simulation.announce()
     again.begin_ghost()
     for count, (time_ns, row) in enumerate(sorted_states(session)):
@@ -44,7 +44,7 @@ def play(
             # A command that can't have been taken: from here on what was recorded is all there is.
             computed = row
         observer.state(time_ns, computed if _published_alike(session, computed, row) else row)
-        again.simulation.tell_status()
+        again.simulation.notify_status()
         if again.ghost is not None:
             again.ghost.advance(time_ns)
 
@@ -68,7 +68,7 @@ def _published_alike(session: RecordedSession, computed: np.ndarray, row: np.nda
 def _play_states(session: RecordedSession, observer: Observer, given: Scenario | None) -> None:
     if given is None:
         raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
-    tell_start(observer, given)
+    notify_start(observer, given)
     observer.body_changed(0, _snapshot(given))
     for time_ns, row in sorted_states(session):
         observer.state(time_ns, row)

@@ -116,10 +116,10 @@ class Resimulation(ScenarioRun):
         else:
             if isinstance(command, Change):
                 self._changes_ns = time_ns
-            # What acts under a change of its own instant can't be judged before that acts.
-            judged = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
+            # What acts under a change of its own instant can't be checked before that acts.
+            checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
             # What acted at one instant acts in the order of the log, whatever rule made it.
-            self.simulation.submit(command, time_ns, (b"", number), judged)
+            self.simulation.submit(command, time_ns, (b"", number), checked)
 
     def _command(self, kind: str, content: dict, number: int) -> Command | None:
         frames = frame_names(self.scenario.parameters, self.node_name)

@@ -8,23 +8,17 @@ commands are constant and an integrator advances the body. ``advance`` is the wh
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
 from heapq import heappop, heappush
 from typing import Protocol
 
 from ..base.errors import CommandRefused, InputError
 from ..base.rotation import cross, times
 from ..motion.integrators import check_supported
-from ..motion.integrators.integrator import (
-    ANGULAR_DAMPING,
-    MAX_SPEED,
-    NO_GYROSCOPIC_TERM,
-    STRING,
-    needs_of_load,
-)
-from ..motion.loads import Load, light_row, load_of_bytes, settle
+from ..motion.integrators.integrator import MAX_SPEED, STRING
+from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
 from . import flight as fl
+from .checks import check_command, check_load_supported, check_thrust, load_row, needs_of
 from .commands import (
     Change,
     ClearWrench,
@@ -47,7 +41,7 @@ from .observer import BodySnapshot, Observer
 from .readings import Readings
 from .setup import Setup
 from .string_control import StringControl
-from .thrusters import ThrusterControl, check_forces
+from .thrusters import ThrusterControl
 
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
@@ -97,7 +91,7 @@ class Simulation(Readings):
         """Tell the observer about the body as it is now."""
         self._notifier.body(self)
 
-    def tell_status(self, paused: bool = False) -> None:
+    def notify_status(self, paused: bool = False) -> None:
         """Tell the observer what the body is doing, where that changed since it was last told."""
         self._notifier.status(self, paused)
 
@@ -119,16 +113,16 @@ class Simulation(Readings):
         command: Command,
         at_ns: int | None = None,
         listed: Listed | None = None,
-        judged: tuple[bytes, Setup] | None = None,
+        checked: tuple[bytes, Setup] | None = None,
     ) -> int:
         """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
 
-        listed: its place, when it is an entry of a list. judged: what ``judge`` gave, and the setup that it was given,
-        where that isn't the present one: a change before it in its list may allow what the present setup doesn't.
-        Raises CommandRefused for what can be judged now; what can't (a ray) is judged when it acts, and counted.
+        listed: its place, when it is an entry of a list. checked: what ``check_command`` gave, and the setup that it
+        was given, where that isn't the present one: a change before it in its list may allow what that doesn't.
+        Raises CommandRefused for what can be checked now; what can't (a ray) is checked when it acts, and counted.
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
-        row, setup = (judge(command, self.setup), self.setup) if judged is None else judged
+        row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
         pending = Pending(when_ns, command, listed)
         if row and isinstance(command, WrenchCommand):
             pending.settle(command, row, setup)
@@ -159,7 +153,7 @@ class Simulation(Readings):
         stay.
         """
         self._arrays.end_all()
-        self._tell([])
+        self._notify([])
         self.observer.reset()
         self.events.reset()
         replaced = setup is not None and setup is not self.setup
@@ -233,12 +227,12 @@ class Simulation(Readings):
                 self._push(pending)
             del due[waiting:]
         if due or self._notifier.wants_loads or arrays.integers[fl.TIMEOUTS]:
-            self._tell(due)
+            self._notify(due)
         self.time_ns = until_ns if reached else arrays.time_ns
         self.state = State(self.time_ns, arrays.row.copy())
         return reached
 
-    def _tell(self, due: list[Pending]) -> None:
+    def _notify(self, due: list[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier = self.observer, self._notifier
         heard = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
@@ -280,7 +274,7 @@ class Simulation(Readings):
         """Everything that ends or begins now; a new segment if anything did."""
         arrays, now_ns = self._arrays, self.time_ns
         changed = arrays.end_due()
-        self._tell([])
+        self._notify([])
         changed |= self._string.end_due(now_ns)
         if self.thrusters.due_ns <= now_ns:
             loads, timed_out = self.thrusters.end_due(now_ns, self.setup.wrench_timeout_ns)
@@ -308,10 +302,10 @@ class Simulation(Readings):
         command = pending.command
         if isinstance(command, WrenchCommand | ClearWrench):
             if isinstance(command, WrenchCommand) and not self._still_holds(pending, command):
-                pending.settle(command, _settled(command, self.setup, self.state), self.setup)
+                pending.settle(command, load_row(command, self.setup, self.state), self.setup)
             self._arrays.put([pending])
             self._arrays.apply()
-            self._tell([pending])
+            self._notify([pending])
             if isinstance(command, ClearWrench):
                 self.thrusters.clear()
             self.state = self._arrays.state
@@ -361,7 +355,7 @@ class Simulation(Readings):
         load = load_of_bytes(pending.row)
         if before.body is not setup.body:
             load.check_magnitude(setup.body)
-        _check_load_supported(command, load, setup)
+        check_load_supported(command, load, setup)
         pending.settled_for = setup
         return True
 
@@ -404,57 +398,3 @@ class Simulation(Readings):
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
         self._arrays.finish_segment()
         return self.state
-
-
-def judge(command: Command, setup: Setup) -> bytes:
-    """The row of a command's load, empty for what is none or can't be settled before it acts; raises CommandRefused for
-    what a body of this setup can't take.
-    """
-    if isinstance(command, WrenchCommand):
-        row = _settled(command, setup, None)
-        return b"" if command.frame.point[0] == "ray" else row
-    if isinstance(command, MoveString):
-        check_supported(setup.integrator, frozenset({STRING}))
-    if isinstance(command, ThrusterCommand):
-        check_thrust(command.forces, setup)
-    return b""
-
-
-def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
-    """Raises CommandRefused for forces of thrusters that body or integrator can't take."""
-    check_forces(setup.thrusters, forces, setup.body)
-    for thruster in setup.thrusters.values():
-        check_supported(setup.integrator, needs_of_load(thruster.load(1.0)))
-
-
-def _settled(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
-    """The row of the load, which body and integrator can take."""
-    frame, force, torque = command.frame, command.force, command.torque
-    if setup.integrator.supports_loads or frame.impulse:
-        row = light_row(frame, force, torque, setup.light_amount)
-        if row:
-            return row
-    load = settle(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
-    load.check_magnitude(setup.body)
-    _check_load_supported(command, load, setup)
-    return load.packed
-
-
-def _check_load_supported(command: WrenchCommand, load: Load, setup: Setup) -> None:
-    # An impulse acts at once: the integrator never sees it.
-    if not (setup.integrator.supports_loads or command.frame.impulse):
-        check_supported(setup.integrator, needs_of_load(load))
-
-
-def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
-    """What the scene asks of its integrator."""
-    needs: set[str] = set()
-    for load in loads:
-        needs |= needs_of_load(load)
-    if not setup.gyroscopic:
-        needs.add(NO_GYROSCOPIC_TERM)
-    if setup.angular_damping:
-        needs.add(ANGULAR_DAMPING)
-    if tied:
-        needs.add(STRING)
-    return frozenset(needs)

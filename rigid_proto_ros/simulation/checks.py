@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""What a setup's body and integrator can take: commands are refused before they act where that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..motion.integrators import check_supported
+from ..motion.integrators.integrator import (
+    ANGULAR_DAMPING,
+    NO_GYROSCOPIC_TERM,
+    STRING,
+    needs_of_load,
+)
+from ..motion.loads import Load, light_row, settle
+from ..motion.state import State
+from .commands import Command, MoveString, ThrusterCommand, WrenchCommand
+from .setup import Setup
+from .thrusters import check_forces
+
+
+def check_command(command: Command, setup: Setup) -> bytes:
+    """The row of a command's load, empty for what is none or is found only when it acts; raises CommandRefused for
+    what a body of this setup can't take.
+    """
+    if isinstance(command, WrenchCommand):
+        row = load_row(command, setup, None)
+        return b"" if command.frame.point[0] == "ray" else row
+    if isinstance(command, MoveString):
+        check_supported(setup.integrator, frozenset({STRING}))
+    if isinstance(command, ThrusterCommand):
+        check_thrust(command.forces, setup)
+    return b""
+
+
+def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
+    """Raises CommandRefused for forces of thrusters that body or integrator can't take."""
+    check_forces(setup.thrusters, forces, setup.body)
+    for thruster in setup.thrusters.values():
+        check_supported(setup.integrator, needs_of_load(thruster.load(1.0)))
+
+
+def load_row(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
+    """The row of the command's load; raises CommandRefused where body or integrator can't take it."""
+    frame, force, torque = command.frame, command.force, command.torque
+    if setup.integrator.supports_loads or frame.impulse:
+        row = light_row(frame, force, torque, setup.light_amount)
+        if row:
+            return row
+    load = settle(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
+    load.check_magnitude(setup.body)
+    check_load_supported(command, load, setup)
+    return load.packed
+
+
+def check_load_supported(command: WrenchCommand, load: Load, setup: Setup) -> None:
+    """Raises CommandRefused (``integrator``) where the setup's integrator doesn't support the command's load."""
+    # An impulse acts at once: the integrator never sees it.
+    if not (setup.integrator.supports_loads or command.frame.impulse):
+        check_supported(setup.integrator, needs_of_load(load))
+
+
+def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
+    """What the scene asks of its integrator."""
+    needs: set[str] = set()
+    for load in loads:
+        needs |= needs_of_load(load)
+    if not setup.gyroscopic:
+        needs.add(NO_GYROSCOPIC_TERM)
+    if setup.angular_damping:
+        needs.add(ANGULAR_DAMPING)
+    if tied:
+        needs.add(STRING)
+    return frozenset(needs)
