@@ -200,3 +200,15 @@ def test_a_library_that_is_missing_is_named_with_the_extra_that_brings_it(tmp_pa
     monkeypatch.setitem(sys.modules, "pygltflib", None)
     assert main(["simulate", "book", "--gltf", str(Path(tmp_path) / "a.glb")]) == 2
     assert "pip install 'rigid_proto_ros[export]'" in capsys.readouterr().err
+
+
+def test_in_the_lesson_the_ghost_with_the_boxs_centre_turns_about_a_point_2_4_cm_off(tmp_path):
+    file = tmp_path / "two.glb"
+    settings = ["--set", "inertia_model_com=model", "--duration", "1"]
+    assert main(["simulate", "true_or_box_tensor", *settings, "--gltf", str(file), "--with", "ghost"]) == 0
+    nodes = {node["name"]: node for node in Player(file).document["nodes"]}
+    true, box = (np.array(nodes[name]["extras"]["center_of_mass"]) for name in ("body", "ghost"))
+    assert np.linalg.norm(true - box) == pytest.approx(0.024, abs=5e-4)
+    offset = np.array(nodes["body mesh"]["translation"]) - nodes["ghost mesh"]["translation"]
+    assert np.allclose(offset, box - true)
+    assert nodes["ghost"]["extras"]["inertia_model"] == "bounding_box"
