@@ -92,9 +92,23 @@ def _share_anew(at: int) -> int:
     return 0
 
 
+@njit(cache=True, error_model="numpy")
+def _apply_at(at: int) -> int:
+    f, n, times, loads, events, _ = _arrays(at)
+    n[fl.EVENTS], n[fl.TIMEOUTS] = 0, 0
+    while n[fl.DUE] < n[fl.DUE_END]:
+        fl.apply(f, n, times, loads, events, n[fl.DUE])
+        n[fl.DUE] += 1
+    return 0
+
+
 @functools.cache
-def _entries() -> tuple[Callable, Callable]:
-    return entry_of(_fly_at, int64(int64, int64)), entry_of(_begin_at, int64(int64))
+def _entries() -> tuple[Callable, Callable, Callable]:
+    return (
+        entry_of(_fly_at, int64(int64, int64)),
+        entry_of(_begin_at, int64(int64)),
+        entry_of(_apply_at, int64(int64)),
+    )
 
 
 class FlightArrays:
@@ -104,7 +118,7 @@ class FlightArrays:
 
     def __init__(self, setup: Setup) -> None:
         self.first_due = 0
-        self._fly, self._begin = _entries()
+        self._fly, self._begin, self._apply = _entries()
         start = setup.flight_start
         self._make_room(start.room)
         self._make_tables(FIRST_ROWS)
@@ -181,11 +195,8 @@ class FlightArrays:
         return came == fl.REACHED
 
     def apply(self) -> None:
-        """Apply the command due next, at the time of the flight."""
-        n = self.n
-        n[fl.EVENTS], n[fl.TIMEOUTS] = 0, 0
-        fl.apply(self.f, n, self.times, self.loads, self.events, int(n[fl.DUE]))
-        n[fl.DUE] += 1
+        """Apply the commands put last, at the time of the flight."""
+        self._apply(self._at)
 
     def end_due(self) -> bool:
         """End what ends at the time of the flight; whether anything did."""

@@ -330,17 +330,21 @@ class Simulation(Readings):
     def _thrust(self, loads: list[tuple[int, Load]]) -> None:
         """Let thrusters, by number, push like this until they are told otherwise."""
         arrays = self._arrays
+        rows = []
         for number, load in loads:
             kind = fl.HELD_WRENCH if load.is_zero else fl.PULSE
             row = Pending(self.time_ns, ClearWrench(), kind=kind, duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
             row.slot = -1 - number
-            arrays.put([row])
-            arrays.apply()
-            for now_ns, what, load_id, _ in arrays.last_events():
-                if what == fl.ENDED:
-                    self.observer.load_ended(now_ns, load_id)
-                elif what == fl.BEGAN:
-                    self._notifier.load_began(self, load_id, "thruster", load)
+            rows.append(row)
+        arrays.put(rows)
+        arrays.apply()
+        if not self._notifier.wants_loads:
+            return
+        for now_ns, what, load_id, row_number in arrays.last_events():
+            if what == fl.ENDED:
+                self.observer.load_ended(now_ns, load_id)
+            elif what == fl.BEGAN:
+                self._notifier.load_began(self, load_id, "thruster", loads[row_number - arrays.first_due][1])
 
     def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
         """Whether the load settled at submission holds now: it doesn't if it was a ray, or the mesh has changed since.

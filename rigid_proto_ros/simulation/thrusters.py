@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 from ..base.errors import CommandRefused, InputError
@@ -107,6 +108,7 @@ class _Working:
         self.value, self.since_ns = self.target + (self.value - self.target) * decay, now_ns
 
 
+@lru_cache(maxsize=64)
 def _mean_of_decay(x: float) -> float:
     """(1 − exp(−x))/x for 0 <= x <= 1/STAIRS, by its series: the same bits everywhere."""
     value = 1.0

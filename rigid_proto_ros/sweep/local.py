@@ -44,7 +44,7 @@ def local_chunks(
     study: Study, parts: Parts, todo: Iterable[int], workers: int
 ) -> Generator[tuple[int, Chunk], None, None]:
     """Chunks as they get done, a few ahead of whoever takes them."""
-    pool = _threads(workers) if goes_in_batches(study) else _processes(workers)
+    pool = _threads(workers) if goes_in_batches(study) else in_processes(workers)
     pending: dict[Future, int] = {}
     waiting = iter(todo)
     try:
@@ -64,7 +64,8 @@ def _threads(workers: int) -> Executor:
     return ThreadPoolExecutor(workers, thread_name_prefix="sweep")
 
 
-def _processes(workers: int) -> Executor:
+def in_processes(workers: int) -> Executor:
+    """Processes that end with this one."""
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(workers, mp_context=context, initializer=_depend_on_the_parent)
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Flights from Python, without ROS: load a scene, command, step, sample, record, and many of them on all cores.
+
+    scene = load_scene("t_handle", {"publish_rate": 50.0})
+    with Flight(scene, record="out/flight.mcap") as flight:
+        while flight.sample().time_ns < 2_000_000_000:
+            flight.command({"wrench": {"axes": "body", "torque": torque(flight.sample())}})
+            flight.step(0.02)
+
+Commands are entries of a poke script without their ``t``, and the motion is the one that the node flies: a recording
+replays to the bit. docs/python.md tunes a controller over 10,000 flights.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+from ..base.errors import CommandRefused, InputError
+from ..motion.state import State
+from ..scene.command_codec import core_command
+from ..scene.offline import OfflineRun, read_scene
+from ..scene.scenario import Scenario, nanoseconds
+from ..scene.script import expand_script, with_contacts
+from ..simulation.observer import Observer
+from .local import cores, in_processes
+
+Scene = Scenario
+"""A checked scene. It can be flown any number of times, and goes to other processes."""
+
+Value = TypeVar("Value")
+Result = TypeVar("Result")
+
+
+def load_scene(name: str, settings: Mapping[str, object] | None = None) -> Scene:
+    """A scene file by path or bundled name, parameters on top as ``{"gravity": [0, 0, -9.81]}``; raises InputError."""
+    return read_scene(name, settings, lambda warning: print(warning, file=sys.stderr))
+
+
+class Flight:
+    """One body in flight, from time 0. record: an .mcap file for all states and commands; close the flight then, as the
+    ``with`` statement does. observer: whoever else is told (simulation/observer.py).
+    """
+
+    def __init__(self, scene: Scene, record: str | Path = "", observer: Observer | None = None) -> None:
+        if record:
+            if observer is not None:
+                raise InputError("record", str(record), "a file or an observer, not both")
+            from ..session.mcap_observer import McapObserver
+
+            observer = McapObserver(record, parameters=scene.parameters, simulated_log=True)
+        self._observer = observer
+        self._run = OfflineRun(scene, [], observer)
+        self._commands = 0
+
+    def __enter__(self) -> Flight:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def command(self, entry: Mapping[str, object]) -> None:
+        """Let an entry of a poke script act now, after those given before; with ``t`` at that time [s, simulated] or
+        later. Raises InputError for one that can't be taken.
+        """
+        simulation, scene = self._run.simulation, self._run.scenario
+        # Counted from now, in whole nanoseconds; seconds don't hold them all.
+        start_ns = 0 if "t" in entry else simulation.time_ns
+        commands = expand_script([{"t": 0.0, **entry}], "command", scene.parameters.wrench_timeout)
+        for command in with_contacts(commands, scene.setup.contacts):
+            time_ns = start_ns + command.t_ns
+            core = core_command(command, time_ns, scene.setup.contacts, self._run.change, message=b"")
+            simulation.submit(core, time_ns, (b"", self._commands))
+            self._commands += 1
+
+    def step(self, seconds: float) -> State:
+        """Simulate so long, and return the state at the end. Raises InputError when the motion fails, or a command is
+        refused as it comes to act.
+        """
+        simulation = self._run.simulation
+        refused = simulation.refused.total()
+        if not self._run.advance(simulation.time_ns + nanoseconds(seconds)):
+            raise InputError("step", simulation.failure)
+        if simulation.refused.total() > refused:
+            counts = ", ".join(f"{count} {reason}" for reason, count in simulation.refused.items())
+            raise CommandRefused("schedule", "command", f"refused when it came to act ({counts})")
+        return simulation.state
+
+    def sample(self) -> State:
+        """The state now: time_ns, position, orientation_xyzw, linear_velocity, angular_velocity, angular_velocity_body;
+        before what was commanded at this very time has acted.
+        """
+        return self._run.simulation.state
+
+    def close(self) -> None:
+        """Finish the recording."""
+        if self._observer is not None:
+            self._observer.close()
+
+
+def fly_all(function: Callable[[Value], Result], values: Iterable[Value], workers: int = 0) -> Iterator[Result]:
+    """``function`` of each value, in their order, on all cores or so many: by the processes in which sweeps fly what
+    the compiled batch can't. function: one that other processes can import.
+    """
+    values = list(values)
+    workers = workers or cores()
+    with in_processes(workers) as pool:
+        yield from pool.map(function, values, chunksize=max(1, min(32, len(values) // (4 * workers))))

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""Flights from Python: commanded, stepped and recorded as scripts and the node do it, one by one and on all cores."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene
+
+EXAMPLE = Path(__file__).parents[2] / "msg_examples" / "tune_controller.py"
+SCRIPT = [
+    {"t": 0.0, "at": "tip", "push": 0.05, "duration": 0.2},
+    {"t": 0.1, "wrench": {"torque": [0.0, 0.0, 1e-4], "duration": 0.3, "slot": "wheel"}},
+    {"t": 0.1, "impulse": [0.001, 0.0, 0.0]},
+    {"t": 0.25, "set": {"gravity": [0.0, 0.0, -1.0]}},
+    {"t": 0.3, "thrusters": [0.05, 0.0, 0.02, 0.0]},
+    {"t": 0.4, "state": {"position": [1.0, 0.0, 0.0]}},
+]
+
+
+def test_commands_by_hand_fly_as_a_script_does_and_the_recording_verifies(tmp_path) -> None:
+    pytest.importorskip("mcap")
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.check import verify
+
+    scene = load_scene("t_handle")
+    with Flight(scene, record=tmp_path / "flight.mcap") as flight:
+        for entry in SCRIPT:
+            flight.step(entry["t"] - flight.sample().time_ns * 1e-9)
+            flight.command({key: value for key, value in entry.items() if key != "t"})
+        reached = flight.step(0.2)
+    run = OfflineRun(scene, parse_script(str(SCRIPT)))
+    run.advance(reached.time_ns)
+    assert run.simulation.state.row.tobytes() == reached.row.tobytes()
+    (session,) = read_runs(tmp_path / "flight.mcap")
+    assert verify(session) is None and len(session.events) == 7  # the held torque is ended by a command
+
+
+def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_step() -> None:
+    flight = Flight(load_scene("t_handle"))
+    with pytest.raises(InputError, match="there is no key frce"):
+        flight.command({"frce": [0, 0, 1]})
+    with pytest.raises(InputError, match="4 numbers, one a thruster"):
+        flight.command({"thrusters": [1.0]})
+    flight.command({"at": {"ray": {"origin": [9, 9, 9], "direction": [1, 0, 0]}}, "force": [1, 0, 0]})
+    with pytest.raises(InputError, match="1 ray_miss"):
+        flight.step(0.1)
+
+
+def final_height(spin: float) -> float:
+    flight = Flight(load_scene("t_handle", {"gravity": [0, 0, -9.81], "initial.linear_velocity": [0, 0, spin]}))
+    return float(flight.step(1.0).position[2])
+
+
+def test_many_flights_come_back_in_the_order_of_their_values() -> None:
+    heights = list(fly_all(final_height, [float(k) for k in range(5)], workers=2))
+    assert heights == pytest.approx([k - 4.905 for k in range(5)])
+
+
+def test_the_example_tunes_a_controller() -> None:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE), "--side", "2", "--starts", "1"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": str(EXAMPLE.parents[1])},
+    )
+    assert "4 flights of 2 s" in done.stdout and "best: stiffness" in done.stdout
