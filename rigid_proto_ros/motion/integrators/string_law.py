@@ -34,7 +34,8 @@ from .motion_series import (
     stretch_at,
 )
 
-SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
+SLACK, PULLS, SHORTENS, PASSES = 0.0, 1.0, 2.0, 3.0
+"""PASSES: of a step past the free end of a string that pushes at no length (integrators/passage.py)."""
 
 _AGREEMENT = 0.03
 _AGREEMENT_SLACK = 1e-3
