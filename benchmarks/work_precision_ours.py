@@ -125,29 +125,31 @@ def prepare_simulation(problem: Problem, step: float, integrator: str) -> Run | 
     """The whole simulation; ``step`` is the accuracy for an adaptive integrator."""
     adaptive = integrator in ADAPTIVE
     arguments = (1e-3, step) if adaptive else (step, 1e-9)
-    now = {"simulation": simulation_of(problem, integrator, *arguments)}
-    if now["simulation"] is None:
+    simulation = simulation_of(problem, integrator, *arguments)
+    if simulation is None:
         return None
     begin = time.perf_counter()
-    now["simulation"].advance(round(min(problem.duration, 10 * arguments[0]) * 1e9))
+    simulation.advance(round(min(problem.duration, 10 * arguments[0]) * 1e9))
     compile_s = time.perf_counter() - begin
 
     def restart():
-        now["simulation"] = simulation_of(problem, integrator, *arguments)
+        # The same object from its start, as a peer's integrator is set back.
+        simulation.reset()
+        submit(simulation, problem.wrenches)
+        simulation.advance(0)
 
     def advance(until: float):
-        now["simulation"].advance(round(until * 1e9))
+        simulation.advance(round(until * 1e9))
 
     def row():
-        simulation = now["simulation"]
         if simulation.failure or simulation.refused:
             return np.full(13, np.nan)
         return simulation.state.row.copy()
 
     restart()
-    if now["simulation"].refused:
+    if simulation.refused:
         return None
-    return Run(restart, advance, row, lambda: now["simulation"].steps, compile_s)
+    return Run(restart, advance, row, lambda: simulation.steps, compile_s)
 
 
 def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None:
