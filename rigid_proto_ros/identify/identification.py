@@ -58,9 +58,12 @@ def identify(
     compared = []
     if candidates:
         compared = compare(flights, estimate, candidates, fit, visibility.told(len(unknowns.theta_columns)))
-    return Identification(
-        flights, estimate, visibility, check_residuals(flights, estimate), compared, _assumed(flights, known, fit)
+    given = {"mass": known.mass is not None or known.theta is not None}
+    guessed = frozenset(
+        name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.theta is not None)
     )
+    checks = check_residuals(flights, estimate)
+    return Identification(flights, estimate, visibility, checks, compared, _assumed(flights, known, fit), guessed)
 
 
 def _first_guess(known: Known) -> np.ndarray:

@@ -35,6 +35,8 @@ class Identification:
     checks: Sequence[ResidualCheck]
     compared: Sequence[Judged]
     assumed: Sequence[str]
+    guessed: frozenset[str] = frozenset()
+    """Of ``mass``, ``com`` and ``inertia`` what was neither asked for nor given: it has no number."""
 
     @property
     def hidden(self) -> list[Hidden]:
@@ -58,12 +60,12 @@ class Identification:
     @property
     def mass(self) -> Quantity:
         """[kg]."""
-        return self._of(lambda body: body.mass)
+        return Quantity(None, None) if "mass" in self.guessed else self._of(lambda body: body.mass)
 
     @property
     def center_of_mass(self) -> list[Quantity]:
         """[m, tracked frame]."""
-        return self._each(lambda body: body.center_of_mass, 3)
+        return self._each(lambda body: body.center_of_mass, 3, "com")
 
     @property
     def inertia(self) -> list[Quantity]:
@@ -93,7 +95,10 @@ class Identification:
     def _of(self, read: Callable[[mp.MassEstimate], float]) -> Quantity:
         return self.visibility.quantity(lambda values: read(values.body))
 
-    def _each(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int) -> list[Quantity]:
+    def _each(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int, group: str) -> list[Quantity]:
+        if group in self.guessed:
+            return [Quantity(None, None)] * count
+
         def one(k: int) -> Quantity:
             return self._of(lambda body: float(read(body)[k]))
 
@@ -101,7 +106,7 @@ class Identification:
 
     def _whole(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int) -> list[Quantity]:
         """All of them or none: an entry that happens to be 0 has the size of the others."""
-        found = self._each(read, count)
+        found = self._each(read, count, "inertia")
         return found if all(one.value is not None for one in found) else [Quantity(None, None)] * count
 
     @property

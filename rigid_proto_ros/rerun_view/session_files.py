@@ -51,12 +51,16 @@ def repair(path: str | Path, repaired: str | Path) -> None:
     files = bags.bag_files(path)
     if len(files) > 1:
         raise InputError("--repair", f"the bag has {len(files)} files; name one of them")
+    if bags.is_sqlite(files[0]):
+        raise InputError("--repair", str(files[0]), "an .mcap or .rrd file; SQLite repairs its own")
     bags.repair_mcap(bags.bag_bytes(files[0]), repaired, str(files[0]))
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is to be read as a bag: a folder, or a file that begins as an MCAP file does, or is named so."""
-    if path.is_dir() or ".mcap" in path.suffixes:
+    """Whether a path is to be read as a bag: a folder, or a file that begins as an MCAP file does, or is named so or
+    .db3.
+    """
+    if path.is_dir() or ".mcap" in path.suffixes or path.suffix == ".db3":
         return True
     try:
         with open(path, "rb") as stream:

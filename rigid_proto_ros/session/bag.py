@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Bags of ``ros2 bag record``: a folder with metadata.yaml, or a bare .mcap, whole or split, compressed or not."""
+"""Bags of ``ros2 bag record``: a folder with metadata.yaml, or a bare .mcap, whole or split, compressed or not, or the
+.db3 files of rosbag2's sqlite3 storage.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +18,7 @@ from .mcap_reading import (
     read_mcap,
     repair_mcap,
 )
+from .sqlite_reading import is_sqlite, read_sqlite
 
 __all__ = ["bag_bytes", "bag_files", "read_bag", "repair_mcap"]
 
@@ -26,7 +29,7 @@ def read_bag(path: Path, wanted: Callable[[str], bool]) -> McapContent:
     """All that is whole in a bag, of the topics that are ``wanted``; raises InputError."""
     whole = McapContent(complete=True)
     for file in bag_files(path):
-        part = read_mcap(bag_bytes(file), str(file), wanted)
+        part = read_sqlite(file, wanted) if is_sqlite(file) else read_mcap(bag_bytes(file), str(file), wanted)
         for topic, messages in part.messages.items():
             plain = [(log_time, _plain(data, topic)) for log_time, data in messages]
             whole.messages.setdefault(topic, []).extend(plain)
@@ -49,10 +52,10 @@ def bag_files(path: Path) -> list[Path]:
         found = [next((f for f in (path / n, path / f"{n}.zstd") if f.is_file()), path / n) for n in names]
     else:
         # metadata.yaml is written at the end: a bag whose recorder was killed has none.
-        found = [f for f in path.iterdir() if ".mcap" in f.suffixes]
+        found = [f for f in path.iterdir() if ".mcap" in f.suffixes or f.suffix == ".db3"]
         found.sort(key=lambda f: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", f.name)])
     if not found:
-        raise InputError("session", str(path), "a folder that ros2 bag record -s mcap wrote, with .mcap files in it")
+        raise InputError("session", str(path), "a folder that ros2 bag record wrote, with .mcap or .db3 files in it")
     return found
 
 
@@ -79,8 +82,10 @@ def _listed(metadata: Path) -> list[str]:
         names = [str(name) for name in names]
     except (KeyError, TypeError):
         raise InputError(str(metadata), "not readable as the metadata that rosbag2 writes") from None
-    if storage != "mcap":
-        raise InputError("storage", storage, "mcap; ros2 bag convert makes one of another storage")
+    if storage not in ("mcap", "sqlite3"):
+        raise InputError("storage", storage, "mcap or sqlite3; ros2 bag convert makes one of another")
+    if storage == "sqlite3" and compression:
+        raise InputError("compression_format", compression, "none, for sqlite3; ros2 bag convert makes such a bag")
     if compression not in ("", "zstd", None):
         raise InputError("compression_format", compression, "zstd, or none")
     return names

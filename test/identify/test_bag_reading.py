@@ -15,6 +15,7 @@ from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify.bag_reading import Choice, bag_flight, given_offsets
 from rigid_proto_ros.identify.identification import identify
 from rigid_proto_ros.identify.report import Identification
+from rigid_proto_ros.rerun_view.session_files import is_bag
 
 INERTIA = np.diag([2.0, 3.0, 4.0]) * 1e-3
 COM = (0.01, -0.02, 0.03)
@@ -131,6 +132,43 @@ def _poses(tmp_path: Path, count: int = 50, topic: str = "/pose", shift_s: float
         for t, p, q in zip(series[0].times_ns, series[0].values, series[1].values, strict=True)
     ]
     return fb.write(tmp_path / "bag.mcap", {topic: ("geometry_msgs/msg/PoseStamped", messages), **others})
+
+
+@pytest.mark.parametrize(
+    "folder_of",
+    [fb.as_mcap_folder, fb.as_sqlite_folder, lambda bag, folder: fb.as_sqlite_folder(bag, folder, files=3)],
+    ids=["mcap", "sqlite3", "sqlite3 split"],
+)
+def test_a_folder_of_rosbag2_says_what_the_bare_file_does(tmp_path: Path, folder_of) -> None:
+    bag = _poses(tmp_path)
+    bare, folder = bag_flight(bag, Choice()), bag_flight(folder_of(bag, tmp_path / "flown"), Choice())
+    assert [one.name for one in folder.series] == [one.name for one in bare.series]
+    for one, other in zip(folder.series, bare.series, strict=True):
+        assert np.array_equal(one.times_ns, other.times_ns)
+        assert np.array_equal(one.values, other.values)
+
+
+def test_a_bare_db3_file_is_a_bag_and_a_broken_one_is_refused(tmp_path: Path) -> None:
+    [file] = fb.as_sqlite_folder(_poses(tmp_path), tmp_path / "flown").glob("*.db3")
+    assert is_bag(file)
+    assert len(bag_flight(file, Choice()).series[0].times_ns) == 50
+    file.write_bytes(file.read_bytes()[:3000])
+    with pytest.raises(InputError, match="sqlite3 storage"):
+        bag_flight(file, Choice())
+
+
+def test_transforms_without_a_tree_are_poses(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    series = mf.mocap(_truth(), mf.tumbling(), rng, 0.5).series
+    messages = [
+        (t, fb.transform(t, p, q, "map", "drone"))
+        for t, p, q in zip(series[0].times_ns, series[0].values, series[1].values, strict=True)
+    ]
+    name = "geometry_msgs/msg/TransformStamped"
+    bag = fb.write(tmp_path / "vicon.mcap", {"/vicon/drone": (name, messages)})
+    found = bag_flight(bag, Choice())
+    assert [one.kind for one in found.series] == ["position", "attitude"]
+    assert np.array_equal(found.series[0].values, series[0].values)
 
 
 def test_a_bag_without_pose_or_rate_is_refused(tmp_path: Path) -> None:

@@ -55,6 +55,18 @@ def test_a_known_mass_fixes_the_mass_and_not_the_tensor_of_a_free_tumble() -> No
     assert _what(found) == {"size of the tensor"}
 
 
+def test_what_is_neither_asked_for_nor_given_is_no_number() -> None:
+    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
+    flight = mf.mocap(truth, mf.tumbling((0.4, 6.0, 0.3)), np.random.default_rng(1), 1.0)
+    found = identify([flight], fit=("com", "inertia"))
+    assert found.mass.value is None
+    assert all(one.value is not None for one in (*found.center_of_mass, *found.shape))
+    bare = identify([flight], fit=("gravity",))
+    assert all(one.value is None for one in (*bare.center_of_mass, *bare.inertia, *bare.shape, *bare.moments))
+    given = identify([flight], fit=("gravity",), known=Known(theta=truth.theta))
+    assert given.mass.value == pytest.approx(0.5)
+
+
 def test_a_known_poke_fixes_all() -> None:
     assert not _identified((0.4, 6.0, 0.3), mf.acting(POKE)).hidden
 

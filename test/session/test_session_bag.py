@@ -238,15 +238,15 @@ def test_a_changed_state_is_named(flown, mesh_beside, tmp_path, capsys):
 def test_what_is_no_bag_is_refused_in_one_line(flown, tmp_path, capsys):
     empty = tmp_path / "empty"
     empty.mkdir()
-    sqlite = LAYOUTS["folder"](tmp_path / "sqlite", flown)
-    metadata = Path(sqlite) / "metadata.yaml"
-    metadata.write_text(metadata.read_text().replace("storage_identifier: mcap", "storage_identifier: sqlite3"))
+    unknown = LAYOUTS["folder"](tmp_path / "unknown", flown)
+    metadata = Path(unknown) / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("storage_identifier: mcap", "storage_identifier: tape"))
     other = tmp_path / "other.mcap"
     write_bag_file(other, [Logged("/chatter", "std_msgs/msg/String", 1, cdr.string("hello"))])
     garbled = tmp_path / "garbled.mcap"
     bad = [replace(m, data=b"\x00\x01") if m.topic.endswith("pose") else m for m in flown]
     write_bag_file(garbled, bad)
-    for path, word in ((empty, "ros2 bag record"), (sqlite, "sqlite3"), (other, "/chatter"), (garbled, "pose")):
+    for path, word in ((empty, "ros2 bag record"), (unknown, "tape"), (other, "/chatter"), (garbled, "pose")):
         status, _, err = _command(capsys, path)
         assert status == 2 and word in err and len(err.splitlines()) == 1, err
 
