@@ -249,15 +249,15 @@ def _expand_string(entry: Any, t_ns: int, where: str) -> list[ScriptCommand]:
 
 def with_contacts(script: list[ScriptCommand], contacts: Mapping[str, Vector]) -> list[ScriptCommand]:
     """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
-    settled = []
+    resolved = []
     for command in script:
         if command.contact:
             if command.contact not in contacts:
                 known = ", ".join(sorted(contacts)) or "none"
                 raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
             command = replace(command, point=contacts[command.contact], contact="")
-        settled.append(command)
-    return settled
+        resolved.append(command)
+    return resolved
 
 
 def _wrench_fields(entry: dict, where: str) -> tuple[str, Vector, Vector]:

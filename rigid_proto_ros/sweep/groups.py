@@ -26,9 +26,9 @@ from .study import Study, Vary, script_entries
 from .templates import (
     FAST,
     TIMES,
+    LoadResolver,
     NotBatchable,
     Script,
-    Settler,
     checked_integrator,
     constants_of,
     script_of,
@@ -69,13 +69,13 @@ class Group:
         self.constants = constants_of(parameters, self.body_mesh)
         self.settings, self.times = settings_of(parameters), times_of(parameters)
         self.ballast = np.array(parameters.point_masses, dtype=float).reshape(-1, 4)
-        self.settler = Settler(parameters, self.body_mesh)
+        self.resolver = LoadResolver(parameters, self.body_mesh)
         self.overlay: Overlay | None = None
         timeout = parameters.wrench_timeout
         if fits(study):
-            self.overlay, loads = make_overlay(study, self.settler, timeout)
+            self.overlay, loads = make_overlay(study, self.resolver, timeout)
         else:
-            _, loads = script_of(expand_script(study.script, "script", timeout), self.settler)
+            _, loads = script_of(expand_script(study.script, "script", timeout), self.resolver)
         self.integrator = checked_integrator(parameters, loads)
 
     def variants(self, columns: list[np.ndarray], count: int) -> tuple[Variants, np.ndarray]:
@@ -129,7 +129,7 @@ class Group:
                 commands = expand_script(
                     self._script([c[i] for c in columns]), "script", self.parameters.wrench_timeout
                 )
-                script, loads = script_of(commands, self.settler)
+                script, loads = script_of(commands, self.resolver)
                 checked_integrator(self.parameters, loads)
                 scripts.append(script)
             except (NotBatchable, InputError, TypeError, AttributeError, KeyError):

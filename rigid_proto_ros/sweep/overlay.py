@@ -17,7 +17,7 @@ from ..scene.script import MAX_TIME_S, expand_script
 from ..simulation import flight as fl
 from .study import Study
 from .targets import Target
-from .templates import Script, Settler, script_of
+from .templates import LoadResolver, Script, script_of
 
 _VECTORS = {"force": ld.FORCE, "impulse": ld.FORCE, "torque": ld.TORQUE, "angular_impulse": ld.TORQUE}
 _TIMING = {"repeat", "every", "jitter", "seed"}
@@ -88,11 +88,11 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
     return good
 
 
-def make_overlay(study: Study, settler: Settler, wrench_timeout: float) -> tuple[Overlay, list]:
+def make_overlay(study: Study, resolver: LoadResolver, wrench_timeout: float) -> tuple[Overlay, list]:
     """The script ready for varied numbers, and the loads that the integrator has to support; raises
     NotBatchable, InputError.
     """
     commands = expand_script(study.script, "script", wrench_timeout)
     commands.sort(key=lambda command: command.entry)
-    script, loads = script_of(commands, settler)
+    script, loads = script_of(commands, resolver)
     return Overlay(script, commands), loads

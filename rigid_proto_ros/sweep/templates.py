@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What rows have in common, settled once: mesh constants, integrator, and the script as arrays for the
+"""What rows have in common, found once: mesh constants, integrator, and the script as arrays for the
 compiled batch.
 """
 
@@ -132,8 +132,8 @@ def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
     return integrator
 
 
-class Settler:
-    """Settles the frames of one mesh's commands, each once."""
+class LoadResolver:
+    """Resolves the frames of one mesh's commands, each once."""
 
     def __init__(self, parameters: Parameters, body_mesh: BodyMesh | None) -> None:
         self._contacts = dict(parameters.contacts)
@@ -141,7 +141,7 @@ class Settler:
         self._known: dict[str, tuple] = {}
 
     def frame(self, text: str) -> tuple[Frame, Load]:
-        """The frame, and a load of no force settled there; raises InputError, or NotBatchable for a ray."""
+        """The frame, and a load of no force that acts there; raises InputError, or NotBatchable for a ray."""
         if text not in self._known:
             frame = parse_frame(text, set(self._contacts))
             if frame.point[0] == "ray":
@@ -159,22 +159,22 @@ class Settler:
             return [command.t_ns, -1, fl.CLEAR, fl.NO_SLOT], np.zeros(LOAD), None
         if command.kind not in ("wrench", "poke"):
             raise NotBatchable
-        frame, settled = self.frame(command.frame_id)
+        frame, resolved = self.frame(command.frame_id)
         own = WrenchCommand(
             command.kind == "wrench", frame, command.force, command.torque, command.t_ns, command.frame_id, b""
         )
-        load = Load(settled.axes, settled.mesh_point, command.force, command.torque, settled.mesh_normal)
+        load = Load(resolved.axes, resolved.mesh_point, command.force, command.torque, resolved.mesh_normal)
         integers = [command.t_ns, own.duration_ns, own.flight_kind, own.slot]
         return integers, load.row, None if frame.impulse else load
 
 
-def script_of(commands: list[ScriptCommand], settler: Settler) -> tuple[Script, list[Load]]:
+def script_of(commands: list[ScriptCommand], resolver: LoadResolver) -> tuple[Script, list[Load]]:
     """Commands, in order of time, as arrays, and the loads that the integrator has to support; raises
     NotBatchable, InputError.
     """
     if len(commands) > MAX_COMMANDS:
         raise NotBatchable
-    ordered = [settler.numbers(command) for command in commands]
+    ordered = [resolver.numbers(command) for command in commands]
     integers = np.array([row for row, _, _ in ordered], np.int64).reshape(-1, fl.COMMAND)
     loads = np.array([row for _, row, _ in ordered]).reshape(-1, LOAD)
     return Script(integers, loads), [load for _, _, load in ordered if load is not None]
