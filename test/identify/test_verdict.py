@@ -57,7 +57,7 @@ def test_a_known_mass_fixes_the_mass_and_not_the_tensor_of_a_free_tumble() -> No
 
 def test_what_is_neither_asked_for_nor_given_is_no_number() -> None:
     truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
-    flight = mf.mocap(truth, mf.tumbling((0.4, 6.0, 0.3)), np.random.default_rng(1), 1.0)
+    flight = mf.mocap(truth, mf.tumbling((0.4, 6.0, 0.3)), np.random.default_rng(1), 3.0)
     found = identify([flight], fit=("com", "inertia"))
     assert found.mass.value is None
     assert all(one.value is not None for one in (*found.center_of_mass, *found.shape))
