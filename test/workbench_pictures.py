@@ -31,14 +31,15 @@ def main() -> None:
     args = parser.parse_args()
     with held_domain() as domain, tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        started_s = time.monotonic()
         bench = Bench(environment, Path(folder), any_free_port(), "t_handle")
         try:
             browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
             page = Page(browser, bench.address, SIZE)
+            if args.compare:
+                draw_comparison(page, args.compare, started_s)
             if args.picture:
                 draw_pull(page, args.picture)
-            if args.compare:
-                draw_comparison(page, args.compare)
             if args.lessons:
                 args.lessons.mkdir(parents=True, exist_ok=True)
                 for lesson in lessons():
@@ -50,31 +51,46 @@ def main() -> None:
             bench.process.end()
 
 
-def draw_comparison(page: Page, picture: Path) -> None:
-    """True tensor against box: what a user sees by three actions (start the workbench, open the page, click), counted here."""
-    began = time.monotonic()
+def draw_comparison(page: Page, picture: Path, started_s: float) -> None:
+    """True tensor against box: what a user sees by three actions (start the workbench, open the page, click), counted here
+    and timed from ``started_s`` [s, monotonic], when the workbench was started.
+    """
+    clicked_s = time.monotonic()
     actions = ["rigid_proto workbench", "open the page"]
     page.button(START)
     actions.append(f"click {START!r}")
-    before_s = page.readout[0]
-    found = page.until(lambda: re.search(r"(\d+)° apart", page.text), "the angle between body and ghost")
-    page.until(lambda: page.readout[0] < before_s, "a new beginning")
+    alike = r"Released alike[^*]*?([1-9]\d*)° apart"
+    found = page.until(lambda: re.search(alike, page.text), "the angle between body and ghost")
+    seen_s = time.monotonic()
     print(
-        f"{len(actions)} actions ({', '.join(actions)}), seen {time.monotonic() - began:.1f} s after the click: {found[0]}"
+        f"{len(actions)} actions ({', '.join(actions)}): {found[1]}° apart seen {seen_s - clicked_s:.1f} s after the click, "
+        f"{seen_s - started_s:.1f} s after the start of the workbench"
     )
     assert len(actions) <= 5
+    # Slow, so that a browser that draws late draws the moment that is asked for.
+    page.choose("Speed", "1/10")
+    page.page.evaluate("() => document.activeElement.blur()")  # keys typed into an input are text
+    page.page.keyboard.press("r")
+    page.until(lambda: page.readout[0] < 1.5, "the beginning again")
     page.until(lambda: page.readout[0] >= 2.0, "two seconds of flight")
+    page.page.keyboard.press("Space")
+    page.until(lambda: "The simulation is paused" in page.text, "a pause")
+    time.sleep(2.0)
     page.page.screenshot(path=picture)
+    page.page.keyboard.press("Space")
 
 
 def draw_pull(page: Page, picture: Path) -> None:
     """The T-handle a flip on, in the middle, pulled at by a string."""
+    page.choose("Lesson", "The T-handle that flips by itself")
+    page.until(lambda: "12 rad/s" in page.text, "the T-handle")
     time.sleep(6.0)
-    page.choose("Speed", "1/10")
+    page.choose("Speed", "1/100")
+    time.sleep(2.0)
     x, y = page.middle
     # Slow, so that the picture is taken before the body has followed and the string is long.
     page.drag(x, y, -150.0, -60.0, steps=2)
-    time.sleep(0.8)
+    time.sleep(3.0)
     # A browser draws moved nodes before lines that are made anew: at rest all is where it belongs.
     page.page.keyboard.press("Space")
     page.until(lambda: "The simulation is paused" in page.text, "a pause")
