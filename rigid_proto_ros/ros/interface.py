@@ -135,7 +135,11 @@ INTERFACES = (
     _topic(PUBLISHED, "/clock", "rosgraph_msgs/Clock", "simulated time", "publish_clock"),
     _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, where tf2_msgs is installed", "publish_tf"),
     _service("~/reset", "Trigger", "time 0 and the initial state; wrench, pulses and schedule are dropped"),
-    _service("~/pause", "SetBool", "true stops simulated time, false lets it run"),
+    _service(
+        "~/pause",
+        "SetBool",
+        "true stops simulated time; false lets it run, once lists sent meanwhile are read and what they need is loaded",
+    ),
     _service(
         "~/step",
         "Trigger",
