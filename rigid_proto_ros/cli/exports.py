@@ -34,7 +34,7 @@ HELP = {
     "video": "write a film, without a display; needs a Vulkan driver, of which mesa-vulkan-drivers will do",
 }
 
-PARTS = ("ghost", "trail")
+PARTS = ("ghost", "string", "trail")
 
 FOR = {
     "tolerance": ("gltf", "usd"),
@@ -171,21 +171,19 @@ def _write_animations(
 ) -> None:
     from ..export.animation import animate
     from ..export.gltf import write_gltf
-    from ..export.sampling import body_size
     from ..export.usd import write_usd
 
     parts = _parts(args)
     with Progress("choosing keys") as progress:
-        made = animate(record, looks, args.tolerance or 1e-3, args.fps, "ghost" in parts, progress.fraction)
+        made = animate(record, looks, args.tolerance or 1e-3, args.fps, parts, progress.fraction)
     for name in ("gltf", "usd"):
         if name not in files:
             continue
         with Progress(f"writing {files[name]}"):
             if name == "gltf":
-                write_gltf(files[name], record, made.motion, made.keys, "trail" in parts)
+                write_gltf(files[name], record, made, "trail" in parts)
             else:
-                trail = body_size(record) if "trail" in parts else 0.0
-                write_usd(files[name], record, made.motion, made.keys, args.fps, trail)
+                write_usd(files[name], record, made, args.fps, "trail" in parts)
         for line in made.report:
             say(f"{files[name]}: {line}")
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from .flight_record import FlightRecord
 from .keys import PoseKeys, pose_keys
 from .looks import Looks
 from .sampling import Motion, Sampler, Tolerance, body_size
+from .string_line import StringKeys, string_ends, string_keys
 
 TIMES_CHECKED = 1000
 """Evenly over the flight, beside those that the keys were chosen from."""
@@ -19,12 +20,13 @@ TIMES_CHECKED = 1000
 
 @dataclass(frozen=True)
 class Animation:
-    """motion: looks at the flight; keys: of its tracks. error: the worst that was measured, in [m] and [rad], of all
-    tracks. report: what to say of it, a line each.
+    """motion: looks at the flight; keys: of its tracks; string: None where none is tied, or none is asked for. error:
+    the worst that was measured, in [m] and [rad], of all. report: what to say of it, a line each.
     """
 
     motion: Motion
     keys: list[PoseKeys]
+    string: StringKeys | None
     error: tuple[float, float]
     report: list[str]
 
@@ -34,17 +36,19 @@ def animate(
     looks: Looks | None,
     share: float = 1e-3,
     fps: float | None = None,
-    ghost: bool = False,
+    parts: Collection[str] = (),
     progress: Callable[[float, float], None] = lambda *_: None,
 ) -> Animation:
     """Keys that err by at most ``share`` of the body's size and as many hundred degrees, as few as it takes; or ``fps``
-    evenly spaced ones a second, whatever they err. Raises InputError where that takes too many.
+    evenly spaced ones a second, whatever they err. parts: what moves beside the body, ``ghost`` and ``string``. Raises
+    InputError where that takes too many.
     """
     size = body_size(record)
     tolerance = Tolerance.of(share, size)
-    sampler = Sampler(record, looks, tolerance, ghost)
+    sampler = Sampler(record, looks, tolerance, "ghost" in parts, "string" in parts)
     motion = sampler.within(progress) if fps is None else sampler.at(sampler.evenly(fps))
     keys = [pose_keys(motion, track, tolerance if fps is None else None) for track in motion.tracks]
+    string = string_keys(motion.seconds, *ends_of(record, motion)) if "string" in parts else None
     between = np.linspace(sampler.start_ns, sampler.end_ns, TIMES_CHECKED + 2)[1:-1].astype(np.int64)
     checked = [motion, sampler.at(between), sampler.at(record.times_ns)]
     errors = [
@@ -52,6 +56,8 @@ def animate(
         for look in checked
         for own, track in zip(keys, look.tracks, strict=False)
     ]
+    if string is not None:
+        errors += [(_string_error(string, record, look, motion.times_ns[0]), 0.0) for look in checked]
     worst = max(e[0] for e in errors), max(e[1] for e in errors)
     count = sum(len(own.places.times) + len(own.attitudes.times) for own in keys)
     text = (
@@ -66,4 +72,16 @@ def animate(
         )
     if sampler.note:
         report.append(sampler.note)
-    return Animation(motion, keys, worst, report)
+    return Animation(motion, keys, string, worst, report)
+
+
+def ends_of(record: FlightRecord, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Both ends (n, 3) of the string at the motion's times; NaN while none is tied."""
+    return string_ends(record.strings, motion.times_ns, motion.body.poses)
+
+
+def _string_error(string: StringKeys, record: FlightRecord, look: Motion, start_ns: int) -> float:
+    """How far the stick's ends are from the string's at most [m]."""
+    true, seen = ends_of(record, look), string.played((look.times_ns - start_ns) * 1e-9)
+    apart = np.fmax(*(np.linalg.norm(a - b, axis=1) for a, b in zip(true, seen, strict=True)))
+    return float(np.nan_to_num(apart).max())

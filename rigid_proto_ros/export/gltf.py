@@ -15,12 +15,13 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.output_file import whole_file
-from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, TRAIL_COLOUR
+from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from ..rerun_view.surface_normals import shaded_surface
+from .animation import Animation
 from .flight_record import DrawnBody, FlightRecord
 from .interpolation import Keys
-from .keys import PoseKeys
-from .sampling import Motion, Track, single
+from .sampling import Motion, Track, body_size, single
+from .string_line import StringKeys
 
 if TYPE_CHECKING:
     import pygltflib
@@ -32,6 +33,9 @@ COMPONENTS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 """Attitude xyzw of the root: a quarter turn about x takes z up to y up."""
+
+STRING_WIDTH, STRING_SIDES = 0.012, 8
+"""Of the body's size; corners of its cross-section."""
 
 
 def check_gltf() -> None:
@@ -150,10 +154,11 @@ class Document:
                 self.animate(node, path, Keys(times, values), "STEP")
 
 
-def write_gltf(file: str, record: FlightRecord, motion: Motion, keys: list[PoseKeys], trail: bool = False) -> None:
-    """Write the motion: the body, the ghost where the motion has one, and the centre of mass's path on request.
-    keys: of the motion's tracks.
+def write_gltf(file: str, record: FlightRecord, made: Animation, trail: bool = False) -> None:
+    """Write an animation: the body, the ghost and the string where it has them, and the centre of mass's path on
+    request.
     """
+    motion, keys = made.motion, made.keys
     check_gltf()
     import pygltflib
 
@@ -180,6 +185,8 @@ def write_gltf(file: str, record: FlightRecord, motion: Motion, keys: list[PoseK
         document.animate(body, "rotation", pose.attitudes)
         _draw_meshes(document, body, name, material, surfaces, record, motion, track)
         _show_while_there(document, body, motion, track)
+    if made.string is not None:
+        _draw_string(document, root, made.string, STRING_WIDTH * body_size(record))
     if trail and len(keys[0].places.times) > 1:
         _draw_trail(document, root, keys[0].places.values)
     _save(document, file)
@@ -257,6 +264,30 @@ def _draw_trail(document: Document, root: int, places: np.ndarray) -> None:
     points = document.accessor(places, VERTICES, bounds=True)
     mesh = document.mesh("trail", {"POSITION": points}, None, LINE_STRIP, material)
     document.node("trail", root, mesh=mesh)
+
+
+def _draw_string(document: Document, root: int, string: StringKeys, width: float) -> None:
+    angles = np.linspace(0.0, 2.0 * np.pi, STRING_SIDES, endpoint=False)
+    around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(STRING_SIDES)])
+    points = np.vstack([0.5 * width * around, 0.5 * width * around + [0.0, 0.0, 1.0]])
+    low = np.arange(STRING_SIDES)
+    following = (low + 1) % STRING_SIDES
+    sides = np.vstack(
+        [
+            np.column_stack([low, following, following + STRING_SIDES]),
+            np.column_stack([low, following + STRING_SIDES, low + STRING_SIDES]),
+        ]
+    )
+    attributes = {
+        "POSITION": document.accessor(points, VERTICES, bounds=True),
+        "NORMAL": document.accessor(np.vstack([around, around]), VERTICES),
+    }
+    material = document.material("string", STRING_COLOUR)
+    mesh = document.mesh("string", attributes, document.accessor(sides.ravel(), INDICES), TRIANGLES, material)
+    node = document.node("string", root, mesh=mesh)
+    document.animate(node, "translation", string.places)
+    document.animate(node, "rotation", string.attitudes)
+    document.animate(node, "scale", string.scales)
 
 
 def _save(document: Document, file: str) -> None:

@@ -18,6 +18,7 @@ from ..rerun_view.inertia_shapes import PrincipalFrame
 from .flight_record import DrawnBody, FlightRecord
 from .interpolation import attitude_angles, blend
 from .looks import POSE, Looks
+from .string_line import between_ends, string_breaks, string_ends
 
 TURN_MAX = 0.5
 """[rad] Between two looks at least, so that no turn is missed."""
@@ -134,15 +135,23 @@ def single(times_ns: np.ndarray) -> np.ndarray:
 
 class Sampler:
     """Looks at a flight again. looks: None for one that can't be simulated; then its recorded states are all there
-    is, as ``note`` says. With ``ghost`` the ghost's motion counts too.
+    is, as ``note`` says. With ``ghost`` the ghost's motion counts too, with ``string`` that of the string's ends.
     """
 
-    def __init__(self, record: FlightRecord, looks: Looks | None, tolerance: Tolerance, ghost: bool = False) -> None:
+    def __init__(
+        self,
+        record: FlightRecord,
+        looks: Looks | None,
+        tolerance: Tolerance,
+        ghost: bool = False,
+        string: bool = False,
+    ) -> None:
         self.record = record
         self.looks = looks
         self.tolerance = tolerance
         self.note = ""
         self._ghost = ghost
+        self._string = string
         self.start_ns, self.end_ns = int(record.times_ns[0]), int(record.times_ns[-1])
         if looks is None:
             self.note = "the session can't be simulated again: between its states nothing is known"
@@ -177,8 +186,8 @@ class Sampler:
         tolerance = self.tolerance
         if self.looks is None:
             return self.at(self.record.times_ns)
-        marks = [t for t, _ in self.record.strings if self.start_ns <= t <= self.end_ns]
-        breaks = [t for t in (*self.record.breaks, *marks) if self.start_ns <= t <= self.end_ns]
+        marks = [*self.record.breaks, *string_breaks(self.record.strings), *(t for t, _ in self.record.strings)]
+        breaks = [t for t in marks if self.start_ns <= t <= self.end_ns]
         times = np.union1d(self._snapped(np.union1d(self.record.times_ns, breaks)), self._changes()).astype(np.int64)
         rows, ghosts = self.looks.at(times)
         times, rows, ghosts = self._turned(times, rows, ghosts)
@@ -198,6 +207,10 @@ class Sampler:
             errs = _errs(tolerance, rows[:, :POSE], where, u, found[:, :POSE])
             if self._ghost:
                 errs = np.fmax(errs, _errs(tolerance, ghosts, where, u, ghosts_found))
+            if self._string:
+                ends = string_ends(self.record.strings, times, rows[:, :POSE])
+                now = string_ends(self.record.strings, middles, found[:, :POSE])
+                errs = np.fmax(errs, between_ends(ends, where, u, now) / tolerance.position)
             again = np.repeat(errs > SHARE, 2)
             times, rows, ghosts = (
                 np.insert(old, where + 1, new, axis=0)
@@ -238,7 +251,9 @@ class Sampler:
         """The last time before, and the first after, each change of what is drawn."""
         ghosts = drawn_alike(self.record.ghosts) if self._ghost else []
         bodies = [*drawn_alike(self.record.bodies)[1:], *ghosts[1:]]
-        times = {t for body in bodies for t in (body.time_ns, body.time_ns + 1)}
+        changes = [body.time_ns for body in bodies]
+        changes += [t for t, _ in self.record.strings if t > 0] if self._string else []
+        times = {t for change in changes for t in (change, change + 1)}
         return sorted(t for t in times if self.start_ns <= t <= self.end_ns)
 
     def _agrees(self) -> bool:

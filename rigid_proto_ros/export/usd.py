@@ -14,13 +14,14 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.output_file import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
-from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, TRAIL_COLOUR
+from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from ..rerun_view.inertia_shapes import PrincipalFrame
 from ..rerun_view.surface_normals import shaded_surface
 from ..simulation.observer import BodySnapshot
+from .animation import Animation, ends_of
 from .flight_record import DrawnMesh, FlightRecord
 from .keys import PoseKeys
-from .sampling import Motion, Track, single
+from .sampling import Motion, Track, body_size, single
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
@@ -29,7 +30,7 @@ PLAYED_FPS = 60.0
 """Time codes a second where none are asked for; samples lie wherever they are needed."""
 
 GHOST_OPACITY = 0.45
-TRAIL_WIDTH = 0.01
+TRAIL_WIDTH, STRING_WIDTH = 0.01, 0.012
 """Of the body's size."""
 
 
@@ -41,12 +42,11 @@ def check_usd() -> None:
         raise InputError("--usd", "usd-core is missing: pip install 'rigid_proto_ros[export]'") from None
 
 
-def write_usd(
-    file: str, record: FlightRecord, motion: Motion, keys: list[PoseKeys], fps: float | None = None, trail: float = 0.0
-) -> None:
-    """Write the motion: the body, the ghost where the motion has one, and the centre of mass's path where ``trail``,
-    the size of the body [m], is given. keys: of the motion's tracks.
+def write_usd(file: str, record: FlightRecord, made: Animation, fps: float | None = None, trail: bool = False) -> None:
+    """Write an animation: the body, the ghost and the string where it has them, and the centre of mass's path on
+    request.
     """
+    motion, keys, size = made.motion, made.keys, body_size(record)
     check_usd()
     from pxr import Usd, UsdGeom, UsdPhysics
 
@@ -68,8 +68,10 @@ def write_usd(
         _hide_while_away(prim, motion, track, rate)
         _draw_meshes(stage, prim, (colour, opacity), record, motion, track, rate)
     _add_physics(stage, record)
+    if made.string is not None:
+        _draw_string(stage, record, motion, rate, STRING_WIDTH * size)
     if trail and len(keys[0].places.times) > 1:
-        _draw_trail(stage, keys[0].places.values, TRAIL_WIDTH * trail)
+        _draw_trail(stage, keys[0].places.values, TRAIL_WIDTH * size)
     with whole_file("--usd", file) as path:
         # The library takes an empty file for a damaged one.
         path.unlink()
@@ -189,16 +191,47 @@ def _add_mass(mass: Any, body: BodySnapshot) -> None:
     mass.CreatePrincipalAxesAttr(Gf.Quatf(w, x, y, z))
 
 
-def _draw_trail(stage: Usd.Stage, places: np.ndarray, width: float) -> None:
-    from pxr import Gf, UsdGeom, Vt
+def _draw_string(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: float, width: float) -> None:
+    from pxr import Vt
 
-    curve = UsdGeom.BasisCurves.Define(stage, "/flight/trail")
-    curve.CreateTypeAttr(UsdGeom.Tokens.linear)
+    free, knots = ends_of(record, motion)
+    tied = ~np.isnan(free[:, 0])
+    curve = _line(stage, "/flight/string", 2, STRING_COLOUR, width)
+    points, extent = curve.CreatePointsAttr(), curve.CreateExtentAttr()
+    was_tied: bool | None = None
+    # Of looks at equal times, on both sides of a change, the last counts.
+    for k in np.flatnonzero(np.append(np.diff(motion.seconds) > 0.0, True)):
+        code = float(motion.seconds[k]) * rate
+        if bool(tied[k]) != was_tied:
+            was_tied = bool(tied[k])
+            _show(curve, was_tied, code)
+        if tied[k]:
+            ends = np.array([free[k], knots[k]], dtype=np.float32)
+            points.Set(Vt.Vec3fArray.FromNumpy(ends), code)
+            extent.Set(Vt.Vec3fArray.FromNumpy(_extent(ends, width)), code)
+
+
+def _draw_trail(stage: Usd.Stage, places: np.ndarray, width: float) -> None:
+    from pxr import Vt
+
     points = places.astype(np.float32)
+    curve = _line(stage, "/flight/trail", len(points), TRAIL_COLOUR, width)
     curve.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    curve.CreateCurveVertexCountsAttr([len(points)])
+    curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(_extent(points, width)))
+
+
+def _line(stage: Usd.Stage, path: str, count: int, colour: tuple[int, int, int], width: float) -> UsdGeom.BasisCurves:
+    from pxr import Gf, UsdGeom
+
+    curve = UsdGeom.BasisCurves.Define(stage, path)
+    curve.CreateTypeAttr(UsdGeom.Tokens.linear)
+    curve.CreateCurveVertexCountsAttr([count])
     curve.CreateWidthsAttr([width])
     curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
-    reach = 0.5 * width
-    curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])))
-    curve.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(TRAIL_COLOUR) / 255.0).tolist())])
+    curve.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(colour) / 255.0).tolist())])
+    return curve
+
+
+def _extent(points: np.ndarray, width: float) -> np.ndarray:
+    reach = np.float32(0.5 * width)
+    return np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])

@@ -86,7 +86,7 @@ def issues(modules: Path, file: Path) -> dict:
     return json.loads(out)
 
 
-@pytest.mark.parametrize("options", [[], ["--with", "ghost,trail"], ["--fps", "30"]])
+@pytest.mark.parametrize("options", [[], ["--with", "ghost,string,trail"], ["--fps", "30"]])
 def test_khronos_validator_finds_no_error_and_no_warning(modules, session, options, tmp_path):
     file = tmp_path / "flight.glb"
     assert main(["replay", str(session), "--gltf", str(file), *options]) == 0
@@ -100,7 +100,7 @@ def test_khronos_validator_finds_no_error_and_no_warning(modules, session, optio
 )
 def test_khronos_validator_accepts_every_kind_of_scene(modules, scene, tmp_path):
     file = tmp_path / "flight.glb"
-    assert main(["simulate", scene, "--duration", "2", "--gltf", str(file), "--with", "ghost,trail"]) == 0
+    assert main(["simulate", scene, "--duration", "2", "--gltf", str(file), "--with", "ghost,string,trail"]) == 0
     found = issues(modules, file)
     assert (found["numErrors"], found["numWarnings"]) == (0, 0), found
 
