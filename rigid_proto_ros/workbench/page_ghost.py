@@ -13,22 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..motion.state import State
-from ..scene.ghost import Ghost
+from ..scene.ghost import Ghost, Refusals
 from ..scene.scenario import Scenario
 from ..simulation.commands import Command, Listed
-from ..simulation.observer import Observer
 from ..simulation.setup import Setup
 
 PORTION_NS = 1_000_000_000
 """[ns] That it is advanced at most between two pictures: whoever draws waits for it."""
-
-
-class _Refused(Observer):
-    def __init__(self, on_refusal: Callable[[str], None]) -> None:
-        self._on_refusal = on_refusal
-
-    def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002 (the observer's signature)
-        self._on_refusal(message)
 
 
 class PageGhost:
@@ -37,7 +28,7 @@ class PageGhost:
     """
 
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
-        self._observer = _Refused(on_refusal)
+        self._observer = Refusals(on_refusal)
         self._ghost: Ghost | None = None
         self._setup: Setup | None = None
         self._offset_ns = 0
