@@ -23,6 +23,7 @@ from ..simulation.setup import Setup
 from .command_queue import CommandQueue, Unserved
 from .scheduling import LONG_TEXT, BackgroundThread, ScheduleMessage
 from .simulation_loop import SimulationLoop
+from .static_frames import StaticFrames
 
 TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
@@ -55,6 +56,7 @@ class CommandIntake:
         node: Node,
         loop: SimulationLoop,
         frames: tuple[str, str],
+        static_frames: StaticFrames,
         apply_changes: Callable[[Mapping, BodyMesh | None], Setup],
         apply_inertia: Callable[[Mapping], Setup],
     ) -> None:
@@ -63,6 +65,7 @@ class CommandIntake:
         self.wall_stamp = 0
         self._loop = loop
         self._frames = frames
+        self._static_frames = static_frames
         self._apply_changes = apply_changes
         self._apply_inertia = apply_inertia
         self._next_quiet_ns = 0
@@ -140,15 +143,26 @@ class CommandIntake:
         stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
         frame = self._read_frames.get(frame_id)
         if frame is None:
-            frame = parse_frame(frame_id, frozenset(simulation.setup.contacts), *self._frames)
+            try:
+                frame = parse_frame(frame_id, frozenset(simulation.setup.contacts), *self._frames)
+            except CommandRefused:
+                if not self._static_frames.known:
+                    raise
+                # Logged as it is read now: a replay has no such frames.
+                read = self._static_frames.read(frame_id, simulation.setup.body, force, torque)
+                message = cdr.wrench_stamped(stamp_ns, read.frame_id, read.force, read.torque)
+                command = WrenchCommand(held, read.frame, read.force, read.torque, stamp_ns, read.frame_id, message)
+                return self._submit(command)
             # Contacts and frames' names are set at start only, so what was read once stays so.
             if len(self._read_frames) >= MOST_FRAMES:
                 self._read_frames.clear()
             self._read_frames[frame_id] = frame
         message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
-        command = WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message)
-        simulation.submit(command, self._when(stamp_ns))
-        if held:
+        return self._submit(WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message))
+
+    def _submit(self, command: WrenchCommand) -> int:
+        self._loop.simulation.submit(command, self._when(command.stamp_ns))
+        if command.held:
             self._loop.request_step()
         return 1
 

@@ -20,6 +20,7 @@ from ..simulation.commands import WrenchCommand
 from ..simulation.observer import BodySnapshot, Observer
 from . import qos
 from .robot_description import RobotDescription
+from .static_frames import StaticFrames
 
 WARNING_S = 1.0
 """Between two warnings of one reason, wall time."""
@@ -28,13 +29,14 @@ WARNING_S = 1.0
 class EventPublisher(Observer):
     """An observer that publishes; its methods run on the physics thread, and are rare."""
 
-    def __init__(self, node: Node, body_frame: str, mesh_path: Callable[[], str]) -> None:
+    def __init__(self, node: Node, body_frame: str, mesh_path: Callable[[], str], static_frames: StaticFrames) -> None:
         def publisher(message_type: type, topic: str, profile: QoSProfile) -> Publisher:
             return node.create_publisher(
                 message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE
             )
 
         self._logger = node.get_logger()
+        self._static_frames = static_frames
         self._mesh_frame = f"{body_frame}/mesh"
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
         self._scene = publisher(String, "scene", qos.LATCHED)
@@ -59,6 +61,7 @@ class EventPublisher(Observer):
         inertia.iyy, inertia.iyz, inertia.izz = float(I[1, 1]), float(I[1, 2]), float(I[2, 2])
         self._inertia.publish(message)
         self._description.body_changed(body)
+        self._static_frames.body_changed(time_ns, body)
 
     def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
         """A wrench or poke as it took effect: its point settled on the body, its axes world or body."""

@@ -134,6 +134,12 @@ INTERFACES = (
     ),
     _topic(PUBLISHED, "/clock", "rosgraph_msgs/Clock", "simulated time", "publish_clock"),
     _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, where tf2_msgs is installed", "publish_tf"),
+    _topic(
+        PUBLISHED,
+        "/tf_static",
+        "tf2_msgs/TFMessage",
+        "frames of mesh and contacts at the body, where tf2_msgs is installed; those of others are read from it, too",
+    ),
     _service("~/reset", "Trigger", "time 0 and the initial state; wrench, pulses and schedule are dropped"),
     _service(
         "~/pause",

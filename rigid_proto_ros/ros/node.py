@@ -15,6 +15,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ..scene.command_codec import frame_names
 from ..scene.offline import notify_start
 from ..scene.scenario import BodyMesh, Scenario, make_scenario
 from ..simulation.observer import Observer
@@ -30,6 +31,7 @@ from .services import Services
 from .simulation_interfaces import offer_simulation_interfaces
 from .simulation_loop import SimulationLoop
 from .state_publisher import StatePublisher
+from .static_frames import StaticFrames
 from .watchers import Watchers
 
 
@@ -52,8 +54,9 @@ class RigidBodyNode(Node):
         scenario = make_scenario(declare_parameters(self, values))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
-        frames = scenario.parameters.world_frame, scenario.parameters.body_frame or self.get_name()
-        events = EventPublisher(self, frames[1], self._mesh_path)
+        frames = frame_names(scenario.parameters, self.get_name())
+        static_frames = StaticFrames(self, frames, scenario.setup.contacts)
+        events = EventPublisher(self, frames[1], self._mesh_path, static_frames)
         self._watchers = Watchers(
             self.get_name(), events, make_viewer(scenario, self.get_name()), self._recording_failed
         )
@@ -70,7 +73,7 @@ class RigidBodyNode(Node):
             lambda: self._watchers.are_there,
         )
         self.call = partial(physics.call, self.loop)
-        self.intake = CommandIntake(self, self.loop, frames, self._apply_scheduled, self._apply_inertia)
+        self.intake = CommandIntake(self, self.loop, frames, static_frames, self._apply_scheduled, self._apply_inertia)
         self._live_parameters = LiveParameters(
             self, super().set_parameters_atomically, self.loop, self.call, self._watchers, self.states
         )

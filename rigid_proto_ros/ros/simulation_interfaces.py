@@ -13,6 +13,7 @@ from typing import Any
 from rclpy.node import Node
 
 from ..base.errors import InputError
+from ..scene.command_codec import frame_names
 from . import entity_services
 from .entity_services import EntityServices
 from .physics_thread import Call, step_over
@@ -144,6 +145,6 @@ def offer_simulation_interfaces(node: Node, loop: SimulationLoop, call: Call) ->
         from simulation_interfaces import msg, srv
     except ImportError:
         return False
-    entity = EntityServices(loop, call, msg, node.get_name(), loop.scenario.parameters.world_frame)
+    entity = EntityServices(loop, call, msg, node.get_name(), frame_names(loop.scenario.parameters, "")[0])
     SimulationInterfaces(loop, call, msg, entity).offer(node, srv)
     return True

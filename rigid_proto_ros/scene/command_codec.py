@@ -192,7 +192,10 @@ def _text(value: object) -> str:
 
 def frame_names(parameters: Parameters, node_name: str) -> tuple[str, str]:
     """What the node of this name calls the world's frame and the body's."""
-    return parameters.world_frame, parameters.body_frame or node_name.rpartition("/")[2] or "rigid_body"
+    world, body = parameters.world_frame, parameters.body_frame
+    if parameters.frames == "rep105":
+        return "odom" if world == "world" else world, body or "base_link"
+    return world, body or node_name.rpartition("/")[2] or "rigid_body"
 
 
 def core_command(

@@ -273,6 +273,12 @@ class Parameters:
     pose_noise: PoseNoise = PoseNoise()
     noise_seed: int = whole(0, "Of the noise: the same seed errs alike at the same stamps.", lower=0, upper=2**62)
     ghost: GhostParameters = GhostParameters()
+    frames: str = text(
+        "own",
+        "rep105 calls the frames odom and base_link, as REP-105 does, where world_frame and body_frame say no other.",
+        choices=("own", "rep105"),
+        changes=READ_ONLY,
+    )
     world_frame: str = text("world", "Name of the world frame in published messages.", changes=READ_ONLY)
     body_frame: str = text(
         "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY

@@ -13,7 +13,7 @@ import pytest
 from ros_process import running_node
 
 from rigid_proto_ros.ros.interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
-from rigid_proto_ros.scene.parameters import PARAMETERS
+from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 
 pytest.importorskip("rclpy")
 NAME = "listed"
@@ -89,12 +89,13 @@ def test_running_node_has_exactly_the_listed_topics_and_services(graph, directio
     listed = {
         _resolved(i.name): i.type
         for i in INTERFACES
-        if i.direction == direction and not (i.name == "/tf" and without_tf)
+        if i.direction == direction and not (i.name in ("/tf", "/tf_static") and without_tf)
     }
     assert graph[direction] == listed
 
 
 def test_what_is_on_request_names_a_switch() -> None:
     for interface in INTERFACES:
-        assert not interface.on_request or PARAMETERS[interface.on_request].type == "bool"
+        switch = interface.on_request
+        assert not switch or f"{switch}." in PATTERNS or PARAMETERS[switch].type == "bool"
         assert interface.meaning and not interface.meaning.endswith(".")
