@@ -87,16 +87,23 @@ class LinkShapes:
             found.append(own @ shape.rotation.T + shape.position)
         return np.concatenate(found)
 
+    @cached_property
+    def _box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) of the box, in the first shape's axes, around all."""
+        local = self.points @ self.first.rotation
+        return local.min(axis=0), local.max(axis=0)
+
     @property
     def diagonal(self) -> float:
         """Diagonal of the box, in the first shape's axes, around all."""
-        return float(np.linalg.norm(np.ptp(self.points @ self.first.rotation, axis=0)))
+        lower, upper = self._box
+        return float(np.linalg.norm(upper - lower))
 
     @property
     def middle(self) -> np.ndarray:
         """Centre (3,) of that box, in the link's frame."""
-        local = self.points @ self.first.rotation
-        return self.first.rotation @ (0.5 * (local.min(axis=0) + local.max(axis=0)))
+        lower, upper = self._box
+        return self.first.rotation @ (0.5 * (lower + upper))
 
     def volume(self) -> float:
         """Volume [m³], what overlaps counted twice; raises InputError for a mesh that bounds none."""
