@@ -377,6 +377,9 @@ def test_picture_is_there_and_small() -> None:
     picture = SOURCE / "docs" / "flight.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert 20_000 < picture.stat().st_size < 300_000
+    film = picture.with_suffix(".gif")
+    assert film.read_bytes().startswith(b"GIF89a")
+    assert 20_000 < film.stat().st_size < 2_000_000
 
 
 def test_frames_of_the_reference_are_read_and_are_what_it_says() -> None:
@@ -417,4 +420,4 @@ def test_every_scene_stands_in_the_list_of_lessons() -> None:
 def test_first_screen_has_the_sentence_the_picture_and_the_two_commands() -> None:
     first = README.read_text("utf-8").splitlines()[:20]
     text = "\n".join(first)
-    assert text.index("docs/flight.png") < text.index("make run") < text.index("make test")
+    assert text.index("docs/flight.gif") < text.index("make run") < text.index("make test")

@@ -75,6 +75,7 @@ def draw_comparison(page: Page, picture: Path, started_s: float) -> None:
     page.until(lambda: page.readout[0] >= 2.0, "two seconds of flight")
     page.page.keyboard.press("Space")
     page.until(lambda: "The simulation is paused" in page.text, "a pause")
+    page.page.evaluate("() => document.querySelectorAll('*').forEach(element => element.scrollTop = 0)")
     time.sleep(2.0)
     page.page.screenshot(path=picture)
     page.page.keyboard.press("Space")
@@ -94,6 +95,7 @@ def draw_pull(page: Page, picture: Path) -> None:
     # A browser draws moved nodes before lines that are made anew: at rest all is where it belongs.
     page.page.keyboard.press("Space")
     page.until(lambda: "The simulation is paused" in page.text, "a pause")
+    page.page.evaluate("() => document.querySelectorAll('*').forEach(element => element.scrollTop = 0)")
     time.sleep(2.0)
     page.page.screenshot(path=picture)
     page.release()
