@@ -48,7 +48,9 @@ def animate(
     sampler = Sampler(record, looks, tolerance, "ghost" in parts, "string" in parts)
     motion = sampler.within(progress) if fps is None else sampler.at(sampler.evenly(fps))
     keys = [pose_keys(motion, track, tolerance if fps is None else None) for track in motion.tracks]
-    string = string_keys(motion.seconds, *ends_of(record, motion)) if "string" in parts else None
+    string = None
+    if "string" in parts:
+        string = string_keys(motion.seconds, *ends_of(record, motion), tolerance.position if fps is None else None)
     between = np.linspace(sampler.start_ns, sampler.end_ns, TIMES_CHECKED + 2)[1:-1].astype(np.int64)
     checked = [motion, sampler.at(between), sampler.at(record.times_ns)]
     errors = [

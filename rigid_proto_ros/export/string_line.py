@@ -9,7 +9,10 @@ import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, multiply
 from ..simulation.observer import ShownString
-from .interpolation import Keys, rounded, slerp
+from .interpolation import Keys, fewest_keys, rounded, slerp
+
+SHARE = 0.2
+"""Of the tolerance, for keys that are left out of each of the stick's place, direction and length."""
 
 Strings = list[tuple[int, ShownString | None]]
 """(time_ns, the string from then on or None)"""
@@ -74,8 +77,12 @@ class StringKeys:
         return free, free + self.scales.played(times)[:, 2:] * way
 
 
-def string_keys(seconds: np.ndarray, free: np.ndarray, knots: np.ndarray) -> StringKeys | None:
-    """The stick at all times (n,) [s, single precision] of the ends; None where a string is never tied."""
+def string_keys(
+    seconds: np.ndarray, free: np.ndarray, knots: np.ndarray, tolerance: float | None = None
+) -> StringKeys | None:
+    """The stick at times (n,) [s, single precision] of its ends (n, 3): as few as keep it within the tolerance [m], or
+    all without one; None where a string is never tied.
+    """
     tied = ~np.isnan(free[:, 0])
     if not tied.any():
         return None
@@ -91,9 +98,23 @@ def string_keys(seconds: np.ndarray, free: np.ndarray, knots: np.ndarray) -> Str
     lengths, ways = _lengths_and_ways(free[nearest], knots[nearest])
     shown = tied[:, np.newaxis].astype(float)
     scales = np.hstack([shown, shown, lengths * shown])
-    scale_times, scales = _with_ends(times, scales, tied)
-    places = Keys(times, rounded(free[nearest]))
-    return StringKeys(places, Keys(times, rounded(_attitudes(ways))), Keys(scale_times, rounded(scales)))
+    attitudes = _attitudes(ways)
+    places = free[nearest]
+    chosen = [np.arange(len(times))] * 3
+    if tolerance is not None:
+        changed = np.isin(at[1:], before + 1) | (tied[1:] != tied[:-1])
+        runs = np.split(np.arange(len(times)), np.flatnonzero(changed) + 1)
+        own = SHARE * tolerance
+        of = ((places, own), (attitudes, own / max(float(lengths.max()), own)), (scales, own))
+        chosen = [
+            np.concatenate([run[fewest_keys(times[run], values[run], within)] for run in runs]) for values, within in of
+        ]
+    scale_times, scales = _with_ends(times[chosen[2]], scales[chosen[2]], tied[chosen[2]])
+    return StringKeys(
+        Keys(times[chosen[0]], rounded(places[chosen[0]])),
+        Keys(times[chosen[1]], rounded(attitudes[chosen[1]])),
+        Keys(scale_times, rounded(scales)),
+    )
 
 
 def _with_ends(times: np.ndarray, scales: np.ndarray, tied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

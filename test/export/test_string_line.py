@@ -98,4 +98,7 @@ def test_a_stick_follows_a_direction_that_turns_right_round_and_over():
     )
     # A curve of at most 7.6 rad/s, by great circles of .005 s: (ω h)²/8.
     assert np.linalg.norm(seen - true, axis=1).max() < (7.6 * 0.005) ** 2 / 8
+    fewer = string_keys(t, np.zeros_like(knots), knots, 1e-2)
+    assert np.linalg.norm(fewer.played(t)[1] - knots, axis=1).max() < 1e-2
+    assert len(fewer.attitudes.times) < len(t) / 4
     assert string_keys(t, np.full_like(knots, np.nan), knots) is None
