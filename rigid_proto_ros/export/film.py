@@ -15,7 +15,6 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.output_file import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, HAND_COLOUR, STRING_COLOUR, TRAIL_COLOUR
-from ..rerun_view.surface_normals import shaded_surface
 from .flight_record import FlightRecord
 from .looks import Looks
 from .sampling import Motion, Sampler, Tolerance, Track, body_size
@@ -213,8 +212,7 @@ class _Drawn:
         self._meshes = []
         self._centres = []
         for mesh in record.meshes:
-            centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-            points, triangles, normals = shaded_surface(mesh.vertices - centre, mesh.triangles)
+            points, triangles, normals = mesh.surface
             material = pygfx.MeshPhongMaterial(color=_rgb(colour), opacity=opacity, shininess=15, specular="#303030")
             if opacity < 1.0:
                 # Whatever order its triangles have.
@@ -223,7 +221,7 @@ class _Drawn:
             drawn = pygfx.Mesh(geometry, material)
             self._group.add(drawn)
             self._meshes.append(drawn)
-            self._centres.append(centre)
+            self._centres.append(mesh.centre)
         self.reach = max((self._reach(record, span.drawn.mesh, span.drawn.body) for span in self._spans), default=0.0)
         self.reach = self.reach or body_size(record)
 

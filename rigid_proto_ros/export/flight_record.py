@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..base.errors import InputError
+from ..rerun_view.surface_normals import shaded_surface
 from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
 
 
@@ -26,6 +28,18 @@ class DrawnMesh:
 
     vertices: np.ndarray
     triangles: np.ndarray
+
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """The middle (3,) of its box [mesh coordinates]."""
+        return 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+
+    @cached_property
+    def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points, triangles and normals as ``shaded_surface`` has them, about the centre: single precision has no
+        digits for a mesh far from its origin.
+        """
+        return shaded_surface(self.vertices - self.centre, self.triangles)
 
 
 class FlightRecord(Observer):

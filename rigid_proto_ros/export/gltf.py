@@ -16,9 +16,8 @@ from .. import __version__
 from ..base.errors import InputError
 from ..base.output_file import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
-from ..rerun_view.surface_normals import shaded_surface
 from .animation import Animation
-from .flight_record import DrawnBody, FlightRecord
+from .flight_record import DrawnBody, DrawnMesh, FlightRecord
 from .interpolation import Keys
 from .sampling import Motion, Track, body_size, single
 from .string_line import StringKeys
@@ -172,7 +171,7 @@ def write_gltf(file: str, record: FlightRecord, made: Animation, trail: bool = F
     )
     root = document.node("flight", None, rotation=Y_UP)
     document.gltf.nodes[root].extras = {"first_time_s": motion.times_ns[0] * 1e-9}
-    surfaces = [_surface(document, mesh.vertices, mesh.triangles) for mesh in record.meshes]
+    surfaces = [_surface(document, mesh) for mesh in record.meshes]
     looks = (("body", document.material("body", BODY_COLOUR)), ("ghost", -1))
     for (name, material), track, pose in zip(looks, motion.tracks, keys, strict=False):
         if name == "ghost":
@@ -196,18 +195,13 @@ def _unit(attitude: np.ndarray) -> list[float]:
     return (attitude / np.linalg.norm(attitude)).tolist()
 
 
-def _surface(document: Document, vertices: np.ndarray, triangles: np.ndarray) -> tuple[dict[str, int], int]:
-    # About the box's centre: single precision has no digits for a mesh far from its origin.
-    places, corners, normals = shaded_surface(vertices - _centre(vertices), triangles)
+def _surface(document: Document, mesh: DrawnMesh) -> tuple[dict[str, int], int]:
+    places, corners, normals = mesh.surface
     attributes = {
         "POSITION": document.accessor(places, VERTICES, bounds=True),
         "NORMAL": document.accessor(normals, VERTICES),
     }
     return attributes, document.accessor(corners.ravel(), INDICES)
-
-
-def _centre(vertices: np.ndarray) -> np.ndarray:
-    return 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
 
 
 def _draw_meshes(
@@ -225,7 +219,7 @@ def _draw_meshes(
     for number, (attributes, indices) in enumerate(surfaces):
         if number not in {span.drawn.mesh for span in spans}:
             continue
-        centre = _centre(record.meshes[number].vertices)
+        centre = record.meshes[number].centre
         steps = []
         for k, span in enumerate(spans):
             scale, com = span.drawn.body.scale, span.drawn.body.center_of_mass

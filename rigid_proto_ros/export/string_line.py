@@ -28,9 +28,7 @@ def string_ends(strings: Strings, times_ns: np.ndarray, poses: np.ndarray) -> tu
         if string is None or end <= begin:
             continue
         times, own = times_ns[begin:end], poses[begin:end]
-        lasts = max(string.end_ns - string.begin_ns, 1)
-        done = np.clip((times - string.begin_ns) / lasts, 0.0, 1.0)[:, np.newaxis]
-        free[begin:end] = string.origin + done * (np.asarray(string.target) - string.origin)
+        free[begin:end] = string.free_end(times)
         knots[begin:end] = own[:, :3] + matrix_from_quaternion(own[:, 3:]) @ string.attach
     return free, knots
 

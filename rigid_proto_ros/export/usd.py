@@ -16,7 +16,6 @@ from ..base.output_file import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from ..rerun_view.inertia_shapes import PrincipalFrame
-from ..rerun_view.surface_normals import shaded_surface
 from ..simulation.observer import BodySnapshot
 from .animation import Animation, ends_of
 from .flight_record import DrawnMesh, FlightRecord
@@ -123,12 +122,12 @@ def _draw_meshes(
             continue
         name = "mesh" if number == 0 else f"mesh_{number + 1}"
         prim = UsdGeom.Mesh.Define(stage, body.GetPath().AppendChild(name))
-        centre = _fill(prim, mesh, look)
+        _fill(prim, mesh, look)
         ops = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble), prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble)
         before: tuple[Any, Any] | None = None
         for k, span in enumerate(spans):
             scale, com = span.drawn.body.scale, span.drawn.body.center_of_mass
-            values = Gf.Vec3d(*(scale * centre - com)), Gf.Vec3d(*scale)
+            values = Gf.Vec3d(*(scale * mesh.centre - com)), Gf.Vec3d(*scale)
             seconds = 0.0 if k == 0 else float(single(np.array([span.drawn.time_ns - motion.times_ns[0]]))[0])
             for n, op in enumerate(ops):
                 if len(spans) == 1:
@@ -142,12 +141,11 @@ def _draw_meshes(
                 _show(prim, span.drawn.mesh == number, seconds * rate)
 
 
-def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int], float]) -> np.ndarray:
-    """The prim's surface about the middle of its box; returns that point (3,) [mesh coordinates]."""
+def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int], float]) -> None:
+    """The prim's surface, about the middle of its box."""
     from pxr import Gf, UsdGeom, Vt
 
-    centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-    points, triangles, normals = shaded_surface(mesh.vertices - centre, mesh.triangles)
+    points, triangles, normals = mesh.surface
     prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
     prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel().astype(np.int32)))
@@ -159,7 +157,6 @@ def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int],
     prim.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(colour) / 255.0).tolist())])
     if opacity < 1.0:
         prim.CreateDisplayOpacityAttr([opacity])
-    return centre
 
 
 def _add_physics(stage: Usd.Stage, record: FlightRecord) -> None:

@@ -147,9 +147,8 @@ def _hand(string: ShownString, times_ns: np.ndarray) -> tuple[np.ndarray, np.nda
     """Place and velocity (n, 3) of the free end at each time."""
     way = np.asarray(string.target, dtype=float) - string.origin
     lasts_ns = string.end_ns - string.begin_ns
-    done = np.clip((times_ns - string.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
     speed = way / (1e-9 * lasts_ns) if lasts_ns > 0 else np.zeros(3)
-    return string.origin + done[:, np.newaxis] * way, (times_ns < string.end_ns)[:, np.newaxis] * speed
+    return string.free_end(times_ns), (times_ns < string.end_ns)[:, np.newaxis] * speed
 
 
 def _tension(string: ShownString, span: np.ndarray, distance: np.ndarray, velocity: np.ndarray) -> np.ndarray:

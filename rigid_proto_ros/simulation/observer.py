@@ -79,6 +79,12 @@ class ShownString:
     rest_length: float
     bilateral: bool
 
+    def free_end(self, times_ns: np.ndarray) -> np.ndarray:
+        """Places (n, 3) [m, world] of the free end at times (n,) [ns]."""
+        lasts_ns = self.end_ns - self.begin_ns
+        done = np.clip((times_ns - self.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
+        return self.origin + done[:, np.newaxis] * (np.asarray(self.target, dtype=float) - self.origin)
+
 
 class Observer:
     """Null object, and the interface: override what is of interest."""
