@@ -18,6 +18,7 @@ import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -100,8 +101,8 @@ def browser_frames(address: str) -> tuple[float, str] | None:
     return float(frames), "SwiftShader, without a graphics card"
 
 
-def measure() -> tuple[dict[str, list[float]], dict[str, tuple[float, str]]]:
-    """Latencies [ms] by kind of event; frames a second and what was counted, by who draws them."""
+def measure(tell: Callable[[dict[str, list[float]]], None]) -> dict[str, tuple[float, str]]:
+    """Measure latencies [ms] by kind of event and tell them; returns frames a second and what was counted, by who draws them."""
     os.environ.update(environment())
     import rclpy
 
@@ -164,6 +165,7 @@ def measure() -> tuple[dict[str, list[float]], dict[str, tuple[float, str]]]:
         moved = until_drawn(drag("update", 0.2 + 1e-3 * k))
         found["drawn string"].append(asyncio.run_coroutine_threadsafe(moved, loop).result(30))
     begin(page.pointer._on_drag, drag("end", 0.2))
+    tell(found)  # before the browser, which takes its time on a busy machine
     ticks: list[float] = []
     tick = page.tick
     page.tick = lambda now_s: (ticks.append(now_s), tick(now_s))[1]
@@ -176,7 +178,7 @@ def measure() -> tuple[dict[str, list[float]], dict[str, tuple[float, str]]]:
     stop_server(server)
     page.close()
     listener.end()
-    return found, frames
+    return frames
 
 
 def main() -> None:
@@ -186,7 +188,15 @@ def main() -> None:
     )
     with Process("-m", "rigid_proto_ros.ros.main", "--ros-args", "-p", "mesh:=teapot") as node:
         node.wait_until_flying()
-        found, frames = measure()
+        frames = measure(lambda found: tell_latencies(found, table))
+    for name, (rate, how) in frames.items():
+        table.add({"event": f"frames of the {name}", "frames_per_s": rate, "load": os.getloadavg()[0]})
+        print(f"{name}: {rate:.1f} frames a second ({how}; load {os.getloadavg()[0]:.1f})")
+    table.write()
+
+
+def tell_latencies(found: dict[str, list[float]], table: ResultTable) -> None:
+    """Rows of the table, and a line of each."""
     for event, values in found.items():
         values.sort()
         row = {
@@ -202,12 +212,9 @@ def main() -> None:
         verdict = "met" if row["p50_ms"] <= target_ms else "missed"
         print(
             f"{event}: median {row['p50_ms']:.2f} ms of {len(values)}, 95 % {row['p95_ms']:.2f}, worst {row['max_ms']:.2f}"
-            f" (target {target_ms:g} ms {verdict}; load {row['load']:.1f})"
+            f" (target {target_ms:g} ms {verdict}; load {row['load']:.1f})",
+            flush=True,
         )
-    for name, (rate, how) in frames.items():
-        table.add({"event": f"frames of the {name}", "frames_per_s": rate, "load": os.getloadavg()[0]})
-        print(f"{name}: {rate:.1f} frames a second ({how}; load {os.getloadavg()[0]:.1f})")
-    table.write()
 
 
 if __name__ == "__main__":
