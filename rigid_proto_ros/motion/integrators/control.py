@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.compilation import njit
+from .error_measure import FLOOR
 
 ACCURACY = 0  # local error rate asked for [1/s]
 DEGREE = 1  # of the series
@@ -43,11 +44,26 @@ def new_control(accuracy: float, degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def commit(control: np.ndarray) -> None:
-    """Count the step that waited as committed."""
+def accept(control: np.ndarray, length_ns: int) -> None:
+    """Let a step of this length wait for its commitment, its allowance no less than the floor."""
+    control[ACCEPTED_NS] = length_ns
+    if control[ACCURACY] * length_ns * 1e-9 < FLOOR:
+        control[FLOOR_BINDS] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def commit(control: np.ndarray, y: np.ndarray, following: np.ndarray, room_ns: int) -> int:
+    """Commit the step that waits, which ends in ``following``, in y if it fits into ``room_ns``; returns its length
+    [ns], 0 where it goes beyond.
+    """
+    length = int(control[ACCEPTED_NS])
+    if length > room_ns:
+        return 0
+    y[:] = following
     control[ELAPSED_NS] += control[ACCEPTED_NS]
     control[EVALUATIONS] += control[PENDING]
     control[STEPS] += 1.0
     control[ACCEPTED_NS] = 0.0
     control[PENDING] = 0.0
     control[SERIES] = 0.0
+    return length

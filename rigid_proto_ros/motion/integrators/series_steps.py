@@ -21,7 +21,6 @@ from ..problem import HAS_STRING, STIFFNESS
 from ..variables import ATTITUDE, DISPLACEMENT, HEAT, SPIN, STORED, VELOCITY
 from . import control as ctl
 from .error_measure import (
-    FLOOR,
     WEIGHINGS,
     heavier,
     jump_of_displacement,
@@ -186,9 +185,7 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
         weights, more = heavier(scales(following, p, (elapsed + length) * 1e-9), weights)
         if not (good and more):
             break
-    if control[ctl.ACCURACY] * length * 1e-9 < FLOOR:
-        control[ctl.FLOOR_BINDS] = 1.0
-    control[ctl.ACCEPTED_NS] = length
+    ctl.accept(control, length)
     return good
 
 
@@ -215,9 +212,7 @@ def steps(
         if sampling:
             _reach(p, control, c, span_ns, y)
             return span_ns if is_good(y) else 0
-        length = int(control[ctl.ACCEPTED_NS])
-        if advanced + length > span_ns:
+        length = ctl.commit(control, y, following, span_ns - advanced)
+        if length == 0:
             return advanced
-        y[:] = following
         advanced += length
-        ctl.commit(control)

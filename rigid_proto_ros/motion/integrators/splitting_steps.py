@@ -40,7 +40,6 @@ from ..problem import (
 )
 from ..variables import SPIN
 from . import control as ctl
-from .error_measure import FLOOR
 from .free_body_step import circulation
 from .free_body_strang import free_body_strang_steps
 
@@ -140,13 +139,9 @@ def steps(
             if length_ns < 1.0 or free_body_strang_steps(following, p, length_ns * 1e-9, 1) != 1:
                 control[ctl.FAILED] = 1.0
                 return advanced
-            control[ctl.ACCEPTED_NS] = length_ns
+            ctl.accept(control, length_ns)
             control[ctl.PENDING] = 1.0
-            if control[ctl.ACCURACY] * length_ns * 1e-9 < FLOOR:
-                control[ctl.FLOOR_BINDS] = 1.0
-        length = int(control[ctl.ACCEPTED_NS])
-        if advanced + length > span_ns:
+        length = ctl.commit(control, y, following, span_ns - advanced)
+        if length == 0:
             return advanced
-        y[:] = following
         advanced += length
-        ctl.commit(control)

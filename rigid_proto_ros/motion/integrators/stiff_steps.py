@@ -458,12 +458,10 @@ def steps(
             if control[ctl.ACCEPTED_NS] < 1.0:
                 control[ctl.FAILED] = 1.0
                 return advanced
-        length = int(control[ctl.ACCEPTED_NS])
-        if advanced + length > span_ns:
+        length = ctl.commit(control, y, following, span_ns - advanced)
+        if length == 0:
             return advanced
-        y[:] = following
         advanced += length
-        ctl.commit(control)
         # What tiny steps of a transient err above their shares is soon lost in the segment's.
         control[ctl.EXCESS] += control[ctl.PENDING_EXCESS]
         share = control[ctl.ACCURACY] * control[ctl.ELAPSED_NS] * 1e-9

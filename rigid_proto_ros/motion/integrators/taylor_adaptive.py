@@ -127,14 +127,10 @@ def steps(
             if not good:
                 control[ctl.FAILED] = 1.0
                 return advanced
-            control[ctl.ACCEPTED_NS] = length_ns
+            ctl.accept(control, length_ns)
             control[ctl.PENDING] = 1.0
-            if control[ctl.ACCURACY] * length_ns * 1e-9 < FLOOR:
-                control[ctl.FLOOR_BINDS] = 1.0
-        length = int(control[ctl.ACCEPTED_NS])
-        if advanced + length > span_ns:
+        length = ctl.commit(control, y, following, span_ns - advanced)
+        if length == 0:
             return advanced
-        y[:] = following
         advanced += length
         follows = ending[0] != 0.0
-        ctl.commit(control)
