@@ -62,7 +62,7 @@ from .integrator import (
 )
 from .runge_kutta import is_good
 from .series_steps import degree_of_motion
-from .stiff_steps import damping_is_stiff
+from .stiffness import damping_is_stiff
 from .taylor_adaptive import degree_for
 
 FASTEST_STRING = 1e6

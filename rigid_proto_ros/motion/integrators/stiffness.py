@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Whether a segment's damping is stiff: so fast that it, and not the motion, would set the length of explicit steps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...base.compilation import njit
+from ..problem import (
+    ATTACH,
+    DAMPING_ANGULAR,
+    DAMPING_LINEAR,
+    HAS_STRING,
+    MASS,
+    MOMENT,
+    MOMENTS,
+    STIFFNESS,
+    STRING_DAMPING,
+    TORQUE_BODY,
+    TORQUE_WORLD,
+    TRANSLATES,
+)
+
+STIFF_RATE = 2e4
+"""/s; slower damping leaves explicit steps of 75 µs and more, so that even they are far faster than the clock."""
+
+STIFF_RATIO = 100.0
+"""Of a damping's rate to those of the motion beside it: the cost of an implicit step over an explicit
+one's, by their lengths.
+"""
+
+OVERDAMPED = 4.0
+"""Of a string's damping rate c/m to its swing √(k/m): twice the damping ratio, 2 being critical."""
+
+
+@njit(cache=True, error_model="numpy")
+def damping_is_stiff(p: np.ndarray, y: np.ndarray, taut: bool) -> bool:
+    """Whether some damping of a segment with problem p from variables y on is so much faster than the motion beside it
+    that it, and not the motion, would set the length of explicit steps. taut: the string counts.
+
+    An explicit step is about 1.5/λ long; an implicit one is some tenths of a radian of the motion, and costs some
+    hundred times as much.
+    """
+    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
+    smallest = p[MOMENTS]
+    angular, fastest, motion = p[DAMPING_ANGULAR], 0.0, spin
+    if angular > 0.0:
+        torque = 0.0
+        for k in range(3):
+            torque += abs(p[TORQUE_BODY + k]) + abs(p[TORQUE_WORLD + k])
+        for k in range(9):
+            torque += abs(p[MOMENT + k])
+        # Where damping is stiff the spin is soon what the torque keeps up.
+        motion += torque / angular
+        if spin > 0.0 or torque > 0.0 or p[HAS_STRING] != 0.0:
+            fastest = angular / smallest
+    if p[TRANSLATES] != 0.0:
+        fastest = max(fastest, p[DAMPING_LINEAR])
+    if taut and p[HAS_STRING] != 0.0:
+        arm = p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2
+        lightness = 1.0 / p[MASS] + arm / smallest
+        swing, damping = math.sqrt(p[STIFFNESS] * lightness), p[STRING_DAMPING] * lightness
+        if damping > OVERDAMPED * swing:
+            fastest = max(fastest, damping)
+            motion += p[STIFFNESS] / p[STRING_DAMPING]
+        else:
+            motion += swing
+    return fastest > max(STIFF_RATE, STIFF_RATIO * motion)
