@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     observer = _observer(recordings, scenario.parameters, record)
     try:
         flight = OfflineRun(scenario, script, observer)
-        wall_time = run_with_progress(flight, nanoseconds(args.duration))
+        wall_time = run_with_progress(flight, nanoseconds(args.duration), _warn)
         result = summary(flight, wall_time)
     finally:
         if observer is not None:
@@ -104,8 +104,6 @@ def run(args: argparse.Namespace) -> int:
         write_exports(args, record, looks_of_scene(scenario, script), _warn if args.json else line)
     if floor := flight.simulation.accuracy_floor:
         _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held at the end: {floor}")
-    if slow := flight.simulation.too_slow:
-        _warn(slow)
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1

@@ -114,11 +114,17 @@ class OfflineRun(ScenarioRun):
         return not self.simulation.failure
 
 
-def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
-    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s]."""
+def run_with_progress(run: OfflineRun, duration_ns: int, warn: Callable[[str], None] | None = None) -> float:
+    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s].
+
+    warn: told once, as soon as it is known, that the motion takes more computing than the clock leaves time for.
+    """
     start = time.perf_counter()
     with Progress(f"simulating {duration_ns / 1e9:g} s") as progress:
         for part in range(1, 101):
+            if warn is not None and (slow := run.simulation.too_slow):
+                warn(slow)
+                warn = None
             if not run.advance(duration_ns * part // 100):
                 break
             progress.fraction(part, 100)

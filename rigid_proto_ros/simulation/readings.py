@@ -101,14 +101,18 @@ class Readings:
 
     @property
     def too_slow(self) -> str:
-        """That the present segment takes more computing than the clock leaves time for; empty when it doesn't."""
+        """That the present segment takes more computing than the clock leaves time for; empty when it doesn't. By what
+        it took so far, and before that by the fastest that turns or swings.
+        """
         segment = self._segment
         elapsed = (self.state.time_ns - segment.start.time_ns) * 1e-9
-        evaluations = segment.evaluations
-        most = MOST_EVALUATIONS_A_SECOND[self.setup.integrator.chooses]
-        if evaluations < FEWEST_EVALUATIONS or evaluations < most * elapsed:
+        if segment.evaluations >= FEWEST_EVALUATIONS and elapsed > 0.0:
+            steps, evaluations = segment.steps / elapsed, segment.evaluations / elapsed
+        else:
+            steps, evaluations = segment.expected_effort(self.state)
+        if evaluations < MOST_EVALUATIONS_A_SECOND[self.setup.integrator.chooses]:
             return ""
-        return f"{self.choice}: {segment.steps / elapsed:.2g} steps for a second of the motion, slower than real time"
+        return f"{self.choice}: {steps:.2g} steps for a second of the motion, slower than real time"
 
     @property
     def string(self) -> Tied | None:

@@ -10,8 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.rotation import length
 from ..motion.integrators import control as ctl
-from ..motion.integrators.integrator import NOTHING, ONE_STEP
+from ..motion.integrators.auto import fastest_swing
+from ..motion.integrators.equations import stretch
+from ..motion.integrators.integrator import FIXED_STEPS, NOTHING, ONE_STEP
 from ..motion.problem import SIZE
 from ..motion.state import State
 from ..motion.variables import STORED
@@ -75,6 +78,19 @@ class Segment:
         """Whether the segment is one exact step, however long, of a body that turns."""
         method = self._arrays.method
         return method.way in (NOTHING, ONE_STEP) and not method.sleeps
+
+    def expected_effort(self, now: State) -> tuple[float, float]:
+        """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
+        method = self._arrays.method
+        if method.way == FIXED_STEPS:
+            steps = 1e9 / int(self._arrays.n[fl.STEP_NS])
+            return steps, steps * method.evaluations
+        if method.radians == 0.0:
+            return 0.0, 0.0
+        fastest = length(now.angular_velocity_body)
+        if method.on_string and stretch(self.sampled, self.problem)[0] > 0.0:
+            fastest = max(fastest, fastest_swing(self.problem))
+        return fastest / method.radians, fastest / method.radians
 
     @property
     def choice(self) -> str:

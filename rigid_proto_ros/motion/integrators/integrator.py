@@ -48,7 +48,7 @@ class Method:
     or samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations:
     of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
     sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
-    with a string alone.
+    with a string alone. radians: of the fastest turn or swing that a step covers, about; 0 where steps don't follow it.
     """
 
     way: int
@@ -59,6 +59,7 @@ class Method:
     sleeps: bool = False
     floor_binds: bool = False
     on_string: bool = False
+    radians: float = 0.0
 
 
 @dataclass(frozen=True)
