@@ -9,6 +9,7 @@ from rigid_proto_ros.base.bundled import scene_names, scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.ros.arguments import given_arguments
 from rigid_proto_ros.scene.offline import scene_values
+from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scalar
 
 SCALARS = (
@@ -151,3 +152,10 @@ def test_names_that_are_none_and_aliases_are_refused_with_their_line(text, words
 
 def test_a_huge_whole_number_is_a_double():
     assert scalar("9223372036854775808") == 9.223372036854775808e18
+
+
+def test_a_scene_that_a_node_tells_works_for_a_node_of_any_name(tmp_path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(make_scenario({"mass": 2.5}).text)
+    for name in ("rigid_body", "/lab/drone"):
+        assert scene_values(path, node_name=name)["mass"] == 2.5
