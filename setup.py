@@ -98,7 +98,8 @@ setup(
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",
     description="Prototype the properties of a rigid body: exact inertia from a mesh, flight under wrenches, Rerun",
-    long_description=Path("README.md").read_text("utf-8"),
+    # Beside this very file: `colcon build --symlink-install` runs a link to it elsewhere.
+    long_description=Path(__file__).resolve().with_name("README.md").read_text("utf-8"),
     long_description_content_type="text/markdown",
     **({"license_expression": "MIT"} if int(setuptools.__version__.partition(".")[0]) >= 77 else {"license": "MIT"}),
     license_files=["LICENSE"],
