@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import MeshError
+from ..base.rotation import length, times
 from ..mesh.nesting import component_nesting
 from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent
 from ..mesh.union import counted_once, united
@@ -133,9 +134,9 @@ def _weld_rims(surface: RepairedSurface, part: float = WELD) -> list[str]:
         return []
     points = surface.vertices[rim]
     used = surface.vertices[surface.triangles.ravel()]
-    tolerance = part * float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+    tolerance = part * length(used.max(axis=0) - used.min(axis=0))
     target = np.arange(len(rim))
-    _near_pairs(points, np.argsort(points @ _SWEEP, kind="stable"), tolerance, target)
+    _near_pairs(points, np.argsort(times(points, _SWEEP), kind="stable"), tolerance, target)
     moved = int(np.count_nonzero(target != np.arange(len(rim))))
     if not moved:
         return []

@@ -53,7 +53,7 @@ def code_tag() -> str:
         *(package / "mesh").glob("*.py"),
         *(package / "mass").glob("moments*.py"),
         *(package / "mass" / name for name in ("from_mesh.py", "verdict.py", "repair.py")),
-        package / "base" / "exact_arithmetic.py",
+        *(package / "base" / name for name in ("exact_arithmetic.py", "simd.py")),
     ]
     for path in sorted(sources):
         digest.update(path.read_bytes())

@@ -152,3 +152,8 @@ def test_the_bundled_studies_are_good_and_one_takes_every_body() -> None:
         variation(own, own.rows - 1).scenario  # noqa: B018
     box = read_study("box_tensor")
     assert sorted(box.vary[0].form.values) == body_names()
+
+
+def test_a_logarithmic_grid_hits_its_powers_of_ten():
+    own = study({**POKES, "samples": 1, "vary": {"mass": {"grid": {"from": 1e-3, "to": 1e3, "count": 7, "log": True}}}})
+    assert own.columns(np.arange(7))[0].tolist() == [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0]
