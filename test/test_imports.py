@@ -33,7 +33,7 @@ ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
 ALLOWED = {
     "numpy": ORDER,
     "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
-    "llvmlite": ("base.simd", "base.elementary"),  # comes with numba
+    "llvmlite": ("base.simd", "base.elementary", "base.provenance"),  # comes with numba
     "argcomplete": ("base.command_line",),
     "rich": ("cli", "base.progress"),
     "yaml": ("scene", "session", "sweep", "ros", "cli"),

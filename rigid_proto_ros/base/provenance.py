@@ -1,14 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""What results depend on beside their input: the processor and the versions. Equal ones give equal bits."""
+"""What a recording was made with beside its input. The package's own version decides about the bits; processor, C
+library and the other versions are named where bits differ all the same.
+"""
 
 from __future__ import annotations
 
+import os
 import platform
+import sysconfig
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from llvmlite import binding
+
 from .. import __version__
+
+MOTION = "2026-11-22"
+"""Since when the motion has had its present bits: versions with this date give the same ones, on any machine."""
 
 PACKAGES = ("numpy", "numba", "scipy", "pyarrow", "distributed")
 
@@ -26,11 +35,27 @@ def cpu() -> str:
 
 
 @cache
+def c_library() -> str:
+    """The C library and its version, without a blank: ``glibc-2.36``, or ``musl``."""
+    try:
+        return (os.confstr("CS_GNU_LIBC_VERSION") or "unknown").replace(" ", "-")
+    except (AttributeError, ValueError, OSError):
+        return "musl" if "musl" in str(sysconfig.get_config_var("HOST_GNU_TYPE")) else "unknown"
+
+
+@cache
 def versions(*others: str) -> dict[str, str]:
-    """Versions of this package, of Python, of what it computes with and of ``others``, by name; what isn't installed is
-    left out.
+    """Versions by name: of this package, of Python, of what it computes with and of ``others``, as far as they are
+    installed; with them the kind of machine and the C library.
     """
-    found = {"rigid_proto_ros": __version__, "python": platform.python_version()}
+    found = {
+        "rigid_proto_ros": __version__,
+        "motion": MOTION,
+        "machine": platform.machine(),
+        "c_library": c_library(),
+        "python": platform.python_version(),
+        "llvm": ".".join(map(str, binding.llvm_version_info)),
+    }
     for name in (*PACKAGES, *others):
         try:
             found[name] = version(name)
