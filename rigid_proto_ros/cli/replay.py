@@ -17,7 +17,11 @@ from .options import add_session
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario
+    from ..session.check import Difference
     from ..session.recorded_session import RecordedSession
+
+PAST_DIFFERENCE_NS = 1_000_000_000
+"""What a recording of both motions shows beyond the first difference: up to there they are one to the eye."""
 
 REFUSALS_SHOWN = 10
 """Of a run: a flood of commands can have been refused."""
@@ -38,6 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser, node="the node to send commands to, or the body in a bag with several")
     parser.add_argument(
         "--verify", action="store_true", help="simulate it again and compare; exit 1 at the first difference"
+    )
+    parser.add_argument(
+        "--until-differs",
+        action="store_true",
+        help="with --verify --record FILE.rrd: if it differs, record both motions, the computed one as a ghost",
     )
     parser.add_argument("--record", metavar="FILE", help="convert it to another recording, .rrd (Rerun) or .mcap")
     parser.add_argument(
@@ -62,14 +71,15 @@ def run(args: argparse.Namespace) -> int:
         _tell(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.repair:
         print(f"  repaired: {args.repair}")
-    if args.record:
+    if args.record and not args.until_differs:
         from ..rerun_view.session_files import record
 
         with Progress(f"recording {args.record}") as progress:
             record(runs, args.record, given_scene(args.scene), progress.fraction)
     if asked(args):
         _export(runs, args)
-    _say_how_to_see_it(args)
+    if not args.until_differs:
+        _say_how_to_see_it(args)
     if args.as_scene:
         _branch(runs[-1], args)
     status = _verify(runs, args) if args.verify else 0
@@ -83,6 +93,8 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("--at", args.at, "a time together with --as-scene FILE.yaml")
     if args.at is not None and not (math.isfinite(args.at) and 0.0 <= args.at <= 1e9):
         raise InputError("--at", args.at, "seconds from 0 to 1e9")
+    if args.until_differs and not (args.verify and args.record and args.record.endswith(".rrd")):
+        raise InputError("--until-differs", True, "it together with --verify and --record FILE.rrd")
     if args.speed is not None and not (math.isfinite(args.speed) and 1e-6 <= args.speed <= 1e6):
         raise InputError("--speed", args.speed, "a factor from 1e-6 to 1e6")
     if args.speed is not None and args.publish != "states":
@@ -115,7 +127,7 @@ def _say_how_to_see_it(args: argparse.Namespace) -> None:
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
-    from ..session.check import BeganLaterError, other_versions, verify
+    from ..session.check import BeganLaterError, verify
 
     verified = 0
     for number, session in enumerate(runs, 1):
@@ -131,10 +143,13 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
             continue
         if difference is not None:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
-            if others := other_versions(session):
-                print(f"rigid_proto replay: bit for bit it is read by what it was made with: {others}", file=sys.stderr)
+            _tell_difference(difference, session)
+            if args.until_differs:
+                _record_both(session, difference, args)
             return 1
         verified += 1
+    if args.until_differs:
+        print(f"  the motions don't differ: {args.record} is not written")
     print("  verified: every command and state is reproduced bit for bit")
     return 0
 
@@ -150,6 +165,35 @@ def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
     if len(runs) > 1:
         print(f"  exported is run {len(runs)}, the last")
     write_exports(args, record, looks_of_session(session, given), lambda text: print(f"  {text}"))
+
+
+def _tell_difference(difference: Difference, session: RecordedSession) -> None:
+    """What led to a difference, as far as the recording says."""
+    from ..base.provenance import versions
+    from ..session.check import made_with_table
+
+    if difference.command:
+        print(f"  before it acted {difference.command}", file=sys.stderr)
+    table = made_with_table(session)
+    if not table:
+        print("  the recording doesn't say what it was made with", file=sys.stderr)
+        return
+    motion = {name: (was, here) for name, was, here in table}.get("motion", ("before 2026-11-22", ""))
+    if motion[0] != motion[1]:
+        here = versions()["motion"]
+        print(f"  it needs a version whose motion is of {motion[0]}; this one's is of {here}", file=sys.stderr)
+    wide = [max(len(row[k]) for row in table) for k in (0, 1)]
+    for name, was, now in table:
+        mark = "" if was == now else "   <- differs"
+        print(f"  {name:{wide[0]}}  recorded {was:{wide[1]}}  here {now}{mark}", file=sys.stderr)
+
+
+def _record_both(session: RecordedSession, difference: Difference, args: argparse.Namespace) -> None:
+    from ..rerun_view.session_files import record_beside
+
+    with Progress(f"recording {args.record}") as progress:
+        record_beside(session, args.record, difference.time_ns + PAST_DIFFERENCE_NS, progress.fraction)
+    print(f"  both motions, the computed one as a ghost: rerun {args.record}")
 
 
 def given_scene(path: str | None) -> Scenario | None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import rotate
+from ..simulation.observer import STATE_FIELDS
 from . import cdr
 
 _TIME = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
@@ -106,6 +107,15 @@ PROJECTIONS: dict[str, Callable[[list[float]], list[float]]] = {"pose": pose_row
 """What each state topic carries of a state row (13 floats), in the order of ``simulation/observer.py``'s
 ``STATE_FIELDS``.
 """
+
+_TWIST_FIELDS = tuple(f"{part}.{axis}" for part in ("linear", "angular") for axis in "xyz")
+FIELDS = {
+    "": STATE_FIELDS,
+    "pose": STATE_FIELDS[:7],
+    "twist": _TWIST_FIELDS,
+    "odom": (*STATE_FIELDS[:7], *_TWIST_FIELDS),
+}
+"""Names of the numbers of each projection, and of the state row itself."""
 
 _DOUBLES = {"pose": 7, "twist": 6, "odom": cdr.ODOMETRY_DOUBLES}
 

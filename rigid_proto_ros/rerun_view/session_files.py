@@ -11,7 +11,7 @@ from types import ModuleType
 from ..base.errors import InputError
 from ..base.output_file import output_file
 from ..scene.scenario import Scenario
-from ..session.playback import play
+from ..session.playback import play, play_beside
 from ..session.recorded_session import RecordedSession
 from .recorder import make_recorder
 
@@ -112,6 +112,21 @@ def record(
         recorder.close()
     if error := getattr(recorder, "error", ""):
         raise InputError("--record", str(path), f"a file that can be written ({error})")
+
+
+def record_beside(
+    session: RecordedSession, path: str, until_ns: int, progress: Callable[[float, float], None] = lambda *_: None
+) -> None:
+    """Record a session's states up to ``until_ns`` with the motion computed anew beside them, as a ghost; raises
+    InputError.
+    """
+    recorder = make_recorder(path, session.node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
+    try:
+        play_beside(session, recorder, until_ns, progress)
+    finally:
+        recorder.close()
+    if error := getattr(recorder, "error", ""):
+        raise InputError("--record", path, f"a file that can be written ({error})")
 
 
 def _after(before: int, total: int, progress: Callable[[float, float], None]) -> Callable[[float, float], None]:

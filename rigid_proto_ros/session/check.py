@@ -1,26 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Is a recording what it says? Its chain of events, and every state computed anew, to the bit."""
+"""Is a recording what it says? Its chain of events, and every state computed anew, to the bit; and where they part."""
 
 from __future__ import annotations
 
 import json
-import platform
+import struct
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.provenance import cpu, versions
-from ..messages.session_messages import PROJECTIONS
+from ..messages.session_messages import FIELDS, PROJECTIONS
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Observer
 from .recorded_session import RecordedSession
 from .replay import Resimulation, as_told, mesh_finder, resimulation, session_scenario
 from .runs import decode_event
-
-BITS_DEPEND_ON = ("rigid_proto_ros", "numpy", "numba", "cpu")
-"""Of what a recording says that it was made with: other ones may give other last digits."""
 
 
 class BeganLaterError(InputError):
@@ -29,10 +26,13 @@ class BeganLaterError(InputError):
 
 @dataclass(frozen=True)
 class Difference:
-    """The first place where the recording and the new computation part."""
+    """The first place where the recording and the new computation part. command: the last one that acted before it,
+    with its number from 1; empty where none did, or where the difference is in the commands.
+    """
 
     time_ns: int
     what: str
+    command: str = ""
 
     def __str__(self) -> str:
         return f"at {self.time_ns / 1e9:.9g} s: {self.what}"
@@ -79,29 +79,24 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
         difference = _row_difference(
-            time_ns, name, row, as_told(session, again.scenario.parameters, name, time_ns, computed)
+            time_ns, count + 1, name, row, as_told(session, again.scenario.parameters, name, time_ns, computed)
         )
         if difference is not None:
             if count == 0 and not recorded and time_ns > 0:
                 # Nothing in it says that it is complete.
                 raise _began_later(session)
-            return difference
+            return replace(difference, command=_command_before(events, recorded, time_ns))
         if count % 1000 == 0:
             progress(count / len(states))
     return _what_follows(again, lines, recorded, events)
 
 
-def other_versions(session: RecordedSession) -> str:
-    """What the recording was made with and isn't here, on which its bits depend; empty where nothing
-    differs or is known.
+def made_with_table(session: RecordedSession) -> list[tuple[str, str, str]]:
+    """What the recording says that it was made with, and the same here: (name, recorded, here); "none" where a package
+    isn't installed. Empty for a recording that doesn't say.
     """
-    here = {"cpu": cpu(), **versions(*session.made_with)}
-    differing = [
-        f"{name} {recorded} (here {here.get(name, 'none')})"
-        for name, recorded in session.made_with.items()
-        if name in BITS_DEPEND_ON and recorded not in (here.get(name), platform.machine())
-    ]
-    return ", ".join(differing)
+    here = {"cpu": cpu(), **versions(*(name for name in session.made_with if name != "began"))}
+    return [(name, was, here.get(name, "none")) for name, was in session.made_with.items() if name != "began"]
 
 
 def broken_link(lines: Sequence[str]) -> int | None:
@@ -139,14 +134,35 @@ def _states_in_order(session: RecordedSession) -> Iterator[tuple[int, str, np.nd
     yield from sorted(merged, key=lambda state: state[0])
 
 
-def _row_difference(time_ns: int, name: str, recorded: np.ndarray, computed: np.ndarray) -> Difference | None:
+def _row_difference(
+    time_ns: int, number: int, name: str, recorded: np.ndarray, computed: np.ndarray
+) -> Difference | None:
+    """How the ``number``-th state differs, by the variable that differs most."""
     if name:
         computed = np.array(PROJECTIONS[name](computed.tolist()))
     if computed.tobytes() == recorded.tobytes():
         return None
-    worst = int(np.argmax(np.abs(computed - recorded)))
-    what = f"{name or 'state'} differs: {float(recorded[worst])!r} recorded, {float(computed[worst])!r} computed"
-    return Difference(time_ns, what)
+    pairs = list(zip(recorded.tolist(), computed.tolist(), strict=True))
+    worst = max(range(len(pairs)), key=lambda k: (abs(pairs[k][1] - pairs[k][0]), _ulps(*pairs[k])))
+    was, now = pairs[worst]
+    where = f"state {number}, {name + ' ' if name else ''}{FIELDS[name][worst]}"
+    return Difference(time_ns, f"{where} differs by {_ulps(was, now)} ulp: {was!r} recorded, {now!r} computed")
+
+
+def _ulps(a: float, b: float) -> int:
+    """How many doubles b lies from a."""
+    first, second = (struct.unpack("<q", struct.pack("<d", x))[0] for x in (a, b))
+    first, second = (bits if bits >= 0 else -(bits & (2**63 - 1)) for bits in (first, second))
+    return abs(first - second)
+
+
+def _command_before(events: list, recorded: Sequence[str], time_ns: int) -> str:
+    """The last command that acted before a state: at its own time, commands act after it."""
+    before = [number for number, event in enumerate(events, 1) if event[0] < time_ns]
+    if not before:
+        return ""
+    last = max(before, key=lambda number: (events[number - 1][0], number))
+    return f"command {last}: {recorded[last - 1]}"
 
 
 def _line_difference(recorded: Sequence[str], computed: Sequence[str], begin: int = 0) -> Difference | None:
@@ -175,7 +191,7 @@ def _begins_at_its_start(session: RecordedSession, events: list) -> bool:
     time_ns, name, row = first
     again = Resimulation(session_scenario(session), [], None, mesh_finder(session), session.node_name)
     told = as_told(session, again.scenario.parameters, name, time_ns, again.advance(time_ns))
-    return _row_difference(time_ns, name, row, told) is None
+    return _row_difference(time_ns, 1, name, row, told) is None
 
 
 def _began_later(session: RecordedSession) -> BeganLaterError:

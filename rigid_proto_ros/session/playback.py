@@ -49,6 +49,32 @@ def play(
             again.ghost.advance(time_ns)
 
 
+def play_beside(
+    session: RecordedSession,
+    observer: Observer,
+    until_ns: int,
+    progress: Callable[[float, float], None] = lambda _done, _total: None,
+) -> None:
+    """Tell ``observer`` the recorded states up to ``until_ns``, and as a ghost the motion that is computed anew."""
+    again = resimulation(session, observer)
+    notify_start(observer, again.scenario)
+    again.simulation.announce()
+    shown = None
+    for count, (time_ns, row) in enumerate(sorted_states(session)):
+        if time_ns > until_ns:
+            break
+        progress(count, len(session.times))
+        try:
+            computed = again.advance(time_ns)
+        except InputError:
+            break  # a command that can't have been taken
+        if again.simulation.setup is not shown:
+            shown = again.simulation.setup
+            observer.ghost_began(time_ns, again.simulation.snapshot())
+        observer.state(time_ns, row)
+        observer.ghost_state(time_ns, computed)
+
+
 def sorted_states(session: RecordedSession) -> Iterator[tuple[int, np.ndarray]]:
     """(time_ns, row) of every state in the order of time."""
     for k in np.argsort(session.times, kind="stable").tolist():

@@ -12,7 +12,7 @@ pytest.importorskip("mcap")
 from rigid_proto_ros.base.provenance import versions
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.session.check import Difference, other_versions, verify
+from rigid_proto_ros.session.check import Difference, made_with_table, verify
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.session.replay import resimulation
 from rigid_proto_ros.session.runs import decode_event
@@ -30,6 +30,29 @@ def recorded(integrator: str) -> RecordedSession:
 
 def test_a_session_recorded_before_with_fixed_steps_is_verified_to_the_bit() -> None:
     assert verify(recorded("discrete_gradient")) is None
+
+
+@pytest.mark.parametrize("name", ["pokes_and_changes", "string", "jitter"])
+def test_a_session_is_verified_to_the_bit_for_as_long_as_the_motion_has_the_bits_it_was_recorded_with(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = RECORDED / f"same_bits_{name}.mcap"
+    (session,) = read_runs(path)
+    same = session.made_with["motion"] == versions()["motion"]
+    assert main(["replay", str(path), "--verify"]) == (0 if same else 1)
+    needed = f"it needs a version whose motion is of {session.made_with['motion']}"
+    assert same or needed in capsys.readouterr().err
+
+
+def test_a_session_of_another_motion_is_told_which_version_it_needs(monkeypatch, capsys) -> None:
+    path = RECORDED / "same_bits_jitter.mcap"
+    monkeypatch.setitem(versions(), "motion", "2031-01-01")
+    monkeypatch.setitem(versions("mcap"), "motion", "2031-01-01")
+    (session,) = read_runs(path)
+    monkeypatch.setitem(versions(*(name for name in session.made_with if name != "began")), "motion", "2031-01-01")
+    monkeypatch.setattr("rigid_proto_ros.session.check.verify", lambda *_: Difference(0, "state 1 differs"))
+    assert main(["replay", str(path), "--verify"]) == 1
+    assert "it needs a version whose motion is of 2026-11-22; this one's is of 2031-01-01" in capsys.readouterr().err
 
 
 def test_a_session_recorded_before_by_auto_moves_as_it_did() -> None:
@@ -52,7 +75,12 @@ def test_where_other_versions_give_other_bits_the_ones_that_recorded_are_named(e
         assert main(["simulate", "t_handle", "--duration", "0.1", record, str(path)]) == 0
     (session,) = read_runs(path)
     assert session.made_with["rigid_proto_ros"] == "0.0.9" and session.made_with["numba"] == versions()["numba"]
-    assert other_versions(session) == f"rigid_proto_ros 0.0.9 (here {versions()['rigid_proto_ros']})"
+    table = {name: (was, here) for name, was, here in made_with_table(session)}
+    assert table["rigid_proto_ros"] == ("0.0.9", versions()["rigid_proto_ros"])
+    assert {"cpu", "machine", "c_library", "llvm", "numba", "numpy", "python"} <= set(table)
+    assert [name for name, (was, here) in table.items() if was != here] == ["rigid_proto_ros"]
     monkeypatch.setattr("rigid_proto_ros.session.check.verify", lambda *_: Difference(0, "state differs"))
     assert main(["replay", str(path), "--verify"]) == 1
-    assert "it was made with: rigid_proto_ros 0.0.9" in capsys.readouterr().err
+    lines = capsys.readouterr().err.splitlines()
+    assert any(line.split()[:3] == ["rigid_proto_ros", "recorded", "0.0.9"] for line in lines)
+    assert [line for line in lines if line.endswith("<- differs")] == [line for line in lines if " 0.0.9 " in line]

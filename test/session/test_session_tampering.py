@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +19,11 @@ from scripts import EVERY_KIND
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.messages.session_messages import FIELDS
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
-from rigid_proto_ros.session.check import broken_link, verify
+from rigid_proto_ros.session.check import Difference, broken_link, verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.event_log import EventLog
@@ -150,8 +152,31 @@ def test_one_bit_of_a_state_is_found(session, topic):
         rows.view(np.uint64)[k, column] ^= np.uint64(1)
         published = {**session.published, topic: replace(session.published[topic], rows=rows)}
         difference = verify(replace(session, published=published))
-        assert f"{topic} differs" in str(difference)
-        assert difference.time_ns == session.published[topic].times[k]
+        assert difference is not None and difference.time_ns == session.published[topic].times[k]
+        name = FIELDS[topic][column]
+        assert re.fullmatch(rf"at \S+ s: state \d+, {topic} {name} differs by 1 ulp: \S+ recorded, .*", str(difference))
+        before = [line for time_ns, line in session.events if time_ns < difference.time_ns]
+        assert difference.command == (f"command {len(before)}: {before[-1]}" if before else "")
+
+
+@needs_rerun
+def test_both_motions_are_in_the_recording_of_one_that_differs(session, tmp_path, capsys, monkeypatch):
+    from rerun.chunk import RrdReader
+
+    from rigid_proto_ros.rerun_view.entities import GHOST
+
+    path, both = tmp_path / "flown.mcap", tmp_path / "both.rrd"
+    assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(path)]) == 0
+    arguments = ["replay", str(path), "--verify", "--until-differs"]
+    assert main(arguments) == 2
+    assert "--record FILE.rrd" in capsys.readouterr().err
+    assert main([*arguments, "--record", str(both)]) == 0
+    assert not both.exists() and "don't differ" in capsys.readouterr().out
+    monkeypatch.setattr("rigid_proto_ros.session.check.verify", lambda *_: Difference(10**8, "state 11 differs"))
+    assert main([*arguments, "--record", str(both)]) == 1
+    (read,) = read_runs(both)
+    assert len(read.times) == 51
+    assert sum(chunk.num_rows for chunk in RrdReader(both).stream() if chunk.entity_path.strip("/") == GHOST) >= 51
 
 
 @needs_rerun
