@@ -49,8 +49,10 @@ SWITCHES = {
 ZOOM = (0.15, 1.2)
 """Body sizes in the picture's units between which a body may grow or shrink before the picture is scaled anew."""
 
-ABOVE_FLOOR = 2e-3
-"""Picture units that the shadow lies above the floor, whose lines would flicker through it."""
+BELOW_FLOOR = 2e-3
+"""Picture units that the shadow lies below the floor. Above it, a browser that draws the shadow first would leave out
+the floor's lines around it; at one height they would flicker.
+"""
 
 LEASH = 0.2
 """Body sizes that the body may move from the picture's middle before the picture follows."""
@@ -143,7 +145,7 @@ class SceneView:
         at = self._drawn(row[0:3])
         self.body.place(at, row[3:7])
         if self.switches.shown("Grid"):
-            below = np.array([at[0], at[1], FLOOR + ABOVE_FLOOR])
+            below = np.array([at[0], at[1], FLOOR - BELOW_FLOOR])
             self._shadow.draw(now_s, row[3:7], *self.body.placement, self.radius / self.unit, below)
         else:
             self._shadow.hide()
