@@ -30,6 +30,8 @@ EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
 # Films; pygfx needs a Vulkan driver.
 VIDEO = ["pygfx>=0.17", "imageio-ffmpeg>=0.5"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
+# Mass and tensor from recorded motion; zstandard comes with mcap.
+IDENTIFY = ["scipy>=1.11", *MCAP]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 # COLLADA and 3MF files through trimesh, the hull, and the union of overlapping parts.
@@ -81,13 +83,14 @@ setup(
     python_requires=">=3.11",
     install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0"],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *EXPORT, *VIDEO, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *VIDEO, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
         "rerun": RERUN,
         "mcap": MCAP,
         "workbench": WORKBENCH,
         "sweep": SWEEP,
+        "identify": IDENTIFY,
         "export": EXPORT,
         "video": VIDEO,
         "terminal": TERMINAL,

@@ -80,9 +80,8 @@ def run(args: argparse.Namespace) -> int:
         from ..identify.identification import identify
         from ..identify.report import as_json, as_text, as_urdf
     except ImportError as error:
-        raise InputError(
-            "identify", f"scipy and mcap have to be installed: pip install scipy mcap zstandard ({error})"
-        ) from None
+        missing = f"{str(error.name).partition('.')[0]} is missing: pip install 'rigid_proto_ros[identify]'"
+        raise InputError("identify", missing) from None
     choice = _choice(args)
     flights, scenes = _flights(args.sessions, choice)
     known, candidates = _known(args, choice, scenes)

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -125,3 +127,13 @@ def test_a_recording_that_cannot_be_written_is_one_line(flight: tuple, capsys: p
     capsys.readouterr()
     assert main(["identify", str(flight[0]), "--to", "0.3", "--record", "shown.txt"]) == 2
     assert "ends in .rrd" in capsys.readouterr().err
+
+
+def test_without_scipy_one_line_names_the_extra() -> None:
+    code = "import sys; sys.modules['scipy'] = None; from rigid_proto_ros.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "identify", "x.mcap"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    [line] = done.stderr.strip().splitlines()
+    assert "scipy is missing: pip install 'rigid_proto_ros[identify]'" in line

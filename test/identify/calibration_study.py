@@ -49,10 +49,42 @@ def bundled_truth(name: str) -> tuple[Values, float]:
     return mf.values_of(properties.mass, com, properties.inertia, EARTH), size
 
 
-def throw(number: int, poked: bool, first: str = "ball", seconds: float = 2.0) -> Throw:
-    """One flight of a bundled body, by a number that decides all. first: what the estimate begins with,
-    ``ball`` or ``wrong``.
+@dataclass(frozen=True)
+class MeasuredThrow:
+    """A throw of a bundled body, by a number that decides all. size: half its diagonal [m]; start (13,): the tracked
+    frame's.
     """
+
+    number: int
+    body: str
+    truth: Values
+    size: float
+    start: np.ndarray
+    flight: MeasuredFlight
+
+    def bound(self) -> Estimate:
+        """What nobody has: the truth, with its Fisher information."""
+        topics = topics_of([self.flight])
+        unknowns = make_unknowns(DEFAULT_FIT, topics)
+        sigmas = dict(zip((POSITION, ATTITUDE), mf.MOCAP, strict=True))
+        [segment] = sh.cut([self.flight], 1e9, topics, lambda s: sigmas[s.kind], lambda s: np.ones(len(s.times_ns)))
+        linear = sh.linearized(segment, self.start, self.truth, unknowns.physical)
+        assert linear is not None
+        root = sh.compressed(*linear)[sh.START : -1, sh.START : -1]
+        return Estimate(self.truth, unknowns, [segment], self.start[None], {}, root, root, 0.0, 0)
+
+    def error(self, theta: np.ndarray) -> float:
+        """How far a body is from the truth, in standard deviations of the Cramér-Rao bound, root mean square of all ten
+        directions.
+        """
+        alike = self.truth.theta.copy()
+        alike[mp.MASS] = theta[mp.MASS]
+        change = np.array([theta[mp.MASS] - self.truth.theta[mp.MASS], *mp.physical_change(alike, theta)[1:]])
+        return float(np.linalg.norm(self.bound().root @ change) / np.sqrt(mp.PARAMETERS))
+
+
+def measured_throw(number: int, poked: bool, seconds: float = 2.0) -> MeasuredThrow:
+    """One flight, with noise."""
     rng = np.random.default_rng(number)
     names = sorted(body_names())
     name = names[number % len(names)]
@@ -63,24 +95,23 @@ def throw(number: int, poked: bool, first: str = "ball", seconds: float = 2.0) -
         mass = mp.mass_of(truth.theta).mass
         point = tuple((truth.theta[mp.COM] + 0.6 * size * _direction(rng)).tolist())
         load = mf.acting((0.4 * seconds, 0.05, "world", point, 20.0 * mass * _direction(rng), (0.0, 0.0, 0.0)))
-    flight = mf.mocap(truth, start, rng, seconds, load=load)
-    found = identify([flight], known=Known(theta=_first(first, truth, rng), length=size))
+    return MeasuredThrow(number, name, truth, size, start, mf.mocap(truth, start, rng, seconds, load=load))
+
+
+def throw(number: int, poked: bool, first: str = "ball") -> Throw:
+    """One throw, estimated. first: what the estimate begins with, ``ball`` or ``wrong``."""
+    made = measured_throw(number, poked)
+    begin = _first(first, made.truth, np.random.default_rng([number, 1]))
+    found = identify([made.flight], known=Known(theta=begin, length=made.size))
     failed = any(check.noise > 1.5 * sd for check, sd in zip(found.checks, mf.MOCAP, strict=True))
-    return Throw(name, normalised_errors(found, truth), failed, _against_bound(found, flight, truth, start, size))
+    return Throw(made.body, normalised_errors(found, made.truth), failed, _against_bound(found, made))
 
 
-def _against_bound(
-    found: Identification, flight: MeasuredFlight, truth: Values, start: np.ndarray, size: float
-) -> dict[str, float]:
-    unknowns = make_unknowns(DEFAULT_FIT, topics_of([flight]))
-    sigmas = dict(zip((POSITION, ATTITUDE), mf.MOCAP, strict=True))
-    [segment] = sh.cut([flight], 1e9, topics_of([flight]), lambda s: sigmas[s.kind], lambda s: np.ones(len(s.times_ns)))
-    triangle = sh.compressed(*sh.linearized(segment, start, truth, unknowns.physical))
-    root = triangle[sh.START : -1, sh.START : -1]
-    ideal = Estimate(truth, unknowns, [segment], start[None], {}, root, root, 0.0, 0)
-    bound = Identification([flight], ideal, Visibility(ideal, size), [], [], [])
-    names, told, true = _numbers(found, truth)
-    sds = _numbers(bound, truth)[1]
+def _against_bound(found: Identification, made: MeasuredThrow) -> dict[str, float]:
+    ideal = made.bound()
+    bound = Identification([made.flight], ideal, Visibility(ideal, made.size), [], [], [])
+    names, told, true = _numbers(found, made.truth)
+    sds = _numbers(bound, made.truth)[1]
     return {
         name: (one.value - x) / sd.sd
         for name, one, sd, x in zip(names, told, sds, true, strict=True)
