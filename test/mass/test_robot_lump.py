@@ -55,16 +55,13 @@ def for_mujoco(urdf: str):
     for part in root.iter("link"):
         for shape in [*part.findall("visual"), *part.findall("collision")]:
             part.remove(shape)
-        if part.find("inertial") is None:
-            root.remove(part)
-            root.remove(next(j for j in root.findall("joint") if j.find("child").get("link") == part.get("name")))
     children = {found.find("child").get("link") for found in root.findall("joint")}
     base = next(part.get("name") for part in root.findall("link") if part.get("name") not in children)
     free = (
         '<r><link name="world"/><joint name="free" type="floating"><parent link="world"/><child link="{}"/></joint></r>'
     )
     root.extend(ElementTree.fromstring(free.format(base)))
-    root.append(ElementTree.fromstring('<mujoco><compiler fusestatic="false" inertiafromgeom="false"/></mujoco>'))
+    root.append(ElementTree.fromstring('<mujoco><compiler fusestatic="true" inertiafromgeom="false"/></mujoco>'))
     return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
 
 
