@@ -30,9 +30,9 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
 @dataclass(frozen=True)
 class Parameter:
-    """type: ``double``, ``doubles``, ``integer``, ``bool`` or ``string``. lower and upper are inclusive unless
-    ``above``: then values must lie above lower. lengths: accepted lengths of ``doubles``. changes: LIVE, AT_RESET or
-    READ_ONLY. default: None where the name is the user's choice.
+    """type: ``double``, ``doubles``, ``integer``, ``bool``, ``string``, or ``bool or string``, of which the strings are
+    the ``choices``. lower and upper are inclusive unless ``above``: then values must lie above lower. lengths: accepted
+    lengths of ``doubles``. changes: LIVE, AT_RESET or READ_ONLY. default: None where the name is the user's choice.
     """
 
     name: str
@@ -50,6 +50,8 @@ class Parameter:
     @property
     def accepted(self) -> str:
         """What the parameter accepts, in words."""
+        if self.type == "bool or string":
+            return ", ".join(["true", "false", *self.choices])
         if self.choices:
             return ", ".join(repr(c) if c == "" else c for c in self.choices)
         if self.type == "bool":
@@ -131,6 +133,7 @@ _CONVERSIONS: dict[str, Callable[[object], Value | None]] = {
     "integer": _to_integer,
     "bool": lambda value: value if isinstance(value, bool) else None,
     "string": lambda value: value if isinstance(value, str) else None,
+    "bool or string": lambda value: value if isinstance(value, (bool, str)) else None,
 }
 
 
@@ -178,9 +181,10 @@ def numbers(
     return _field(default, declaration)
 
 
-def switch(default: bool, description: str, *, changes: str = LIVE) -> Any:
-    """True or false."""
-    return _field(default, Parameter("", "bool", default, description, changes=changes))
+def switch(default: bool, description: str, *, choices: tuple[str, ...] = (), changes: str = LIVE) -> Any:
+    """True or false, or one of the choices."""
+    type_name = "bool or string" if choices else "bool"
+    return _field(default, Parameter("", type_name, default, description, choices=choices, changes=changes))
 
 
 def text(default: str, description: str, *, choices: tuple[str, ...] = (), changes: str = LIVE) -> Any:

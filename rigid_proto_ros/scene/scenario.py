@@ -39,7 +39,7 @@ class BodyMesh:
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
-    made_of: tuple[str, bool, str]
+    made_of: tuple[str, bool | str, str]
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def _no_mesh() -> InputError:
     return InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
 
 
-def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
+def _made_of(parameters: Parameters) -> tuple[str, bool | str, str]:
     return parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback
 
 

@@ -77,7 +77,7 @@ class BodyTab:
                 self._judge(scenario.body_mesh.mesh, parameters.mesh_repair, parameters.mesh_fallback)
             )
 
-    async def _judge(self, mesh: Mesh, repair: bool, fallback: str) -> None:
+    async def _judge(self, mesh: Mesh, repair: bool | str, fallback: str) -> None:
         body = await asyncio.to_thread(mesh_body, mesh, repair=repair, fallback=fallback)
         self.show_verdict(
             [f"{finding.severity}: {finding.message}" for finding in body.verdict.findings]

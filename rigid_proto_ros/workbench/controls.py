@@ -77,7 +77,7 @@ class Controls:
     def checkbox(self, name: str, label: str) -> Handle:
         """A switch."""
         handle = self._gui.add_checkbox(label, False, hint=_hint(name))
-        return self.bind(handle, lambda values: values[name], lambda value: {name: value})
+        return self.bind(handle, lambda values: bool(values[name]), lambda value: {name: value})
 
     def choice(self, name: str, label: str, options: tuple[str, ...] | None = None) -> Handle:
         """One of the parameter's choices; an empty one is shown as a dash."""

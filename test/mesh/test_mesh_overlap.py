@@ -127,3 +127,19 @@ def test_the_command_takes_the_union_and_gives_the_mesh_back(tmp_path, capsys):
     assert "union" in capsys.readouterr().err
     with pytest.raises(InputError, match="union"):
         body(box(), repair="onion")
+
+
+def test_a_scene_takes_the_union(tmp_path):
+    from rigid_proto_ros.scene.scenario import make_scenario, scene_text
+    from rigid_proto_ros.scene.scene_file import read_scene_text
+
+    path = tmp_path / "two.obj"
+    path.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
+    for repair, expected in ((False, 9000.0), (True, 7000.0), ("union", 8000.0)):
+        values = {"mesh": str(path), "mesh_repair": repair}
+        assert make_scenario(values).setup.body.mass == pytest.approx(expected)
+        again = read_scene_text(scene_text(values)).values
+        assert again["mesh_repair"] == repair
+    for wrong in ("onion", "", 1):
+        with pytest.raises(InputError, match="true, false, union"):
+            make_scenario({"mesh": str(path), "mesh_repair": wrong})
