@@ -108,7 +108,8 @@ def main() -> int:
             except (subprocess.CalledProcessError, KeyError, OSError) as error:
                 equal, said = False, f"not run: {error}"
             same = same and equal
-            print(f"{name:14s} {'equal ' if equal else 'DIFFER'} {time.monotonic() - began:6.0f} s  {said}", flush=True)
+            word = "equal" if equal else "not run" if said.startswith("not run") else "DIFFERS"
+            print(f"{name:14s} {word:7s} {time.monotonic() - began:6.0f} s  {said}", flush=True)
     finally:
         if "WORK" not in os.environ:
             shutil.rmtree(work, ignore_errors=True)
