@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 from command_rig import RosClient
 from ros_process import running_node
@@ -99,8 +100,34 @@ def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with the scenes and examples beside it, as commands from the repository's root expect."""
     for name in ("config", "msg_examples"):
         (tmp_path / name).symlink_to(SOURCE / name)
+    write_robot(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def write_robot(folder: Path) -> None:
+    """The reader's robot.urdf, and urdf/robot.urdf: three boxes of 2700 kg/m³ with the inertials of their shapes."""
+    shapes = {
+        "arm": "<box size='0.3 0.2 0.1'/>",
+        "upper_arm": "<mesh filename='upper_arm.stl'/>",
+        "gripper": "<box size='0.3 0.2 0.1'/>",
+    }
+    inertia = "<inertia ixx='{:.17g}' ixy='0' ixz='0' iyy='{:.17g}' iyz='0' izz='{:.17g}'/>".format(
+        *(np.array([0.2**2 + 0.1**2, 0.3**2 + 0.1**2, 0.3**2 + 0.2**2]) * (16.2 / 12.0))
+    )
+    inertial = f"<inertial><mass value='16.2'/>{inertia}</inertial>"
+    links = "".join(
+        f"<link name='{name}'>{inertial}<visual><geometry>{shape}</geometry></visual></link>"
+        for name, shape in shapes.items()
+    )
+    joints = "".join(
+        f"<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 0 1'/></joint>"
+        for name, parent, child in (("shoulder", "arm", "upper_arm"), ("lift", "upper_arm", "gripper"))
+    )
+    for place in (folder, folder / "urdf"):
+        place.mkdir(exist_ok=True)
+        trimesh.creation.box((0.3, 0.2, 0.1)).export(place / "upper_arm.stl")
+        (place / "robot.urdf").write_text(f"<robot name='r'>{links}{joints}</robot>")
 
 
 def test_every_command_is_of_a_kind_that_some_test_looks_at() -> None:

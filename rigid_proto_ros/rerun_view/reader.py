@@ -85,7 +85,6 @@ def _read(path: Path, session: RecordedSession) -> None:
         elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity <= first_mesh):
             # A run may have had several; it began with the first.
             first_mesh = entity
-            # Columns of one entity may lie in chunks of their own, as in a file that was mended.
             held = batch.schema.names
             if "sha256" in held:
                 session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
@@ -100,8 +99,12 @@ def _read(path: Path, session: RecordedSession) -> None:
 
 def _read_properties(entity: str, batch: Any, session: RecordedSession) -> None:
     if entity == MADE_WITH:
-        packages = dict(text.rsplit(" ", 1) for text in batch.column("versions").to_pylist()[0])
-        session.made_with = {"cpu": batch.column("cpu").to_pylist()[0][0], **packages}
+        # Columns of one entity may lie in chunks of their own, as in a file that was mended.
+        held = batch.schema.names
+        if "cpu" in held:
+            session.made_with["cpu"] = batch.column("cpu").to_pylist()[0][0]
+        if "versions" in held:
+            session.made_with |= dict(text.rsplit(" ", 1) for text in batch.column("versions").to_pylist()[0])
     elif "RecordingInfo:name" in batch.schema.names:
         # The node's name, and which run of it.
         name = batch.column("RecordingInfo:name").to_pylist()[0][0].split(",")[0]
