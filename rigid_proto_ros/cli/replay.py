@@ -143,7 +143,8 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
             continue
         if difference is not None:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
-            _tell_difference(difference, session)
+            if not difference.tampered:
+                _tell_difference(difference, session)
             if args.until_differs:
                 _record_both(session, difference, args)
             return 1

@@ -27,12 +27,14 @@ class BeganLaterError(InputError):
 @dataclass(frozen=True)
 class Difference:
     """The first place where the recording and the new computation part. command: the last one that acted before it,
-    with its number from 1; empty where none did, or where the difference is in the commands.
+    with its number from 1; empty where none did, or where the difference is in the commands. tampered: a command was
+    changed after it was recorded, which no machine or version explains.
     """
 
     time_ns: int
     what: str
     command: str = ""
+    tampered: bool = False
 
     def __str__(self) -> str:
         return f"at {self.time_ns / 1e9:.9g} s: {self.what}"
@@ -62,7 +64,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         if broken == 1 and not _begins_at_its_start(session, events):
             raise _began_later(session)
         line = recorded[broken - 1]
-        return Difference(events[broken - 1][0], f"command {broken} isn't what its hash says: {line}")
+        return Difference(events[broken - 1][0], f"command {broken} isn't what its hash says: {line}", tampered=True)
     lines = _Lines()
     again = resimulation(session, lines)
     states = list(_states_in_order(session))

@@ -44,7 +44,7 @@ print(sums[0][1], sum(kernel.stats.cache_hits.values()))
 
 def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_has_changed(tmp_path):
     base, mass = tmp_path / "package" / "base", tmp_path / "package" / "mass"
-    for folder, names in ((base, ("compilation", "exact_arithmetic")), (mass, ("moments_solid",))):
+    for folder, names in ((base, ("compilation", "exact_arithmetic", "simd")), (mass, ("moments_solid",))):
         folder.mkdir(parents=True)
         for name in names:
             shutil.copy(PACKAGE / folder.name / f"{name}.py", folder)

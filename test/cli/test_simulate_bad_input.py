@@ -215,7 +215,7 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
         (["simulate", "config/t_handel.yaml"], "did you mean t_handle?"),
         (["simulate", "t_handle", "--recrod", "x.rrd"], "did you mean --record?"),
         (["replay", "x.rrd", "--publish", "state"], "did you mean states?"),
-        (["inspect", "book", "hammer"], "one argument too many"),
+        (["replay", "book.rrd", "hammer.rrd"], "one argument too many"),
         (["replay", "nowhere.rrd"], "nowhere.rrd"),
         (["demo", "--duration", "1"], "--duration"),
     ],

@@ -55,7 +55,7 @@ class Rig:
             lambda wall_ns, all_topics: self.intake.take(wall_ns, True),
             print,
         )
-        self.intake = command_intake.CommandIntake(self, self.loop, ("world", "rigid_body"), self.change, None)
+        self.intake = command_intake.CommandIntake(self, self.loop, ("world", "rigid_body"), None, self.change, None)
         self.loop.start()
 
     def get_logger(self):
