@@ -21,7 +21,7 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
-DRAWN_MS = 200
+DRAWN_MS = 120
 """[ms] Between two pictures: each is 30 ms of a core's time in software WebGL, which would draw as often as it is let."""
 
 SAID_S = 0.06
@@ -78,13 +78,17 @@ class Page:
         )
         self.page.goto(address)
         self.page.wait_for_selector("canvas")
-        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.drawn()
         # viser says that WebGL runs in software, and stands before the picture while it does.
         see_through = (
             ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
         )
         self.page.add_style_tag(content=see_through)
         self.until(lambda: "is simulating" in self.text or "is sleeping" in self.text, "a node on the page")
+
+    def drawn(self) -> None:
+        """Wait for two pictures: what the page has been told is in the second, and there a click hits it."""
+        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     @property
     def readout(self) -> tuple[float, float]:

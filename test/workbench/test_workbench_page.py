@@ -100,6 +100,7 @@ def put_at_rest(page: Page, ear: Ear) -> None:
         return energy == 0.0 and time_s <= ear.now_ns() * 1e-9
 
     page.until(as_reset, "the body at rest")
+    page.drawn()
 
 
 def teapot():
@@ -184,7 +185,7 @@ def test_a_finger_taps_to_poke_and_drags_to_pull(page, ear) -> None:
     frame, _, point = ear.event("poke", before)["content"]["frame_id"].partition("point/")
     size = float(np.linalg.norm(teapot().surface.extent))
     assert frame == "world@" and np.linalg.norm(np.array(point.split(","), float) - seen) <= 0.01 * size
-    ear.trigger("reset")
+    put_at_rest(page, ear)
     before = len(ear.events())
     page.touch("touchStart", (x, y))
     for k in (1, 2, 3):
@@ -216,7 +217,7 @@ def test_two_pages_have_one_string_and_closing_one_lets_go_of_what_it_holds(page
         assert last[2] == pytest.approx(0.5 * UNIT)
         assert kinds(before) == {"string_attach", "string_target"}
     ear.event("string_release", before)
-    ear.trigger("reset")
+    put_at_rest(page, ear)
     before = len(ear.events())
     page.click(*page.middle)
     ear.event("poke", before)
