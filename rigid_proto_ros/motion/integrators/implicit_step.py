@@ -50,43 +50,27 @@ def _guess(y: np.ndarray, V: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _halves(
+def two_halves(  # noqa: PLR0913
     y: np.ndarray,
     p: np.ndarray,
     h: float,
     taut: bool,
+    guessed: bool,
     first: np.ndarray,
     second: np.ndarray,
     middle: np.ndarray,
     out: np.ndarray,
 ) -> int:
-    """Two steps of h/2 from y into out, by guesses in first and second (5, 6); evaluations, 0 when there
-    is no solution.
+    """Two steps of h/2 from y into out, by guesses in first and second (5, 6), which are made here unless ``guessed``;
+    evaluations, 0 when there is no solution.
     """
+    if not guessed:
+        _guess(y, first)
     spent = radau_step(y, p, 0.5 * h, taut, first, middle)
     if spent == 0:
         return 0
-    more = radau_step(middle, p, 0.5 * h, taut, second, out)
-    return spent + more if more > 0 and is_good(out) else 0
-
-
-@njit(cache=True, error_model="numpy")
-def plain_step(
-    y: np.ndarray,
-    p: np.ndarray,
-    h: float,
-    taut: bool,
-    first: np.ndarray,
-    second: np.ndarray,
-    middle: np.ndarray,
-    out: np.ndarray,
-) -> int:
-    """``_halves`` without a whole step before them."""
-    _guess(y, first)
-    spent = radau_step(y, p, 0.5 * h, taut, first, middle)
-    if spent == 0:
-        return 0
-    _guess(middle, second)
+    if not guessed:
+        _guess(middle, second)
     more = radau_step(middle, p, 0.5 * h, taut, second, out)
     return spent + more if more > 0 and is_good(out) else 0
 
@@ -118,7 +102,7 @@ def _judged(  # noqa: PLR0913
                 a += HALVES[0, i, j] * whole[j, k]
                 b += HALVES[1, i, j] * whole[j, k]
             first[i, k], second[i, k] = a, b
-    more = _halves(y, p, h, taut, first, second, middle, out)
+    more = two_halves(y, p, h, taut, True, first, second, middle, out)
     if more == 0:
         return spent + STAGES, math.inf
     coarse -= out

@@ -25,7 +25,7 @@ from . import control as ctl
 from .equations import stretch
 from .error_measure import scales
 from .first_root import NONE
-from .implicit_step import implicit_step, plain_step
+from .implicit_step import implicit_step, two_halves
 from .motion_series import COLUMNS, motion_at, motion_series
 from .radau_tableau import STAGES
 from .runge_kutta import is_good
@@ -96,10 +96,8 @@ def _through_nanosecond(
             trial, after = max(control[ctl.NEXT], 1e-6 * span), SHORTENS if law == PULLS else PULLS
             if switch != NONE:
                 step = switch
-                if (
-                    plain_step(here, p, step, law == PULLS, room[0:5, 0:6], room[5:10, 0:6], room[15][:STORED], out)
-                    == 0
-                ):
+                pulls, first, second = law == PULLS, room[0:5, 0:6], room[5:10, 0:6]
+                if two_halves(here, p, step, pulls, False, first, second, room[15][:STORED], out) == 0:
                     return False
         _heat_of_slack(here, p, one_sided, law == PULLS, out)
         if switch != NONE:
