@@ -44,6 +44,9 @@ STALLED_S = 15.0
 STANDSTILL_REPORTS = 3
 """Simulated time that so many reports find unmoved is paused by somebody, or follows a clock that stands."""
 
+LOG_S = 3.0
+"""How long the node's log is waited for when a refusal was counted of which it has said nothing yet."""
+
 BURST_S = 0.5
 """Reports that have waited in the queue come together: of so many seconds the last one counts; the node
 makes one a second.
@@ -146,8 +149,10 @@ class ScriptSender(Node):
         rose = {key: int(self._counters[key]) - int(before[key]) for key in before if key.startswith("refused_")}
         refused = rose.pop("refused_total")
         reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
-        if refused and not self._refusals:
-            rclpy.spin_once(self, timeout_sec=0.5)  # the log's line may come behind the report
+        # The log's lines may come behind the report: one for each reason, unless the node had just told of the same.
+        deadline = time.monotonic() + LOG_S
+        while len(self._refusals) < len(reasons) and time.monotonic() < deadline:
+            rclpy.spin_once(self, timeout_sec=0.05)
         late = int(self._counters["late"]) - int(before["late"])
         return Report(sent, late, refused, reasons, tuple(self._refusals), last_ns, self._reported_ns())
 
