@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.compilation import njit
-from . import slack
 from .dop853_tableau import STAGES, WEIGHTS
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
-from .runge_kutta import advance, is_good, rates, stages
+from .runge_kutta import advance, is_good, rates, stages, tableau_steps_on_string
 from .stepping import fixed_steps
 
 
@@ -34,22 +33,7 @@ def dop853_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
 @njit(cache=True, error_model="numpy")
 def dop853_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
-    k, z, new, trial = np.zeros((12, 15)), np.empty(15), y.copy(), y.copy()
-    search = slack.new_search()
-    for done in range(n):
-        new[:] = y
-        slack.begin(search, new, p, h)
-        while search[slack.REMAINING] > 0.0:
-            taut = search[slack.TAUT] != 0.0
-            rates(new, p, taut, k[0])
-            stages(new, p, search[slack.TRIAL], taut, STAGES, 12, k, z)
-            advance(new, p, search[slack.TRIAL], WEIGHTS, 12, k, trial)
-            if slack.judge(search, trial, p):
-                new[:] = trial
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+    return tableau_steps_on_string(y, p, h, n, STAGES, WEIGHTS)
 
 
 DOP853 = Integrator(

@@ -22,7 +22,6 @@ from ..problem import (
     TORQUE_BODY,
     TRANSLATES,
 )
-from . import slack
 from .equations import added_acceleration, angular_acceleration, torque
 from .integrator import (
     ANGULAR_DAMPING,
@@ -32,7 +31,7 @@ from .integrator import (
     STRING,
     Integrator,
 )
-from .runge_kutta import advance, is_good, rates, stages
+from .runge_kutta import tableau_steps_on_string
 from .stepping import fixed_steps
 
 TABLEAU = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
@@ -191,22 +190,7 @@ def _turning_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
 @njit(cache=True, error_model="numpy")
 def rk4_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same by the tableau, each step cut where the string turns slack or taut."""
-    k, z, new, trial = np.zeros((4, 15)), np.empty(15), y.copy(), y.copy()
-    search = slack.new_search()
-    for done in range(n):
-        new[:] = y
-        slack.begin(search, new, p, h)
-        while search[slack.REMAINING] > 0.0:
-            taut = search[slack.TAUT] != 0.0
-            rates(new, p, taut, k[0])
-            stages(new, p, search[slack.TRIAL], taut, TABLEAU, 4, k, z)
-            advance(new, p, search[slack.TRIAL], WEIGHTS, 4, k, trial)
-            if slack.judge(search, trial, p):
-                new[:] = trial
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+    return tableau_steps_on_string(y, p, h, n, TABLEAU, WEIGHTS)
 
 
 RK4 = Integrator(

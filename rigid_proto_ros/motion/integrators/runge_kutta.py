@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""One step of an explicit Runge-Kutta method given by its tableau, on all variables of a segment at once.
+"""One step of an explicit Runge-Kutta method given by its tableau, on all variables of a segment at once, and the loops
+over steps of one length.
 
 Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1. The quaternion is
 normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere.
@@ -8,6 +9,7 @@ normalized after the step; the right-hand side takes its direction only, so stag
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -15,8 +17,12 @@ from ...base.compilation import njit
 from ...base.rotation import normalize
 from ..problem import HAS_STRING, HAS_WORLD_TORQUE, TRANSLATES
 from ..variables import VARIABLES
+from . import slack
 from .equations import accelerations
 from .integrator import MAX_SPEED
+
+_Step = Callable[[np.ndarray, np.ndarray, float, bool, np.ndarray], None]
+"""One step: (y, p, h, taut, out)."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -87,3 +93,58 @@ def is_good(y: np.ndarray) -> bool:
         size += abs(y[j])
     # Negated sense, so that NaN counts as a runaway.
     return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])
+
+
+@njit(inline="always", error_model="numpy")
+def repeated(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+    """Up to n steps of h seconds in place; returns the number of good ones. step: a kernel.
+
+    Put into the kernel that calls it, since numba keeps no compiled code that was handed a function.
+    """
+    new = y.copy()
+    for done in range(n):
+        step(y, p, h, False, new)
+        if not is_good(new):
+            return done
+        y[:] = new
+    return n
+
+
+@njit(inline="always", error_model="numpy")
+def repeated_on_string(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+    """``repeated``, each step cut where the string turns slack or taut."""
+    new, trial = y.copy(), y.copy()
+    search = slack.new_search()
+    for done in range(n):
+        new[:] = y
+        slack.begin(search, new, p, h)
+        while search[slack.REMAINING] > 0.0:
+            step(new, p, search[slack.TRIAL], search[slack.TAUT] != 0.0, trial)
+            if slack.judge(search, trial, p):
+                new[:] = trial
+        if not is_good(new):
+            return done
+        y[:] = new
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def tableau_steps_on_string(y: np.ndarray, p: np.ndarray, h: float, n: int, A: np.ndarray, B: np.ndarray) -> int:
+    """The same for the method of stages A (s, s) and weights B (s,)."""
+    count = len(B)
+    k, z, new, trial = np.zeros((count, VARIABLES)), np.empty(VARIABLES), y.copy(), y.copy()
+    search = slack.new_search()
+    for done in range(n):
+        new[:] = y
+        slack.begin(search, new, p, h)
+        while search[slack.REMAINING] > 0.0:
+            taut = search[slack.TAUT] != 0.0
+            rates(new, p, taut, k[0])
+            stages(new, p, search[slack.TRIAL], taut, A, count, k, z)
+            advance(new, p, search[slack.TRIAL], B, count, k, trial)
+            if slack.judge(search, trial, p):
+                new[:] = trial
+        if not is_good(new):
+            return done
+        y[:] = new
+    return n

@@ -12,10 +12,9 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize
-from . import slack
 from .equations import accelerations
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
-from .runge_kutta import is_good
+from .runge_kutta import repeated, repeated_on_string
 from .stepping import fixed_steps
 
 
@@ -39,31 +38,13 @@ def _step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, out: np.ndarray) -
 @njit(cache=True, error_model="numpy")
 def semi_implicit_euler_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    new = y.copy()
-    for done in range(n):
-        _step(y, p, h, False, new)
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+    return repeated(_step, y, p, h, n)
 
 
 @njit(cache=True, error_model="numpy")
 def semi_implicit_euler_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
-    new, trial = y.copy(), y.copy()
-    search = slack.new_search()
-    for done in range(n):
-        new[:] = y
-        slack.begin(search, new, p, h)
-        while search[slack.REMAINING] > 0.0:
-            _step(new, p, search[slack.TRIAL], search[slack.TAUT] != 0.0, trial)
-            if slack.judge(search, trial, p):
-                new[:] = trial
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+    return repeated_on_string(_step, y, p, h, n)
 
 
 SEMI_IMPLICIT_EULER = Integrator(
