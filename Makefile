@@ -2,6 +2,8 @@
 .DEFAULT_GOAL := help
 .PHONY: help setup run up workbench test lint pictures build bench stress soak clean pins
 SHELL := /bin/bash
+# A make that a test starts has its own jobs.
+unexport MAKEFLAGS MFLAGS
 
 PY := .venv/bin/python
 # Each target installs what it needs and no more: `make run` has no use for what only tests import.

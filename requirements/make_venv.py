@@ -31,6 +31,9 @@ NEEDED_BYTES = {"run": 1.5e9, "workbench": 1.5e9, "all": 2.5e9}  # the environme
 FIRST = ("numpy", "numba", "llvmlite", "pyyaml")
 """What compiling the kernels needs: begun as soon as these are there, beside the installation of the rest."""
 
+IMPORTED_BY_NUMBA = ("scipy", "coverage")
+"""numba imports them where it finds them, so that they mustn't be half there."""
+
 
 def stop(message):
     """End with one line on stderr."""
@@ -302,18 +305,14 @@ def main(stage):
     def begin_compiling():
         compiling.extend(compile_kernels(inner))
 
-    def compile_beside():
-        # numba imports scipy and coverage where it finds them: not while they are half there.
-        if stage != "all":
-            begin_compiling()
-
     lists = ["-r", folder / (stage + ".in"), *([] if ros_installed else ["-r", folder / "ros.in"])]
     lists += [part for file in pinned for part in ("-c", file)]
-    first = [line.split()[0] for name in FIRST for line in pins()[name][:1]]
+    early = (*FIRST, *IMPORTED_BY_NUMBA) if stage == "all" else FIRST
+    first = [line.split()[0] for name in early for line in pins()[name][:1]]
     try:
         if ros_installed:
             install_beside_ros(inner, stage)
-        elif not installed_by_uv(inner, first, lists, compile_beside):
+        elif not installed_by_uv(inner, first, lists, begin_compiling):
             install(inner, *lists)
         install(inner, "--no-build-isolation", "--no-deps", "-e", ROOT)
         if not compiling:
