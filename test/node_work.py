@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
@@ -47,9 +48,8 @@ def main(scenario: str) -> None:
     if scenario == "listened_to":
         for message_type, topic in ((PoseStamped, "pose"), (TwistStamped, "twist"), (Odometry, "odom")):
             listener.create_subscription(message_type, f"/rigid_body/{topic}", lambda m: None, 10, raw=True)
-        while not node.states.find_subscribers() or publisher.get_subscription_count() == 0:
+        while publisher.get_subscription_count() == 0 or not all(map(subscribers(node), STATES[:3])):
             time.sleep(0.02)
-        time.sleep(0.5)
     thread.start([node.loop])
     while steps_and_time(node)[1] < 1e9:
         executor.spin_once(timeout_sec=0.05)
@@ -104,10 +104,6 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
         for _ in range(20):
             executor.spin_once(timeout_sec=0.0)
 
-    def listened() -> bool:
-        (publisher,) = (p for p in node.publishers if p.topic_name == topic)
-        return publisher.get_subscription_count() > 0
-
     for mass in (1.0, 10.0, 100.0):
         change(mass)
         change(mass + 1.0)
@@ -121,10 +117,16 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
         calls.append(counts[topic])
         masses.append(heard.copy())
         listener.destroy_subscription(subscription)
-        until(lambda: not listened())
+        until(lambda: not subscribers(node)(topic))
         heard.clear()
     thread.stop()
     return {"masses": masses, "calls": calls}
+
+
+def subscribers(node: RigidBodyNode) -> Callable[[str], int]:
+    """How many a topic has, as the node knows."""
+    publishers = {publisher.topic_name: publisher for publisher in node.publishers}
+    return lambda topic: publishers[topic].get_subscription_count()
 
 
 def steps_and_time(node: RigidBodyNode) -> tuple[int, int]:

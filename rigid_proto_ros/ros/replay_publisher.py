@@ -14,6 +14,7 @@ import rclpy
 from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
@@ -31,6 +32,9 @@ from .script_sender import ScriptSender
 
 WAIT_FOR_SUBSCRIBERS_S = 3.0
 """States wait this long for somebody to listen; then they go out all the same."""
+
+SETTLED_S = 0.5
+"""After the last subscriber that was found, states wait this long for others."""
 
 NOT_SENT = ("record", "viewer")
 """Parameters of the recording node's own surroundings: sent to another, they would overwrite its recordings."""
@@ -105,9 +109,7 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
         publisher = node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE)
         senders[name] = (publisher, _template(name, session))
     clock = node.create_publisher(Clock, "/clock", qos.CLOCK)
-    deadline = time.monotonic() + WAIT_FOR_SUBSCRIBERS_S
-    while time.monotonic() < deadline and not any(p.get_subscription_count() for p, _ in senders.values()):
-        rclpy.spin_once(node, timeout_sec=0.05)
+    _wait_for_subscribers(node, [*(publisher for publisher, _ in senders.values()), clock])
     merged = sorted(
         ((t, k, name) for name, rows in streams.items() for k, t in enumerate(rows.times.tolist())),
         key=lambda message: message[0],
@@ -125,6 +127,17 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
         publisher.publish(pack(time_ns, streams[name].rows[k].tolist()))
     for publisher, _ in senders.values():
         publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=10.0))
+
+
+def _wait_for_subscribers(node: Node, publishers: list[Publisher]) -> None:
+    """Until somebody listens and no more have come for SETTLED_S: who listens to several topics isn't found at once."""
+    counts, since = [0] * len(publishers), time.monotonic()
+    deadline = since + WAIT_FOR_SUBSCRIBERS_S
+    while time.monotonic() < (since + SETTLED_S if any(counts) else deadline):
+        rclpy.spin_once(node, timeout_sec=0.05)
+        found = [publisher.get_subscription_count() for publisher in publishers]
+        if found != counts:
+            counts, since = found, time.monotonic()
 
 
 def _streams(session: RecordedSession) -> dict[str, StampedRows]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import time
 
 import pytest
 
@@ -48,13 +49,13 @@ def test_messages_and_events_can_be_taken_from_a_subscription_without_an_executo
                 subscription.handle, QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED
             )
             while not (publisher.get_subscription_count() and subscription.get_publisher_count()):
-                pass
+                time.sleep(0.001)
             with matched:
                 status = matched.take_event()
             assert (status.total_count, status.current_count) == (1, 1), f"{SAYS}EventHandle.take_event"
             publisher.publish(String(data="hello"))
             while (taken := subscription.handle.take_message(String, True)) is None:
-                pass
+                time.sleep(0.001)
         data, information = taken
         assert bytes(data).endswith(b"hello\0"), f"{SAYS}Subscription.handle.take_message"
         assert information["publication_sequence_number"] == 1, f"{SAYS}publication_sequence_number"

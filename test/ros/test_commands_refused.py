@@ -11,6 +11,7 @@ import pytest
 from command_rig import COMMANDS, inertia_message, point_message, wrench_message
 
 from rigid_proto_ros.messages import cdr
+from rigid_proto_ros.ros.event_publisher import WARNING_S
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -196,19 +197,32 @@ def test_after_one_refusal_of_each_kind_the_flight_is_that_without_any_command_t
         assert pose is None or [*pose["position"].values(), *pose["orientation"].values()] == row[:7]
 
 
+def warn_again(rig) -> None:
+    """Let the time pass in which what an earlier test has sent keeps further warnings of its kind back."""
+    time.sleep(WARNING_S)
+    assert rig.node_process.alive
+
+
 def test_refusals_are_warned_of_at_most_once_a_second(rig):
     log = rig.node_process.log
     warned = log.read_text().count("refused:")
     start = time.monotonic()
-    rig.do("repeat", topic=rig.name("wrench"), content=wrench_message(0, "mars"), count=300, rate=100.0)
-    rig.sent += 300
-    rig.until_received(rig.sent)
+
+    def warned_twice() -> bool:
+        rig.do("repeat", topic=rig.name("wrench"), content=wrench_message(0, "mars"), count=100, rate=100.0)
+        rig.sent += 100
+        rig.until_received(rig.sent)
+        return log.read_text().count("refused:") - warned >= 2
+
+    # A node that got no time takes what has come meanwhile within one second.
+    rig.until(warned_twice, "second warning")
     elapsed_s = time.monotonic() - start
     # One at once, then one for each full second that has passed: however slow the machine, never more.
-    assert 2 <= log.read_text().count("refused:") - warned <= 1 + elapsed_s
+    assert log.read_text().count("refused:") - warned <= 1 + elapsed_s
 
 
 def test_a_flood_of_one_refusal_doesnt_hide_the_warning_of_another(rig):
+    warn_again(rig)
     log = rig.node_process.log
     before = log.read_text().count("nan")
     mars, not_a_number = wrench_message(0, "mars", (1e-3, 0.0, 0.0)), wrench_message(0, "", (NAN, 0.0, 0.0))
@@ -218,6 +232,7 @@ def test_a_flood_of_one_refusal_doesnt_hide_the_warning_of_another(rig):
 
 
 def test_what_is_refused_when_it_is_to_act_is_warned_of_too(rig):
+    warn_again(rig)
     log = rig.node_process.log
     rig.pause(True)
     rig.publish("poke", wrench_message(0, "world@ray/5,5,5/1,0,0", (1e-3, 0.0, 0.0)))

@@ -56,20 +56,27 @@ KEYS = (
 
 
 def test_all_topics_have_their_private_names_and_standard_types(rig):
-    topics = dict(rig.do("topics"))
-    for name, kind in TYPES.items():
-        package = PACKAGES.get(kind, "geometry_msgs")
-        assert topics[f"/rigid_body/{name}"] == [f"{package}/msg/{kind}"]
-    services = dict(rig.do("services"))
-    for name in ("reset", "step", "clear_wrench", "string/release"):
-        assert services[f"/rigid_body/{name}"] == ["std_srvs/srv/Trigger"]
-    assert services["/rigid_body/pause"] == ["std_srvs/srv/SetBool"]
+    expected = {
+        rig.name(name): [f"{PACKAGES.get(kind, 'geometry_msgs')}/msg/{kind}"] for name, kind in TYPES.items()
+    }
+    found = rig.until(lambda: expected.keys() <= (t := dict(rig.do("topics"))).keys() and t, "all topics")
+    assert {name: found[name] for name in expected} == expected
+    triggers = ("reset", "step", "clear_wrench", "string/release")
+    expected = {rig.name(name): ["std_srvs/srv/Trigger"] for name in triggers}
+    expected[rig.name("pause")] = ["std_srvs/srv/SetBool"]
+    found = rig.until(lambda: expected.keys() <= (s := dict(rig.do("services"))).keys() and s, "all services")
+    assert {name: found[name] for name in expected} == expected
 
 
 def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
     for name in TYPES:
         side = "sub" if name in COMMANDS else "pub"
-        (own,) = [e for e in rig.do("endpoints", topic=rig.name(name)) if e[0] == side and e[1] == "/rigid_body"]
+
+
+        def of_the_node(name=name, side=side) -> list:
+            return [e for e in rig.do("endpoints", topic=rig.name(name)) if e[:2] == [side, "/rigid_body"]]
+
+        (own,) = rig.until(of_the_node, f"the node's side of {name}")
         assert own[2:] == ["RELIABLE", "TRANSIENT_LOCAL" if name in LATCHED else "VOLATILE"]
 
 
@@ -93,11 +100,12 @@ def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal
     assert set(KEYS) <= report.keys()
     kinds = ("wrench", "poke", "string", "inertia", "schedule")
     assert int(report["commands_received"]) == sum(int(report[f"{kind}_received"]) for kind in kinds) == rig.sent
-    before = rig.heard_count("/diagnostics")
+    before = report["stamp_ns"]
     rig.publish("poke", wrench_message(0, "nowhere", (1.0, 0, 0)))
     rig.until_received(rig.sent)
-    rig.until(lambda: rig.heard_count("/diagnostics") >= before + 3, "reports")
-    reports = rig.all_diagnostics(last=rig.heard_count("/diagnostics") - before)
+    counted = rig.diagnostics()["stamp_ns"]
+    rig.until(lambda: len(rig.all_diagnostics(after=counted)) >= 2, "reports")
+    reports = rig.all_diagnostics(after=before)
     counts = [int(r["refused_total"]) for r in reports]
     told = [k for k in range(1, len(counts)) if counts[k] > counts[k - 1]] or [0]
     assert reports[told[0]]["level"] == 1
@@ -201,13 +209,14 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
             assert [(r["poke_received"], r["refused_total"]) for r in reports] == [("6", "0"), ("0", "0")]
             assert [r["name"] for r in reports] == ["/lab/tool: simulation", "/rigid_body: simulation"]
             assert one.events() == []
-            odometry = two.heard("odom", last=1)[0]
+            odometry = two.until(lambda: two.heard("odom", last=1), "odometry")[0]
+            inertias = [client.until(lambda c=client: c.heard("inertia"), "its inertia")[0] for client in (one, two)]
             assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
-            assert two.heard("inertia")[0]["header"]["frame_id"] == "tool/mesh"
+            assert inertias[1]["header"]["frame_id"] == "tool/mesh"
             # What a user overrides is of that topic alone.
             depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
             assert list(two.get(*depths).values()) == [3, 10]
-            assert one.heard("inertia")[0]["inertia"]["m"] != two.heard("inertia")[0]["inertia"]["m"]
+            assert inertias[0]["inertia"]["m"] != inertias[1]["inertia"]["m"]
             two.trigger("reset")
             two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")
             assert one.events() == []

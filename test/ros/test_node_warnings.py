@@ -4,8 +4,14 @@
 from __future__ import annotations
 
 import resource
+import time
 
+import pytest
 from command_rig import NodeProcess, RosClient
+
+pytest.importorskip("rclpy")
+
+from rigid_proto_ros.ros.diagnostics import WARNING_S
 
 
 def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
@@ -19,12 +25,15 @@ def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
 
 def test_real_time_that_is_given_up_is_warned_of_with_its_share_and_not_every_second(rig):
     said = "of real time given up"
-    before = rig.node_process.log.read_text().count(said)
+    before, start = rig.node_process.log.read_text().count(said), time.monotonic()
     # 10⁹ steps a second: some hundred times more than there is time for.
     rig.set(integrator="rk4", step=1e-9)
     lost_s = float(rig.diagnostics()["real_time_lost_s"])
     rig.until(lambda: float(rig.diagnostics()["real_time_lost_s"]) > lost_s + 2.0, "two seconds lost")
-    assert 1 <= rig.node_process.log.read_text().count(said) - before <= 2
+    # On a busy machine one of an earlier test may have come just before: then the next is WARNING_S later.
+    rig.until(lambda: rig.node_process.log.read_text().count(said) > before, "a warning")
+    elapsed_s = time.monotonic() - start
+    assert rig.node_process.log.read_text().count(said) - before <= 2 + elapsed_s // WARNING_S
 
 
 def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_another_begins(
@@ -42,7 +51,8 @@ def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_a
             client.until(lambda: "recording stopped" in client.diagnostics()["message"], "a warning")
             report = client.diagnostics()
             assert (report["level"], report["recording"]) == (1, "")
-            assert client.get("record") == {"record": ""}
+            # The table of parameters follows what has happened.
+            client.until(lambda: client.get("record") == {"record": ""}, "the parameter to follow")
             assert "[ERROR]" in node.log.read_text() and "recording stopped" in node.log.read_text()
             resource.prlimit(node.pid, resource.RLIMIT_FSIZE, unlimited)
             again = tmp_path / "again.mcap"

@@ -53,6 +53,12 @@ def last_reset(messages) -> int:
     return max(k for k, m in enumerate(messages) if m.topic.endswith("events") and b'"reset"' in m.data)
 
 
+def events_since_reset(messages) -> list[bytes]:
+    """Without the reset's own and those of pauses."""
+    run = messages[last_reset(messages) :]
+    return [m.data for m in run if m.topic.endswith("events") and b'"pause"' not in m.data][1:]
+
+
 def flown_to(messages) -> int:
     """The stamp that both pose and twist have reached since the reset [ns]; 0 before it has been heard."""
     messages = list(messages)
@@ -125,14 +131,14 @@ def test_commands_give_a_node_the_same_motion_to_the_bit(session, ros_environmen
         )
         assert done.returncode == 0, done.stderr
         client.until(lambda: flown_to(other.messages) >= 2 * SECOND, "the flight after the reset")
+        (recorded,) = read_runs(session)
+        commands = [json.loads(line) for line in recorded.lines]
+        client.until(lambda: len(events_since_reset(list(other.messages))) >= len(commands), "their events")
         assert client.get("record") == {"record": ""}
     assert not recorder.close()
     messages = other.close()
-    (recorded,) = read_runs(session)
-    commands = [json.loads(line) for line in recorded.lines]
     last = last_reset(messages)
-    seen = [m.data for m in messages[last:] if m.topic.endswith("events") and b'"pause"' not in m.data][1:]
-    assert len(seen) == len(commands)
+    assert len(events_since_reset(messages)) == len(commands)
     for name in ("pose", "twist"):
         stamps, rows = states_of(messages[last:], name)
         flown = {stamp: row for stamp, row in zip(stamps, rows, strict=True) if stamp <= 2 * SECOND}
@@ -165,6 +171,7 @@ def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(ros_
     ):
         client.meet()
         client.publish("poke", wrench_message(0, "flyer@com;impulse", (0.0, 0.3, 0.0)))
+        client.until_received(1)
         client.set(gravity=[0.0, 0.0, -1.0])
         client.fly_until(SECOND)
         client.reset()

@@ -37,6 +37,7 @@ def test_the_imu_feels_the_exact_specific_force_at_its_contact_and_turns_at_the_
     rig.set(imu_contact="left", gravity=[0.0, 0.0, -9.81], scale=[1.5, 0.8, 2.0], wrench_timeout=0.0)
     rig.listen("imu")
     rig.start_over(paused=True)
+    rig.until(lambda: rig.heard("imu"), "the node to know that somebody listens")
     rig.forget("imu")
     rig.publish("wrench", wrench_message(SECOND // 2, "world@com", force))
     rig.until_received(rig.sent)

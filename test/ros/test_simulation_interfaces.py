@@ -41,6 +41,7 @@ class Node:
     def __init__(self) -> None:
         from rigid_proto_ros.ros.physics_thread import PhysicsThread
         from rigid_proto_ros.ros.simulation_loop import SimulationLoop
+        from rigid_proto_ros.ros.warm_up import warm_up
         from rigid_proto_ros.scene.scenario import make_scenario
         from rigid_proto_ros.simulation.observer import Observer
 
@@ -48,6 +49,8 @@ class Node:
         self.loop = SimulationLoop(
             scenario, Observer(), lambda state: None, lambda wall_ns, whole: False, lambda message: None
         )
+        # As the node does: a kernel that compiles would hold the first request up for longer than it waits.
+        warm_up(scenario.setup)
         self.thread = PhysicsThread()
         self.thread.start([self.loop])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("mcap")
 
+from command_rig import RosClient
 from ros_process import from_source, run, running_node
 
 from rigid_proto_ros.base.bundled import scene_path
@@ -31,7 +31,11 @@ from rigid_proto_ros.workbench.ros_link import RosLink
 
 rclpy.init(args=[])
 link = RosLink("/rigid_body", lambda f, *a: f(*a), lambda text: None, lambda values: None)
-time.sleep(2.0)
+link.wait_for_node(100.0)
+while not all(p.get_subscription_count() for p in link.node.publishers if p.topic_name.startswith(link.target)):
+    time.sleep(0.02)
+while not all(client.service_is_ready() for client in link.node.clients):
+    time.sleep(0.02)
 r = random.Random(5)
 link.wrench("poke", "normal@tip", (0.02, 0.0, 0.0))
 time.sleep(0.1)
@@ -89,10 +93,11 @@ def test_a_hand_session_on_a_node_flies_again_offline_and_on_a_node(
         assert offline.advance(time_ns)
         assert np.array(PROJECTIONS["pose"](offline.simulation.state.row.tolist())).tobytes() == pose
 
-    with node(scene, "again.mcap"):
+    with RosClient(ros_environment) as client, node(scene, "again.mcap"):
+        client.meet()
         sent = run("poke_client", script, "--reset", "--timeout", 60, environment=ros_environment)
         assert sent.returncode == 0, sent.stderr
-        time.sleep(saved.last_ns / 1e9 + 2.0)
+        client.fly_until(saved.last_ns + 10**9)
     again = poses(read_runs(tmp_path / "again.mcap")[-1])
     common = sorted(by_hand.keys() & again.keys())
     assert common[-1] > saved.last_ns
