@@ -56,9 +56,7 @@ KEYS = (
 
 
 def test_all_topics_have_their_private_names_and_standard_types(rig):
-    expected = {
-        rig.name(name): [f"{PACKAGES.get(kind, 'geometry_msgs')}/msg/{kind}"] for name, kind in TYPES.items()
-    }
+    expected = {rig.name(name): [f"{PACKAGES.get(kind, 'geometry_msgs')}/msg/{kind}"] for name, kind in TYPES.items()}
     found = rig.until(lambda: expected.keys() <= (t := dict(rig.do("topics"))).keys() and t, "all topics")
     assert {name: found[name] for name in expected} == expected
     triggers = ("reset", "step", "clear_wrench", "string/release")
@@ -71,7 +69,6 @@ def test_all_topics_have_their_private_names_and_standard_types(rig):
 def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
     for name in TYPES:
         side = "sub" if name in COMMANDS else "pub"
-
 
         def of_the_node(name=name, side=side) -> list:
             return [e for e in rig.do("endpoints", topic=rig.name(name)) if e[:2] == [side, "/rigid_body"]]
