@@ -10,11 +10,12 @@ from ros_process import RosProcess, alive, catches, descendants, running_node
 
 from rigid_proto_ros.rerun_view.reader import read_session
 
-BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
+"""One handler serves both; a node's end by SIGTERM is looked at in test_node_flight.py too."""
 
 
 @needs_rerun
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
+@BOTH
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
     flight = ("rigid_proto", "demo", "--duration", 60, "--out", tmp_path)
     demo = RosProcess(*flight, environment=ros_environment, log=tmp_path / "demo")

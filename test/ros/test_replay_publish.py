@@ -28,6 +28,10 @@ from rigid_proto_ros.scene.sensor_noise import sensor_noise
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.replay import resimulation
 
+QUICK_ENDINGS = pytest.mark.parametrize(
+    "ending", [".mcap", pytest.param(".rrd", marks=[needs_rerun, pytest.mark.stress])]
+)
+
 
 def flown_session(folder, *settings: str):
     (folder / "script.yaml").write_text(EVERY_KIND)
@@ -68,7 +72,7 @@ def flown_to(messages) -> int:
     return min(max(states_of(run, name)[0], default=0) for name in ("pose", "twist"))
 
 
-@pytest.mark.parametrize("ending", [".mcap", pytest.param(".rrd", marks=[needs_rerun, pytest.mark.stress])])
+@QUICK_ENDINGS
 def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tmp_path, ending):
     recorder = BagRecorder(ros_environment)
     done = run(
@@ -202,7 +206,7 @@ def hammer(ros_environment, tmp_path_factory):
         yield client
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@QUICK_ENDINGS
 def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
     hammer, ros_environment, tmp_path, ending
 ):
