@@ -203,7 +203,9 @@ def installed_by_uv(python, first, files, compiling):
 
 def install(python, *arguments):
     """Run pip in .venv; a failure ends with the reason in one line, the whole output in .venv/setup.log."""
-    process = started(python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", *arguments)
+    # --no-compile: what is imported is compiled then, and that is a tenth of what is installed.
+    pip = (python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile")
+    process = started(*pip, *arguments)
     status, output = Progress("packages, by pip").wait(process)
     if status == 0:
         return
