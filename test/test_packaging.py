@@ -4,6 +4,7 @@
 import importlib.metadata
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -174,6 +175,19 @@ def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None
     for requirement in requirements:
         if any(requirement.marker is None or requirement.marker.evaluate({"extra": e}) for e in ("all", "ros", "test")):
             assert requirement.specifier.contains(pins[requirement.name.lower()]), requirement
+
+
+def test_a_refusal_names_an_extra_that_installs_what_is_missing() -> None:
+    metadata = importlib.metadata.metadata("rigid_proto_ros")
+    brought: dict[str, set[str]] = {extra: set() for extra in metadata.get_all("Provides-Extra") or []}
+    for requirement in [Requirement(text) for text in metadata.get_all("Requires-Dist") or []]:
+        for extra, packages in brought.items():
+            if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
+                packages.add(requirement.name.removeprefix("ros-"))
+    text = "\n".join(path.read_text("utf-8") for path in (SOURCE / "rigid_proto_ros").rglob("*.py"))
+    named = re.findall(r"""is_missing\(['"]([\w-]+)['"], ['"](\w+)['"]\)""", text)
+    assert len(named) > 10
+    assert not [(package, extra) for package, extra in named if package not in brought[extra]]
 
 
 def test_every_ros_package_that_the_code_imports_is_declared() -> None:

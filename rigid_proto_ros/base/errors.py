@@ -38,6 +38,11 @@ class CommandRefused(InputError):
         super().__init__(field, received, accepted)
 
 
+def is_missing(package: str, extra: str) -> str:
+    """Says that a package isn't installed, and how one of this package's extras installs it."""
+    return f"{package} is missing: pip install 'rigid_proto_ros[{extra}]'"
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """``did you mean X?`` for the known name nearest to ``name``; empty where none is near."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)

@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 
 if TYPE_CHECKING:
     from ..identify.bag_reading import Choice
@@ -80,8 +80,8 @@ def run(args: argparse.Namespace) -> int:
         from ..identify.identification import identify
         from ..identify.report import as_json, as_text, as_urdf
     except ImportError as error:
-        missing = f"{str(error.name).partition('.')[0]} is missing: pip install 'rigid_proto_ros[identify]'"
-        raise InputError("identify", missing) from None
+        package = str(error.name).partition(".")[0]
+        raise InputError("identify", is_missing(package, "identify")) from None
     choice = _choice(args)
     flights, scenes = _flights(args.sessions, choice)
     known, candidates = _known(args, choice, scenes)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 
 if TYPE_CHECKING:
     from ..identify.comparison import Candidate
@@ -29,7 +29,7 @@ def record(
     try:
         from ..rerun_view.identification_picture import DrawnTensor, record_identification
     except ImportError:
-        raise InputError("--record", path, "the package rerun-sdk (pip install rerun-sdk)") from None
+        raise InputError("--record", is_missing("rerun-sdk", "rerun")) from None
     from ..identify.report import as_text
 
     com = found.estimate.mass.center_of_mass

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 
 _MODULES = {
     "rigid_body_node": "rigid_proto_ros.ros.main",
@@ -24,14 +24,18 @@ GRACE_S = 5.0
 """A process that doesn't end within this time of SIGINT is killed."""
 
 
+def check_rclpy(field: str) -> None:
+    """Raise InputError where rclpy isn't found."""
+    if importlib.util.find_spec("rclpy") is None:
+        source = "; or source the setup.bash of a ROS installation"
+        raise InputError(field, is_missing("rclpy", "ros") + source)
+
+
 def own_executable(name: str) -> list[str]:
     """How to start one of this package's executables with the interpreter and packages of this process. Raises
     InputError where they lack ROS.
     """
-    if importlib.util.find_spec("rclpy") is None:
-        raise InputError(
-            name, "no rclpy", "a ROS installation whose setup.bash was sourced, or pip install 'rigid_proto_ros[ros]'"
-        )
+    check_rclpy(name)
     return [sys.executable, "-m", _MODULES[name]]
 
 

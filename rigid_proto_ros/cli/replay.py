@@ -228,10 +228,11 @@ def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
 
 
 def _publish(session: RecordedSession, args: argparse.Namespace) -> int:
-    try:
-        from ..ros import replay_publisher
-    except ImportError as error:
-        raise InputError("--publish", args.publish, f"rclpy to be installed ({error})") from None
+    from .processes import check_rclpy
+
+    check_rclpy("--publish")
+    from ..ros import replay_publisher
+
     if args.publish == "states":
         return replay_publisher.publish_states(session, args.speed or 1.0)
     return replay_publisher.publish_commands(session, args.node or f"/{session.node_name}")

@@ -8,7 +8,7 @@ import importlib.util
 import tempfile
 from pathlib import Path
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.progress import Progress
 from .options import add_session, pixels
 
@@ -40,6 +40,10 @@ def run(args: argparse.Namespace) -> int:
     """Take the picture; InputError says what was wrong with the request."""
     from ..rerun_view.session_files import is_bag
 
+    # Pillow comes with Rerun.
+    for module, package in (("rerun", "rerun-sdk"), ("PIL", "pillow")):
+        if importlib.util.find_spec(module) is None:
+            raise InputError("snapshot", is_missing(package, "rerun"))
     size = pixels(args.size, 200)
     if not is_bag(Path(args.session)):
         _draw(args, args.session, size)
@@ -50,9 +54,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]) -> None:
-    for module, package in (("rerun", "rerun-sdk"), ("PIL", "pillow")):
-        if importlib.util.find_spec(module) is None:
-            raise InputError("snapshot", f"the package {package} is missing: pip install {package}")
     from ..rerun_view.snapshot import take_picture
 
     with Progress("drawing") as progress:

@@ -9,7 +9,7 @@ import sys
 import time
 
 from ..base.bundled import scene_names
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from .options import add_mesh, add_scene
 
 RESTART_S = 3.0
@@ -41,9 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Start what is needed and stay."""
-    for package, remedy in (("viser", "pip install 'viser>=1.1,<1.2'"), ("rclpy", "a ROS 2 installation")):
-        if importlib.util.find_spec(package) is None:
-            raise InputError("workbench", f"the package {package} is missing: {remedy} (extras [workbench] and [ros])")
+    from .processes import check_rclpy
+
+    if importlib.util.find_spec("viser") is None:
+        raise InputError("workbench", is_missing("viser", "workbench"))
+    check_rclpy("workbench")
     if args.node and (args.scene or args.mesh):
         raise InputError("--node", args.node, "a running node, or a scene to start one with, not both")
     if args.link is not None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, HAND_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from .flight_record import FlightRecord
@@ -44,7 +44,7 @@ def check_film() -> None:
         import imageio_ffmpeg  # noqa: F401
         import pygfx  # noqa: F401
     except ImportError as error:
-        raise InputError("--video", f"{error.name} is missing: pip install 'rigid_proto_ros[video]'") from None
+        raise InputError("--video", is_missing(str(error.name), "video")) from None
 
 
 def write_film(

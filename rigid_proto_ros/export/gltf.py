@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from .animation import Animation
@@ -42,7 +42,7 @@ def check_gltf() -> None:
     try:
         import pygltflib  # noqa: F401
     except ImportError:
-        raise InputError("--gltf", "pygltflib is missing: pip install 'rigid_proto_ros[export]'") from None
+        raise InputError("--gltf", is_missing("pygltflib", "export")) from None
 
 
 @dataclass(frozen=True)

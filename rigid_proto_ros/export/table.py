@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import whole_file
 from ..base.provenance import cpu, versions
 from ..simulation.quantities import QUANTITIES
@@ -49,7 +49,7 @@ def check_parquet() -> None:
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
-        raise InputError("--parquet", "pyarrow is missing: pip install 'rigid_proto_ros[export]'") from None
+        raise InputError("--parquet", is_missing("pyarrow", "export")) from None
 
 
 def write_parquet(file: str, columns: dict[str, np.ndarray]) -> None:

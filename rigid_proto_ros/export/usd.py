@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
@@ -38,7 +38,7 @@ def check_usd() -> None:
     try:
         import pxr  # noqa: F401
     except ImportError:
-        raise InputError("--usd", "usd-core is missing: pip install 'rigid_proto_ros[export]'") from None
+        raise InputError("--usd", is_missing("usd-core", "export")) from None
 
 
 def write_usd(file: str, record: FlightRecord, made: Animation, fps: float | None = None, trail: bool = False) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.errors import MeshError
+from ..base.errors import MeshError, is_missing
 
 FLAT = 1e-12
 """Distances below this part of the points' extent count as zero: such a point adds less volume than rounding does."""
@@ -51,7 +51,7 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
     try:
         from scipy.spatial import ConvexHull, QhullError
     except ImportError:
-        raise MeshError("mesh_fallback", "hull needs scipy: pip install scipy; box needs nothing") from None
+        raise MeshError("mesh_fallback", f"hull: {is_missing('scipy', 'meshes')}; box needs nothing") from None
     if len(points) < 4:
         raise MeshError("mesh_fallback", f"{len(points)} points have no hull with a volume; box may do")
     shape = _round_shape(points)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.bounded_file import read_bounded
 from ..base.compilation import njit
-from ..base.errors import MeshError
+from ..base.errors import MeshError, is_missing
 from . import cache as mesh_cache
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
@@ -240,8 +240,7 @@ def _read_with_trimesh(data: bytes, suffix: str, path: Path, max_bytes: int) -> 
         triangles = np.array(mesh.faces, dtype=np.int64)
         units = {geometry.units for geometry in scene.geometry.values()}
     except ImportError as error:
-        missing = f"this format needs {error.name}: pip install 'rigid_proto_ros[meshes]', or pip install {error.name}"
-        raise MeshError(path.name, missing) from None
+        raise MeshError(path.name, is_missing(str(error.name), "meshes")) from None
     except Exception as error:  # noqa: BLE001 - a foreign reader fails in as many ways as files are broken
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise MeshError(path.name, f"trimesh {trimesh.__version__} can't read the file ({reason})") from None

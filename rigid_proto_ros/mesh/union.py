@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import MeshError
+from ..base.errors import MeshError, is_missing
 
 if TYPE_CHECKING:
     import manifold3d
@@ -66,7 +66,7 @@ def united(
     manifold3d, and for a component that it can't take.
     """
     if not can_unite():
-        raise MeshError("mesh_repair", "union needs manifold3d: pip install 'rigid_proto_ros[meshes]'")
+        raise MeshError("mesh_repair", f"union: {is_missing('manifold3d', 'meshes')}")
     used = vertices[triangles.ravel()]
     middle = 0.5 * used.min(axis=0) + 0.5 * used.max(axis=0)
     mesh = _solid(vertices - middle, triangles, component, volume, depth).to_mesh64()

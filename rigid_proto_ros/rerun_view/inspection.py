@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import output_file
 from ..mass.export import quaternion_wxyz
 from ..mass.inspection import Inspection
@@ -43,7 +43,7 @@ def record_inspection(path: str, inspection: Inspection) -> None:
     try:
         import rerun as rr
     except ImportError:
-        raise InputError("--record", path, "the package rerun-sdk (pip install rerun-sdk)") from None
+        raise InputError("--record", is_missing("rerun-sdk", "rerun")) from None
     target = output_file("--record", path)
     recording = rr.RecordingStream("rigid_proto_inspect")
     try:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
 from .ports import choose_port
 
@@ -75,10 +75,7 @@ class RerunObserver(Observer):
         if initial_view not in INITIAL_VIEWS:
             raise InputError("initial_view", initial_view, "one of " + ", ".join(INITIAL_VIEWS))
         if (record or viewer != "none") and importlib.util.find_spec("rerun") is None:
-            field, received = ("record", record) if record else ("viewer", viewer)
-            raise InputError(
-                field, received, "the package rerun-sdk (pip install rerun-sdk), or an .mcap file to record to"
-            )
+            raise InputError("record" if record else "viewer", is_missing("rerun-sdk", "rerun"))
         self.live_address = ""
         self.web_address = ""
         self._name = name

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..scene.parameters import Parameters
 from ..simulation.observer import Observer
 
@@ -32,8 +32,8 @@ def make_recorder(
             from ..session.mcap_observer import McapObserver
 
             return McapObserver(path, node_name, parameters, on_error, simulated_log)
-        except ImportError as error:
-            raise InputError("record", path, f"mcap to be installed, pip install mcap zstandard ({error})") from None
+        except ImportError:
+            raise InputError("record", is_missing("mcap", "mcap")) from None
     from . import RerunObserver
 
     return RerunObserver(record=path, name=node_name, on_error=on_error, open_ended=not simulated_log)

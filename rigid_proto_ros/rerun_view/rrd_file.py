@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from .viewers import viewer_program
 
 MAGIC = b"RRF2"
@@ -100,7 +100,7 @@ def _write_indexed(path: Path, indexed: Path, timeout_s: float) -> str:
     """The recording again, with an index; returns why it couldn't be written, or nothing."""
     program = viewer_program()
     if program is None:
-        return "the rerun program is missing (pip install rerun-sdk)"
+        return is_missing("rerun-sdk", "rerun")
     try:
         done = subprocess.run(
             [program, "rrd", "optimize", str(path), "-o", str(indexed)],

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import output_file
 from ..scene.scenario import Scenario
 from ..session.playback import play, play_beside
@@ -25,8 +25,8 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
     if not path.exists():
         raise InputError("session", f"there is no file and no folder {str(path)!r}")
     if not is_bag(path):
-        return [_rerun_reader(path).read_session(path)]
-    bags = _bag_reader(path)
+        return [_rerun_reader().read_session(path)]
+    bags = _bag_reader()
     from ..session.runs import is_session_topic, session_runs
 
     return session_runs(bags.read_bag(path, is_session_topic), path, node)
@@ -47,7 +47,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
 
         repair_rrd(path, repaired)
         return
-    bags = _bag_reader(path)
+    bags = _bag_reader()
     files = bags.bag_files(path)
     if len(files) > 1:
         raise InputError("--repair", f"the bag has {len(files)} files; name one of them")
@@ -69,17 +69,17 @@ def is_bag(path: Path) -> bool:
         return False
 
 
-def _bag_reader(path: Path) -> ModuleType:
+def _bag_reader() -> ModuleType:
     try:
         from ..session import bag as session_bag
-    except ImportError as error:
-        raise InputError("session", str(path), f"mcap to be installed: pip install mcap ({error})") from None
+    except ImportError:
+        raise InputError("session", is_missing("mcap", "mcap")) from None
     return session_bag
 
 
-def _rerun_reader(path: Path) -> ModuleType:
+def _rerun_reader() -> ModuleType:
     if find_spec("rerun") is None:
-        raise InputError("session", str(path), "rerun to be installed: pip install rerun-sdk")
+        raise InputError("session", is_missing("rerun-sdk", "rerun"))
     from . import reader
 
     return reader

@@ -111,7 +111,7 @@ def headless_viewer(width: int, height: int) -> Iterator[Any]:
         try:
             process = open_headless(port, width, height, log.fileno())
         except FileNotFoundError as error:
-            raise InputError("snapshot", "no viewer", str(error)) from error
+            raise InputError("snapshot", str(error)) from error
         try:
             yield _connected(f"rerun+http://{LOOPBACK}:{port}/proxy", process, log)
         finally:

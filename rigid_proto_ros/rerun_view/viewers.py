@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
+from ..base.errors import is_missing
 from .ports import LOOPBACK, any_free_port
 
 STOP_TIMEOUT_S = 1.0
@@ -56,7 +57,7 @@ class ViewerProcess:
     def __init__(self, *arguments: str, log: int = subprocess.DEVNULL) -> None:
         program = viewer_program()
         if program is None:
-            raise FileNotFoundError("the rerun viewer program is not installed (pip install rerun-sdk)")
+            raise FileNotFoundError(is_missing("rerun-sdk", "rerun"))
         # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture.
         environment = {**os.environ, "RERUN_APP_ONLY": "true"}
         self.process = subprocess.Popen(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable
 from typing import Any
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from .chunk import Chunk, run_chunk
 from .study import Study
 from .table import Parts
@@ -30,8 +30,7 @@ def cluster_chunks(
     try:
         import distributed
     except ImportError:
-        accepted = "distributed installed: pip install 'rigid_proto_ros[sweep]'"
-        raise InputError("--dask", address, accepted) from None
+        raise InputError("--dask", is_missing("distributed", "sweep")) from None
     try:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.output_file import output_file
 from .table import read_columns
 
@@ -72,7 +72,7 @@ def _figure() -> Any:
         from matplotlib import rcParams
         from matplotlib.figure import Figure
     except ImportError:
-        raise InputError("--plot", "matplotlib is missing: pip install matplotlib") from None
+        raise InputError("--plot", is_missing("matplotlib", "sweep")) from None
     # The same table gives the same file.
     rcParams["svg.hashsalt"] = "rigid_proto_ros"
     return Figure(figsize=(7.2, 4.8), layout="constrained")

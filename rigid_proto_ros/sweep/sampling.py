@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from .row_random import latin_uniforms, row_uniforms, seed_words
 
 SAMPLERS = ("random", "latin_hypercube", "sobol")
@@ -46,7 +46,7 @@ class _Sobol:
         try:
             from scipy.stats import qmc
         except ImportError:
-            raise InputError("sampler", "sobol needs scipy (pip install scipy)") from None
+            raise InputError("sampler", f"sobol: {is_missing('scipy', 'sweep')}") from None
         self._engine = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(np.random.SeedSequence(seed)))
         self._lock = threading.Lock()
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.provenance import cpu, versions
 from .chunk import Chunk
 from .study import Study
@@ -39,7 +39,7 @@ def arrow() -> tuple[ModuleType, ModuleType]:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise InputError("sweep", "pyarrow is missing: pip install 'rigid_proto_ros[sweep]'") from None
+        raise InputError("sweep", is_missing("pyarrow", "sweep")) from None
     return pyarrow, pyarrow.parquet
 
 

@@ -40,8 +40,12 @@ def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(pro
     [
         (["up"], "rclpy", "rigid_proto_ros[ros]"),
         (["demo"], "rclpy", "rigid_proto_ros[ros]"),
-        (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "PIL", "pip install pillow"),
-        (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "rerun", "pip install rerun-sdk"),
+        (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "PIL", "rigid_proto_ros[rerun]"),
+        (["snapshot", "session.mcap", "--at", "1", "-o", "x.png"], "PIL", "rigid_proto_ros[rerun]"),
+        (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "rerun", "rigid_proto_ros[rerun]"),
+        (["workbench"], "viser", "rigid_proto_ros[workbench]"),
+        (["workbench"], "rclpy", "rigid_proto_ros[ros]"),
+        (["simulate", "t_handle", "--record", "x.rrd"], "rerun", "rigid_proto_ros[rerun]"),
     ],
 )
 def test_a_command_without_its_package_names_it_in_one_line_and_does_nothing(
