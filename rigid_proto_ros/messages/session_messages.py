@@ -15,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.rotation import rotate
+from ..base.rotation import cross, rotate, rotate_inverse, vector
+from ..motion.body import Body
+from ..motion.loads import Load
 from ..simulation.observer import STATE_FIELDS
 from . import cdr
 
@@ -153,6 +155,18 @@ def read_state(name: str, data: bytes, topic: str) -> tuple[int, list[float]]:
 
 def _undecodable(topic: str, message_type: str) -> InputError:
     return InputError(topic, f"a message can't be decoded as {message_type} in little-endian CDR")
+
+
+def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitude: np.ndarray) -> bytes:
+    """A geometry_msgs/WrenchStamped of a load that began to act while the body lay at ``attitude`` (4,) xyzw: in the
+    body's frame, whose origin is the COM and whose axes are those of the mesh.
+    """
+    force, torque, arm = load.force, load.torque, load.arm(body)
+    if load.axes == "world":
+        force, torque = rotate_inverse(*attitude, *force), rotate_inverse(*attitude, *torque)
+    else:
+        force = vector(load.own_force(body))
+    return cdr.wrench_stamped(time_ns, body_frame, force, vector(np.asarray(torque) + cross(arm, force)))
 
 
 def inertia_bytes(time_ns: int, frame_id: str, mass: float, com: Iterable[float], tensor6: Iterable[float]) -> bytes:

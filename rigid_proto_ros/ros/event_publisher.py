@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Callable
 
+import numpy as np
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -14,6 +15,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from ..messages import cdr
+from ..messages.session_messages import applied_bytes
 from ..motion.body import Body
 from ..motion.loads import Load
 from ..simulation.commands import WrenchCommand
@@ -37,6 +39,7 @@ class EventPublisher(Observer):
 
         self._logger = node.get_logger()
         self._static_frames = static_frames
+        self._body_frame = body_frame
         self._mesh_frame = f"{body_frame}/mesh"
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
         self._scene = publisher(String, "scene", qos.LATCHED)
@@ -63,12 +66,12 @@ class EventPublisher(Observer):
         self._description.body_changed(body)
         self._static_frames.body_changed(time_ns, body)
 
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
-        """A wrench or poke as it took effect: its point settled on the body, its axes world or body."""
+    def applied(self, time_ns: int, _command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
+        """A wrench or poke as it took effect: about the COM in the body's frame, which TF knows. What its sender said
+        of point, axes, slot and duration stands in its event.
+        """
         if self._applied.get_subscription_count():
-            force = load.force if load.axes == "world" else load.own_force(body).tolist()
-            frame_id = load.frame_id + command.frame.options
-            self._applied.publish(cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
+            self._applied.publish(applied_bytes(time_ns, self._body_frame, load, body, attitude))
 
     def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002
         """A warning, for what is refused when it comes and for what turns out impossible when it is to act.

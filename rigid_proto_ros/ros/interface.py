@@ -106,7 +106,8 @@ INTERFACES = (
         PUBLISHED,
         "~/applied",
         "geometry_msgs/WrenchStamped",
-        "each wrench and poke as it took effect, its point resolved on the body",
+        "each wrench and poke when it took effect: about the COM, in the body's frame as that lay then; what its "
+        "sender said of point, axes, slot and duration stands in the line of the same time on `~/events`",
     ),
     _topic(
         PUBLISHED,

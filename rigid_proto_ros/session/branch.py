@@ -36,7 +36,7 @@ class ActingLoads(Observer):
         self.acting: dict[int, _Acting] = {}
         self._latest: _Acting | None = None
 
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body, _attitude: np.ndarray) -> None:
         """Remember the command until it is said to act."""
         force = load.force if load.axes == "world" else load.own_force(body)
         frame_id = load.frame_id + command.frame.options

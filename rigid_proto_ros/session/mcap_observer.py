@@ -132,11 +132,10 @@ class McapObserver(Observer):
         """Copy one state row (13,)."""
         self._mailbox.put(time_ns, row)
 
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
+    def applied(self, time_ns: int, _command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
         """Write a wrench or poke as it took effect, as the node publishes it."""
-        force = load.force if load.axes == "world" else load.own_force(body).tolist()
-        frame_id = load.frame_id + command.frame.options
-        self._message(time_ns, "applied", cdr.wrench_stamped(time_ns, frame_id, force, load.torque))
+        data = session_messages.applied_bytes(time_ns, self._body_frame, load, body, attitude)
+        self._message(time_ns, "applied", data)
 
     def event(self, time_ns: int, line: str) -> None:
         """Write a line of the event log."""

@@ -68,8 +68,10 @@ SHARE = LOAD
 """A row of loads: the load itself (LOAD,), and while it acts what it adds to the sums (LOADS_SIZE,)."""
 LOAD_ROW = LOAD + LOADS_SIZE
 
-# A row of events: something became of a load. ROW_OF: the command's row in the tables.
-EVENT_NS, WHAT, LOAD_ID, ROW_OF, EVENT = range(5)
+# A row of events: something became of a load. ROW_OF: the command's row in the tables. ATTITUDE: (4,) xyzw of the body
+# at that time, for APPLIED alone: doubles, by their bits.
+EVENT_NS, WHAT, LOAD_ID, ROW_OF, ATTITUDE = range(5)
+EVENT = ATTITUDE + 4
 APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
 """APPLIED: a command acts, before what it ends and begins. DONE: after that. TIMED_OUT: a held wrench has ended so, and
 ROW_OF is its slot.
@@ -340,6 +342,7 @@ def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, ev
         n[LOAD_IDS] += 1
     load_id = n[LOAD_IDS]
     _write(n, events, APPLIED, load_id, row)
+    events[n[EVENTS] - 1, ATTITUDE:] = f[ROW + 3 : ROW + 7].view(np.int64)
     if kind == CLEAR:
         end_all(n, times, events)
     elif kind == IMPULSE:

@@ -210,8 +210,12 @@ class FlightArrays:
             fl.end_all(self.n, self.times, self.events)
 
     def last_events(self) -> list[list[int]]:
-        """What the last call began and ended: rows (EVENT,)."""
-        return self.events[: self.n[fl.EVENTS]].tolist()
+        """What the last call began and ended: rows (ATTITUDE,)."""
+        return self.events[: self.n[fl.EVENTS], : fl.ATTITUDE].tolist()
+
+    def attitude_at(self, number: int) -> np.ndarray:
+        """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""
+        return self.events[number, fl.ATTITUDE :].view(np.float64).copy()
 
     # Segments
 

@@ -112,8 +112,10 @@ class Observer:
     def load_ended(self, time_ns: int, load_id: int) -> None:
         """The load with this id acts no longer."""
 
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:
-        """A wrench or poke took effect: the WrenchCommand, the Load that it settled to, and the Body it acts on."""
+    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
+        """A wrench or poke took effect: the WrenchCommand, the Load that it settled to, the Body it acts on, and how
+        that lay then (4,) xyzw.
+        """
 
     def string_changed(self, time_ns: int, string: ShownString | None) -> None:
         """The string is tied like this from ``time_ns`` on, or not at all; again at every target."""

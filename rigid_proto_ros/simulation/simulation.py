@@ -240,7 +240,7 @@ class Simulation(Readings):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
-        for now_ns, what, load_id, row in self._arrays.last_events():
+        for number, (now_ns, what, load_id, row) in enumerate(self._arrays.last_events()):
             self.time_ns = now_ns
             if what in (fl.ENDED, fl.TIMED_OUT):
                 observer.load_ended(now_ns, load_id)
@@ -256,7 +256,7 @@ class Simulation(Readings):
             if load is None or not isinstance(command, WrenchCommand):
                 continue
             if what == fl.APPLIED:
-                observer.applied(now_ns, command, load, self.setup.body)
+                observer.applied(now_ns, command, load, self.setup.body, self._arrays.attitude_at(number))
             else:
                 kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
                 notifier.load_began(self, load_id, kind, load)

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..base.errors import InputError
 from ..motion.body import Body
 from ..motion.frames import Frame
@@ -101,7 +103,7 @@ class _Writer(Observer):
         """The simulation that this writes of: to be called before anything acts in it."""
         self._again = again
 
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body) -> None:  # noqa: ARG002
+    def applied(self, _time_ns: int, command: WrenchCommand, load: Load, body: Body, _attitude: np.ndarray) -> None:
         """A wrench or poke takes effect; its line follows."""
         self._applied = command, load, body
 

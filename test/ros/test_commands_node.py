@@ -106,7 +106,7 @@ def test_pose_twist_and_odometry_are_one_state_stamped_with_publication_times(ri
     assert {b - a for a, b in zip(times, times[1:], strict=False)} == {10 * MS}
 
 
-def test_applied_says_when_each_command_began_with_its_frame_resolved(rig):
+def test_applied_says_when_each_command_began_and_its_wrench_about_the_com_in_the_bodys_frame(rig):
     rig.start_over(paused=True)
     rig.publish("wrench", wrench_message(200 * MS, "tip", (0.0, 1e-3, 0.0)))
     rig.publish("poke", wrench_message(250 * MS, "world@vertex/3;duration=0.125", (0.0, 1e-3, 0.0), (1e-6, 0.0, 0.0)))
@@ -119,18 +119,35 @@ def test_applied_says_when_each_command_began_with_its_frame_resolved(rig):
         rig.until(lambda: len(rig.heard("applied")) >= 4 and rig.heard("applied"), "applied"), key=stamp_ns
     )
     assert [stamp_ns(m) for m in applied] == [paused_ns, 200 * MS, 250 * MS, 300 * MS]
-    frames = [m["header"]["frame_id"] for m in applied]
+    # A frame that TF knows, and whose origin is the COM.
+    assert {m["header"]["frame_id"] for m in applied} == {"rigid_body"}
     scenario = make_scenario(rig.scene)
-    corner = scenario.setup.surface.vertices[3]
-    assert frames[0].startswith("world@point/")
-    assert frames[1] == "body@point/0.0,0.0,0.07"
-    assert frames[2] == f"world@point/{','.join(repr(float(x)) for x in corner)};duration=0.125"
-    assert frames[3] == "body@point/0.0,-0.05,0.0;impulse"
-    normal = scenario.setup.surface.inward_normal([0.0, -0.05, 0.0])
-    assert applied[3]["wrench"]["force"] == vector(1e-4 * normal)
-    # Each is a frame that the node takes: the same command again.
-    for frame in frames:
-        parse_frame(frame)
+    body, surface = scenario.setup.body, scenario.setup.surface
+    turned = {ns: Rotation.from_quat(list(rig.state_at(ns)[0]["pose"]["orientation"].values())) for ns in (0, 250 * MS)}
+    assert paused_ns == 0
+
+    def about_the_com(point, force, torque=(0.0, 0.0, 0.0)) -> list[float]:
+        return [*force, *(np.cross(body.point(point), force) + torque)]
+
+    at_corner = turned[250 * MS].inv().apply([[0.0, 1e-3, 0.0], [1e-6, 0.0, 0.0]])
+    expected = (
+        about_the_com((0.0, 0.0, 0.07), (0.0, 1e-3, 0.0)),
+        about_the_com(surface.vertices[3], *at_corner),
+        about_the_com((0.0, -0.05, 0.0), 1e-4 * surface.inward_normal([0.0, -0.05, 0.0])),
+    )
+    said = [[*m["wrench"]["force"].values(), *m["wrench"]["torque"].values()] for m in applied]
+    for found, wanted in zip(said[1:], expected, strict=True):
+        assert found == pytest.approx(wanted, rel=1e-13, abs=1e-19)
+    # The ray comes straight from above, through the axis on which the COM lies.
+    assert said[0][:3] == pytest.approx(turned[0].inv().apply([0.0, 0.0, 1e-3]), abs=1e-18)
+    # What else was said stands in the log.
+    frames = {e["time_ns"]: e["content"]["frame_id"] for e in rig.events() if e["kind"] in ("wrench", "poke")}
+    assert frames == {
+        0: "world@ray/0,0,3/0,0,-1",
+        200 * MS: "tip",
+        250 * MS: "world@vertex/3;duration=0.125",
+        300 * MS: "normal@left;impulse",
+    }
 
 
 def chain_is_whole(events: list[dict]) -> None:

@@ -99,8 +99,10 @@ def test_events_scene_applied_and_inertia_are_there(flown):
     applied = messages["/rigid_body/applied"]
     pokes = [json.loads(line) for line in kept.lines if json.loads(line)["kind"] in ("poke", "wrench")]
     assert [stamp(m.header) for _, m in applied] == [event["time_ns"] for event in pokes]
+    assert {m.header.frame_id for _, m in applied} == {"rigid_body"}
     force = applied[0][1].wrench.force
-    assert [force.x, force.y, force.z] == pokes[0]["content"]["force"]
+    # In the body's axes.
+    assert np.linalg.norm([force.x, force.y, force.z]) == pytest.approx(np.linalg.norm(pokes[0]["content"]["force"]))
 
 
 def test_log_times_are_simulated_in_a_run_without_a_clock(flown):
