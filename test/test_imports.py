@@ -140,7 +140,7 @@ def test_each_outside_package_is_imported_in_its_own_place_alone() -> None:
         top = name.split(".")[0]
         if top == PACKAGE or top in sys.stdlib_module_names:
             return True
-        if top in ROS or top == "simulation_interfaces" or top.endswith(("_msgs", "_srvs")):
+        if top in ROS or top in ("simulation_interfaces", "rigid_proto_interfaces") or top.endswith(("_msgs", "_srvs")):
             return within(module, ("ros", "workbench"))
         return within(module, ALLOWED.get(top, ()))
 

@@ -163,7 +163,8 @@ def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitud
     """
     force, torque, arm = load.force, load.torque, load.arm(body)
     if load.axes == "world":
-        force, torque = rotate_inverse(*attitude, *force), rotate_inverse(*attitude, *torque)
+        x, y, z, w = attitude.tolist()
+        force, torque = rotate_inverse(x, y, z, w, *force), rotate_inverse(x, y, z, w, *torque)
     else:
         force = vector(load.own_force(body))
     return cdr.wrench_stamped(time_ns, body_frame, force, vector(np.asarray(torque) + cross(arm, force)))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
@@ -14,12 +15,14 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64MultiArray, String
 
 from ..base.errors import CommandRefused
+from ..base.rotation import Vector
 from ..messages import cdr
 from ..motion.frames import Frame, parse_frame
 from ..scene.command_codec import ScriptCommand, core_command, of_message, whole_stamp
 from ..scene.scenario import BodyMesh, check_inertia, nanoseconds
 from ..simulation.commands import ThrusterCommand, WrenchCommand
 from ..simulation.setup import Setup
+from .body_wrenches import body_wrench_type, frame_of, wrench_of
 from .command_queue import CommandQueue, Unserved
 from .scheduling import LONG_TEXT, BackgroundThread, ScheduleMessage
 from .simulation_loop import SimulationLoop
@@ -85,6 +88,11 @@ class CommandIntake:
         if loop.scenario.parameters.thrusters:
             queue = CommandQueue(node, Float64MultiArray, "thrusters", group)
             self._sources = (*self._sources, ("thrusters", queue, self._thrusters))
+        typed = body_wrench_type()
+        if typed is not None:
+            for topic, name, held in (("wrench", "body_wrench", True), ("poke", "body_poke", False)):
+                read = partial(self._body_wrench, message_type=typed, held=held)
+                self._sources = (*self._sources, (topic, CommandQueue(node, typed, name, group), read))
         self._active_until_ns = [0] * len(self._sources)
 
     @property
@@ -139,8 +147,15 @@ class CommandIntake:
     # Each returns how many commands the message counts as
 
     def _wrench(self, data: bytes, held: bool) -> int:
+        return self._take_wrench(held, *read_wrench_stamped(data))
+
+    def _body_wrench(self, data: bytes, message_type: type, held: bool) -> int:
+        message = read_message(data, message_type)
+        stamp = message.header.stamp
+        return self._take_wrench(held, whole_stamp(stamp.sec, stamp.nanosec), frame_of(message), *wrench_of(message))
+
+    def _take_wrench(self, held: bool, stamp_ns: int, frame_id: str, force: Vector, torque: Vector) -> int:
         simulation = self._loop.simulation
-        stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
         frame = self._read_frames.get(frame_id)
         if frame is None:
             try:

@@ -57,6 +57,19 @@ INTERFACES = (
     ),
     _topic(
         SUBSCRIBED,
+        "~/body_wrench",
+        "rigid_proto_interfaces/BodyWrench",
+        "as `~/wrench`, with point and slot in fields of their own, where rigid_proto_interfaces is installed",
+    ),
+    _topic(
+        SUBSCRIBED,
+        "~/body_poke",
+        "rigid_proto_interfaces/BodyWrench",
+        "as `~/poke`, with point, duration, impulse and slot in fields of their own, where rigid_proto_interfaces is "
+        "installed",
+    ),
+    _topic(
+        SUBSCRIBED,
         "~/string/target",
         "geometry_msgs/PointStamped",
         "position of the string's free end; the first message ties the string, which is released `string.timeout` "

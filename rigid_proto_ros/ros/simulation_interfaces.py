@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The standard simulator services (simulation_interfaces), where that package is installed.
 
-Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps, and what there is
-to know of the body and to set of its state (entity_services.py). There is one body and no world, so nothing is spawned,
-loaded or deleted.
+Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps, also as an
+action (step_action.py), and what there is to know of the body and to set of its state (entity_services.py). There is
+one body and no world, so nothing is spawned, loaded or deleted.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from . import entity_services
 from .entity_services import EntityServices
 from .physics_thread import Call, step_over
 from .simulation_loop import SimulationLoop
+from .step_action import StepAction
 
 SERVICES = (
     ("GetSimulatorFeatures", "get_simulator_features"),
@@ -60,6 +61,7 @@ class SimulationInterfaces:
             features.SIMULATION_STATE_PAUSE,
             features.STEP_SIMULATION_SINGLE,
             features.STEP_SIMULATION_MULTIPLE,
+            features.STEP_SIMULATION_ACTION,
         ]
         response.features.spawn_formats = []
         response.features.custom_info = (
@@ -142,9 +144,10 @@ class SimulationInterfaces:
 def offer_simulation_interfaces(node: Node, loop: SimulationLoop, call: Call) -> bool:
     """Offer the standard services on the node; False where simulation_interfaces isn't installed."""
     try:
-        from simulation_interfaces import msg, srv
+        from simulation_interfaces import action, msg, srv
     except ImportError:
         return False
     entity = EntityServices(loop, call, msg, node.get_name(), frame_names(loop.scenario.parameters, "")[0])
     SimulationInterfaces(loop, call, msg, entity).offer(node, srv)
+    StepAction(loop, call, msg, action.SimulateSteps).offer(node)
     return True

@@ -86,11 +86,11 @@ def _resolved(name: str) -> str:
 
 
 def _listed(direction: str) -> dict[str, str]:
-    without_tf = importlib.util.find_spec("tf2_msgs") is None
+    missing = {p for p in ("tf2_msgs", "rigid_proto_interfaces") if importlib.util.find_spec(p) is None}
     return {
         _resolved(i.name): i.type
         for i in INTERFACES
-        if i.direction == direction and not (i.name in ("/tf", "/tf_static") and without_tf)
+        if i.direction == direction and i.type.partition("/")[0] not in missing
     }
 
 

@@ -24,6 +24,7 @@ MESSAGES = SimpleNamespace(
         SIMULATION_STATE_PAUSE=26,
         STEP_SIMULATION_SINGLE=31,
         STEP_SIMULATION_MULTIPLE=32,
+        STEP_SIMULATION_ACTION=33,
     ),
     SimulationState=SimpleNamespace(STATE_STOPPED=0, STATE_PLAYING=1, STATE_PAUSED=2, STATE_QUITTING=3),
     Result=SimpleNamespace(RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_NOT_FOUND=2, RESULT_OPERATION_FAILED=4),
@@ -114,7 +115,7 @@ def state(value):
 
 
 def test_what_is_listed_is_served_and_nothing_else_is(services):
-    answer, _ = services
+    answer, node = services
     listed = answer.get_simulator_features(None, response()).features
     assert listed.spawn_formats == []
 
@@ -145,8 +146,63 @@ def test_what_is_listed_is_served_and_nothing_else_is(services):
         26: lambda: set_state(2),
         31: lambda: step(1),
         32: lambda: step(3),
+        33: lambda: carried_out(node, Goal(2)),
     }
     assert [feature for feature, call in calls.items() if call().result.result == OK] == listed.features
+
+
+class Goal:
+    """Stands in for rclpy's handle of a goal; cancelled after so many steps."""
+
+    def __init__(self, steps: int, cancelled_after: int | None = None) -> None:
+        self.request = SimpleNamespace(steps=steps)
+        self.feedback: list[tuple[int, int]] = []
+        self.end = ""
+        self._cancelled_after = cancelled_after
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        return len(self.feedback) == self._cancelled_after
+
+    def publish_feedback(self, feedback) -> None:
+        self.feedback.append((feedback.completed_steps, feedback.remaining_steps))
+
+    def execute(self, callback) -> None:
+        self.result = callback(self)
+
+    def succeed(self) -> None:
+        self.end = "succeeded"
+
+    def canceled(self) -> None:
+        self.end = "canceled"
+
+    def abort(self) -> None:
+        self.end = "aborted"
+
+
+def carried_out(node, goal: Goal):
+    """The result of an action's goal."""
+    from rigid_proto_ros.ros.step_action import StepAction
+
+    action = SimpleNamespace(Result=response, Feedback=SimpleNamespace)
+    StepAction(node.loop, node.call, MESSAGES, action).accepted(goal).join()
+    return goal.result
+
+
+def test_the_action_tells_of_each_step_and_ends_when_cancelled_or_when_time_runs(services):
+    answer, node = services
+    goal = Goal(3)
+    assert carried_out(node, goal).result.result == OK
+    assert (goal.end, goal.feedback) == ("succeeded", [(1, 2), (2, 1), (3, 0)])
+    assert node.loop.simulation.time_ns == 30_000_000
+    goal = Goal(5, cancelled_after=2)
+    assert carried_out(node, goal).result.result == OK
+    assert (goal.end, node.loop.simulation.time_ns) == ("canceled", 50_000_000)
+    answer.set_simulation_state(state(1), response())
+    goal = Goal(5)
+    result = carried_out(node, goal).result
+    assert (goal.end, goal.feedback, result.result) == ("aborted", [], FAILED)
+    assert "pause" in result.error_message
 
 
 def test_steps_are_publications_and_need_a_pause(services):

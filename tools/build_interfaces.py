@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Build a package of ROS interfaces for the ROS wheels of this environment, which have rosidl's generators, headers and
+libraries, but not ament_cmake, which colcon would need.
+
+    python tools/build_interfaces.py interfaces/rigid_proto_interfaces [MORE ...] [--out FOLDER]
+
+A package comes behind those that it uses. Each becomes a Python package in FOLDER, by default among those of the environment.
+Needs a C and a C++ compiler.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+PREFIX = Path(sys.prefix)
+KINDS = ("msg", "srv", "action")
+IMPLEMENTATIONS = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]
+RUNTIME = (
+    "rosidl_runtime_c",
+    "rcutils",
+    "rosidl_typesupport_c",
+    *IMPLEMENTATIONS,
+    "rosidl_typesupport_fastrtps_cpp",
+    "fastcdr",
+)
+
+
+def main() -> None:
+    """Build the packages in turn."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("packages", type=Path, nargs="+", help="folders with package.xml and msg, srv or action")
+    parser.add_argument("--out", type=Path, default=Path(sysconfig.get_path("platlib")), help="where they are to lie")
+    options = parser.parse_args()
+    # rosidl finds its templates through it; the wheels set it in processes that import rclpy.
+    os.environ["AMENT_PREFIX_PATH"] = str(PREFIX)
+    with tempfile.TemporaryDirectory() as work:
+        built: list[Package] = []
+        for folder in options.packages:
+            package = Package(folder.resolve(), Path(work), options.out.resolve())
+            package.generate([b.share.parent for b in built])
+            package.compile(built)
+            built.append(package)
+            print(f"{package.name}: {package.python}")
+
+
+class Package:
+    """One package: its folder, the generated sources below ``work``, and what is installed below ``out``."""
+
+    def __init__(self, folder: Path, work: Path, out: Path) -> None:
+        name = ElementTree.parse(folder / "package.xml").getroot().findtext("name")
+        assert name
+        self.name = name
+        self.folder = folder
+        self.share = work / "share" / name
+        # Two generators write files of the same names.
+        self.sources, self.introspection = work / name / "c", work / name / "introspection"
+        self.objects = work / name / "objects"
+        self.python = out / name
+
+    def generate(self, others: list[Path]) -> None:
+        """IDL, type descriptions, C and Python sources. others: folders with the IDL of packages built before."""
+        # The command rosidl takes a generator that pip and setuptools both list for two, and refuses.
+        from rosidl_adapter.cli import TranslateActionToIDL, TranslateMsgToIDL, TranslateSrvToIDL
+        from rosidl_generator_c.cli import GenerateC
+        from rosidl_generator_py.cli import GeneratePython
+        from rosidl_generator_type_description.cli import HashTypeDescription
+        from rosidl_typesupport_c.cli import GenerateCTypesupport
+        from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
+        from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
+
+        include = [PREFIX / "share", *others]
+        for kind, translate in zip(KINDS, (TranslateMsgToIDL, TranslateSrvToIDL, TranslateActionToIDL), strict=True):
+            if files := _relative(self.folder, f"{kind}/*.{kind}"):
+                translate(f"{kind}2idl").translate(self.name, files, include, self.share)
+        idl = _relative(self.share, "*/*.idl")
+        HashTypeDescription("hash").generate_type_hashes(self.name, idl, [*include, self.share.parent], self.share)
+        sources, introspection = self.sources / self.name, self.introspection / self.name
+        for kind in KINDS:
+            # By themselves: rosidl finds a description by its file's name, which a message and a service may share.
+            descriptions = [str(file) for file in sorted(self.share.glob(f"{kind}/*.json"))]
+            if files := _relative(self.share, f"{kind}/*.idl"):
+                GenerateC("c").generate(self.name, files, include, sources, type_description_files=descriptions)
+        dispatch = GenerateCTypesupport("c", typesupport_implementations=IMPLEMENTATIONS)
+        dispatch.generate(self.name, idl, include, sources)
+        GenerateFastRTPSCTypesupport("fastrtps_c").generate(self.name, idl, include, sources)
+        GenerateIntrospectionCTypesupport("introspection_c").generate(self.name, idl, include, introspection)
+        if self.python.exists():
+            shutil.rmtree(self.python)
+        GeneratePython("py").generate(self.name, idl, include, self.python)
+        (self.python / "__init__.py").touch()
+
+    def compile(self, others: list[Package]) -> None:
+        """The libraries that rmw looks for by name, and the module that Python imports, beside it."""
+        sources, python = self.sources, self.python
+        extension = f"{self.name}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
+        entry = python / f"_{self.name}_s.ep.rosidl_typesupport_c.c"
+        groups = {
+            f"lib{self.name}__rosidl_generator_c.so": sources.rglob("*.c"),
+            f"lib{self.name}__rosidl_typesupport_fastrtps_c.so": sources.rglob("*__type_support_c.cpp"),
+            f"lib{self.name}__rosidl_typesupport_introspection_c.so": self.introspection.rglob("*.c"),
+            f"lib{self.name}__rosidl_typesupport_c.so": sources.rglob("*__type_support.cpp"),
+            f"lib{self.name}__rosidl_generator_py.so": python.rglob("*_s.c"),
+            extension: [entry],
+        }
+        include = [PREFIX / "include", *sorted(p for p in (PREFIX / "include").iterdir() if p.is_dir())]
+        include += [sysconfig.get_path("include"), np.get_include(), self.sources, self.introspection]
+        include += [folder for other in others for folder in (other.sources, other.introspection)]
+        flags = [f"-I{folder}" for folder in include]
+        libraries = [PREFIX / "lib" / f"lib{name}.so" for name in RUNTIME]
+        libraries += sorted(p for p in (PREFIX / "lib").glob("lib*__rosidl_*.so") if "_cpp" not in p.name)
+        libraries += [library for other in others for library in sorted(other.python.glob("lib*.so"))]
+        rpath = [f"-Wl,-rpath,{place}" for place in ("$ORIGIN", *(f"$ORIGIN/../{other.name}" for other in others))]
+        made: list[Path] = []
+        for name, files in groups.items():
+            objects = [self._object(file, flags) for file in sorted(files)]
+            # All of them are loaded with the module: then rmw finds the libraries by their names.
+            link = ["c++", "-shared", f"-Wl,-soname,{name}", "-Wl,--no-as-needed", *rpath, "-o", python / name]
+            subprocess.run([*map(str, (*link, *objects, *made, *libraries))], check=True)
+            made.append(python / name)
+        for source in (*python.rglob("*.c"),):
+            source.unlink()
+
+    def _object(self, source: Path, flags: list[str]) -> Path:
+        made = self.objects / f"{len(list(self.objects.glob('*')))}_{source.name}.o"
+        made.parent.mkdir(parents=True, exist_ok=True)
+        compiler = ["c++", "-std=c++17"] if source.suffix == ".cpp" else ["cc", "-std=gnu11"]
+        subprocess.run([*compiler, "-O1", "-fPIC", "-c", str(source), "-o", str(made), *flags], check=True)
+        return made
+
+
+def _relative(folder: Path, pattern: str) -> list[str]:
+    """Files below a folder, as rosidl wants them."""
+    return [f"{folder}:{file.relative_to(folder)}" for file in sorted(folder.glob(pattern))]
+
+
+if __name__ == "__main__":
+    main()
