@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,8 +17,10 @@ from . import mass_parameters as mp
 from . import measurements as ms
 from . import possible_bodies as pb
 from . import shooting as sh
+from .first_attitude import first_attitude
 from .local_motion import high_rate, least_noise, local_start, noise_by_differences
 from .momentum_balance import balanced_values
+from .poses import Poses, poses_of
 from .unknowns import Unknowns, Values
 
 FIRST_ANGLE = 3.0
@@ -31,6 +33,10 @@ leaves more than noise.
 """
 FITS = 2.0
 """Departures so many times what neighbouring samples say are no noise."""
+NEAR = 1e-3
+"""Part of what a series shows, or radians, within which a stage that leads on to the next one is near enough."""
+LEAST_NOISE = 1e-4
+"""The same that is taken for noise at first: of a simulated flight nothing is left at the end, but not yet then."""
 MOST_SEGMENTS = 40
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 6
@@ -90,7 +96,7 @@ class Estimate:
 
 @dataclass
 class _Work:
-    """What stages hand on."""
+    """What stages hand on. reckoned: poses by ``id`` of the flights that have no attitudes."""
 
     flights: Sequence[ms.MeasuredFlight]
     topics: Sequence[str]
@@ -98,6 +104,7 @@ class _Work:
     values: Values
     sigmas: dict[int, float]
     weights: dict[int, np.ndarray]
+    reckoned: dict[int, Poses] = field(default_factory=dict)
     evaluations: int = 0
 
 
@@ -118,7 +125,7 @@ def fit_flights(
     known: an estimate of the same flights whose noise counts and whose starts are near.
     """
     series = [one for flight in flights for one in flight.series]
-    noise = {id(one): noise_by_differences(one) for one in series}
+    noise = {id(one): max(noise_by_differences(one), LEAST_NOISE * _spread(one)) for one in series}
     ones = {id(one): np.ones(len(one.times_ns)) for one in series}
     work = _Work(flights, topics_of(flights), unknowns, values, dict(known.sigmas if known else noise), ones)
     whole = 2.0 * max(flight.duration_s for flight in flights)
@@ -138,24 +145,35 @@ def fit_flights(
     return _estimate(work, _segments(work, whole), starts)
 
 
+def _spread(series: ms.Series) -> float:
+    """How much a series shows, in its own unit."""
+    return 1.0 if series.kind == ms.ATTITUDE else float(np.std(series.values))
+
+
+def _near_enough(work: _Work) -> dict[int, float]:
+    """Departures of each series that are none to a stage which leads on to the next one."""
+    return {id(one): NEAR * _spread(one) for flight in work.flights for one in flight.series}
+
+
 def _approached(work: _Work, whole: float) -> np.ndarray:
     """Bring ``work`` near by ever longer segments; returns starts of one segment for each flight."""
     values, sigmas = work.values, work.sigmas
-    balanced = balanced_values(work.flights, work.unknowns, values)
+    balanced = _balanced(work)
+    least = _near_enough(work)
     for angle in BALANCED_ANGLES:
         if balanced is None:
             break
         work.values, work.sigmas = balanced, sigmas
         length = min(_first_length(work.flights, angle), whole)
         segments = _segments(work, length)
-        starts = _solved(work, segments, _local_starts(segments), 12, 1e-2)
+        starts = _solved(work, segments, _local_starts(work, segments), 12, 1e-2)
         work.sigmas = _noise(work, segments, starts)
-        if all(work.sigmas[key] < FITS * sigmas[key] for key in sigmas):
+        if all(work.sigmas[key] < max(FITS * sigmas[key], least[key]) for key in sigmas):
             return _lengthened(work, segments, starts, length, whole)
     work.values, work.sigmas = values, sigmas
     length = min(_first_length(work.flights, FIRST_ANGLE), whole)
     segments = _segments(work, length)
-    starts = _local_starts(segments)
+    starts = _local_starts(work, segments)
     free = [k for k, segment in enumerate(segments) if not len(segment.wrenches.commands)]
     if free and len(free) < len(segments):
         # Shape and centre of mass first, where no load hides them: what a load does then tells mass and size at once.
@@ -166,20 +184,40 @@ def _approached(work: _Work, whole: float) -> np.ndarray:
     return _lengthened(work, segments, starts, length, whole)
 
 
-def _local_starts(segments: Sequence[sh.Segment]) -> np.ndarray:
-    return np.array([local_start(segment.flight, segment.begin_ns) for segment in segments])
+def _balanced(work: _Work) -> Values | None:
+    """What the balance of momentum says, None where a flight has no attitudes and none can be reckoned."""
+    offsets = dict(zip(work.topics, work.values.offsets, strict=True))
+    damped = any(name == "damping" for name, _ in work.unknowns.slots)
+    poses = []
+    for flight in work.flights:
+        one = poses_of(flight, offsets, work.values)
+        if one is None:
+            return None
+        if one.is_reckoned:
+            one = work.reckoned[id(flight)] = one.begun_at(first_attitude(one, work.values, damped))
+        poses.append(one)
+    return balanced_values(poses, work.unknowns, work.values)
+
+
+def _local_starts(work: _Work, segments: Sequence[sh.Segment]) -> np.ndarray:
+    return np.array([_local_start(work, segment) for segment in segments])
+
+
+def _local_start(work: _Work, segment: sh.Segment) -> np.ndarray:
+    return local_start(segment.flight, segment.begin_ns, work.reckoned.get(id(segment.flight)))
 
 
 def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, length: float, whole: float) -> np.ndarray:
     """Join segments step by step; returns starts of one segment for each flight."""
     factor = LENGTHENING
+    least = _near_enough(work)
     while length < whole:
         values, sigmas = work.values, work.sigmas
         longer = _segments(work, min(factor * length, whole))
-        joined = np.array([_start_of(segment, segments, starts) for segment in longer])
+        joined = np.array([_start_of(work, segment, segments, starts) for segment in longer])
         joined = _solved(work, longer, joined, 12, 1e-2)
         work.sigmas = _noise(work, longer, joined)
-        if factor > 2.0 and any(work.sigmas[key] > GROWN * sigmas[key] for key in sigmas):
+        if factor > 2.0 and any(work.sigmas[key] > GROWN * max(sigmas[key], least[key]) for key in sigmas):
             # Too long at once: the flight has left the way to the truth. Back, and on in smaller steps.
             work.values, work.sigmas, factor = values, sigmas, math.sqrt(factor)
             continue
@@ -208,12 +246,12 @@ def _segments(work: _Work, length_s: float) -> list[sh.Segment]:
     )
 
 
-def _start_of(segment: sh.Segment, before: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+def _start_of(work: _Work, segment: sh.Segment, before: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
     """The start of that of the earlier segments which begins with this one, or a guess."""
     for other, start in zip(before, starts, strict=True):
         if other.flight is segment.flight and other.begin_ns == segment.begin_ns:
             return start
-    return local_start(segment.flight, segment.begin_ns)
+    return _local_start(work, segment)
 
 
 def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> float:
@@ -225,8 +263,7 @@ def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: 
         for piece, departure in zip(segment.pieces, found, strict=True):
             # Few samples that nothing could bring near must not hide what the others say, nor a noise of nothing all of
             # them.
-            coarse = 1.0 if piece.series.kind == ms.ATTITUDE else float(np.std(piece.series.values))
-            scaled = departure / max(piece.sigma, COARSE * coarse)
+            scaled = departure / max(piece.sigma, COARSE * _spread(piece.series))
             total += float(np.sum(np.log1p(scaled * scaled)))
     return total
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.errors import InputError
 from . import mass_parameters as mp
 from .comparison import Candidate, compare
 from .fitting import fit_flights, topics_of
-from .measurements import ACCELERATION, MeasuredFlight
+from .measurements import ACCELERATION, ATTITUDE, RATE, MeasuredFlight
 from .report import Identification
 from .residual_checks import check_residuals
 from .unknowns import DEFAULT_FIT, Values, make_unknowns
@@ -44,6 +45,7 @@ def identify(
 ) -> Identification:
     """What the flights tell of the body that flew in all of them; raises InputError."""
     known = known or Known()
+    _check_axes(flights)
     topics = topics_of(flights)
     theta = _first_guess(known)
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
@@ -64,6 +66,18 @@ def identify(
     )
     checks = check_residuals(flights, estimate)
     return Identification(flights, estimate, visibility, checks, compared, _assumed(flights, known, fit), guessed)
+
+
+def _check_axes(flights: Sequence[MeasuredFlight]) -> None:
+    """Raises InputError where nothing says how the body's axes lie."""
+    for flight in flights:
+        rate = flight.first(RATE)
+        if rate is not None and flight.first(ATTITUDE) is None and flight.first(RATE, in_body=True) is None:
+            raise InputError(
+                rate.topic,
+                f"{flight.name} has rates in world axes and no attitude, so nothing says how the body's axes lie;"
+                " --pose or --odom adds one, and rates along the body's axes are TOPIC@body",
+            )
 
 
 def _first_guess(known: Known) -> np.ndarray:

@@ -3,33 +3,45 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from . import measurements as ms
 from . import rotations as rot
+from .poses import Poses
 
 NEIGHBOURS = 9
 """Samples for a local parabola: at 100 Hz and .2 degrees of noise its slope errs by some hundredths rad/s."""
 NEAR_TURN = 1.5
 """Over which rotation vectors change nearly as the angular velocity does [rad]."""
+FEWEST_DIFFERENCES, MOST_DIFFERENCES = 3, 7
+"""Of noise all orders have the same spread, but for their factor; of a motion the higher ones leave less."""
+MEDIAN = 0.6745
+"""Of the size of a normal number, in standard deviations."""
 LEAST_NOISE = 1e-10
 """Of the largest value of a series: less can't be told from the rounding of a simulated flight."""
 
 
 def noise_by_differences(series: ms.Series) -> float:
-    """Standard deviation of one component of the noise, from third differences, in which a smooth motion hardly shows.
+    """Standard deviation of one component of the noise, from third and higher differences, in which a smooth
+    motion hardly shows.
 
     Rough where the samples aren't evenly spaced, and an upper bound where there is no noise.
     """
-    values = series.values
-    if len(values) < 5:
+    if len(series.values) < 5:
         return 1.0
     if series.kind == ms.ATTITUDE:
-        first = rot.logarithm(rot.product(rot.inverse(values[:-1]), values[1:]))
-        third = np.diff(first, 2, axis=0)
+        # The differences of attitudes are turns in body axes.
+        differences = rot.logarithm(rot.product(rot.inverse(series.values[:-1]), series.values[1:]))
     else:
-        third = np.diff(values, 3, axis=0)
-    spread = float(np.median(np.abs(third))) / 0.6745 / np.sqrt(20.0)
+        differences = np.diff(series.values, axis=0)
+    spread = np.inf
+    for order in range(2, min(MOST_DIFFERENCES, len(series.values) - 2) + 1):
+        differences = np.diff(differences, axis=0)
+        if order >= FEWEST_DIFFERENCES:
+            own = float(np.median(np.abs(differences))) / MEDIAN / math.sqrt(math.comb(2 * order, order))
+            spread = min(spread, own)
     return max(spread, least_noise(series))
 
 
@@ -55,15 +67,16 @@ def _parabola(series: ms.Series, window: slice, time_ns: int, values: np.ndarray
     return fit[0], fit[1] / span if degree else np.zeros(3)
 
 
-def _first(flight: ms.MeasuredFlight, kind: str) -> ms.Series | None:
-    return next((series for series in flight.series if series.kind == kind), None)
+def local_start(flight: ms.MeasuredFlight, time_ns: int, reckoned: Poses | None = None) -> np.ndarray:
+    """The tracked frame's state (13,) at a time: position, attitude xyzw, velocity, angular velocity in body axes.
 
-
-def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
-    """The tracked frame's state (13,) at a time: position, attitude xyzw, velocity, angular velocity in body axes."""
+    reckoned: poses that say the attitude where none was measured.
+    """
     start = np.zeros(13)
     start[6] = 1.0
-    position, attitude = _first(flight, ms.POSITION), _first(flight, ms.ATTITUDE)
+    if reckoned is not None:
+        start[3:7] = reckoned.attitude_at(np.array([1e-9 * (time_ns - flight.begin_ns)]))[0]
+    position, attitude = flight.first(ms.POSITION), flight.first(ms.ATTITUDE)
     if position is not None:
         window = _window(position, time_ns)
         start[:3], start[7:10] = _parabola(position, window, time_ns, position.values[window])
@@ -74,7 +87,7 @@ def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
         window = _window(rate, time_ns)
         value = _parabola(rate, window, time_ns, rate.values[window])[0]
         start[10:13] = value if rate.in_body else rot.turned_back(start[3:7], value)
-    velocity = _first(flight, ms.VELOCITY)
+    velocity = flight.first(ms.VELOCITY)
     if velocity is not None:
         window = _window(velocity, time_ns)
         value = _parabola(velocity, window, time_ns, velocity.values[window])[0]
@@ -104,7 +117,7 @@ def _local_turn(attitude: ms.Series, time_ns: int) -> tuple[np.ndarray, np.ndarr
 
 def high_rate(flight: ms.MeasuredFlight) -> float:
     """Angular speed that four of five samples don't pass [rad/s]."""
-    rate, attitude = _first(flight, ms.RATE), _first(flight, ms.ATTITUDE)
+    rate, attitude = flight.first(ms.RATE), flight.first(ms.ATTITUDE)
     if rate is not None:
         return float(np.quantile(np.linalg.norm(rate.values, axis=1), 0.8))
     if attitude is None or len(attitude.values) < 2:

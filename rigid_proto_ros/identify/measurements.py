@@ -89,6 +89,10 @@ class MeasuredFlight:
         """The last sample of all."""
         return max(int(series.times_ns[-1]) for series in self.series)
 
+    def first(self, kind: str, in_body: bool = False) -> Series | None:
+        """The first series of a kind. in_body: along body axes alone."""
+        return next((one for one in self.series if one.kind == kind and (one.in_body or not in_body)), None)
+
     @property
     def duration_s(self) -> float:
         """From the first sample to the last [s]."""

@@ -13,91 +13,35 @@ integrals are known, one poke in a long fall tells the mass as well as in a shor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..motion import loads as ld
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import rotations as rot
+from .poses import FEWEST, Poses, integral
+from .pushes import Pushes, pushes_of
 from .triangles import upper_triangle
 from .unknowns import Unknowns, Values
 
 TURN = 0.5
 """Between the two attitudes that give an angular velocity [rad]: farther apart the mean isn't the middle's."""
-POINTS = 8
-"""At which a load is looked at for each time between two samples, and at least."""
 TOLD = 4.0
 """Standard deviations that 1/m and 1/tr I have to be above 0, to say the mass and the size of the tensor."""
 THINNEST = 1e-2
 """Least second moment of the first body, of the largest."""
 LOOSE = 3.0
 """Standard deviation of what is assumed of shape and, in sizes of the body, of the centre of mass."""
-FEWEST = 8
-"""Poses of a flight."""
-MOST_POINTS = 200
 MOST_LEFT_OUT = 0.3
 """Part of the rates that may be left out because a load begins or ends within them."""
 
 
-@dataclass(frozen=True)
-class _Poses:
-    """What a flight's poses say. seconds (n,) from its begin, positions (n, 3) or None, attitudes (n, 4) xyzw."""
-
-    flight: ms.MeasuredFlight
-    seconds: np.ndarray
-    positions: np.ndarray | None
-    attitudes: np.ndarray
-
-    def attitude_at(self, seconds: np.ndarray) -> np.ndarray:
-        """Attitudes (m, 4) between the samples."""
-        after = np.clip(np.searchsorted(self.seconds, seconds), 1, len(self.seconds) - 1)
-        first, last = self.attitudes[after - 1], self.attitudes[after]
-        begin, end = self.seconds[after - 1], self.seconds[after]
-        part = np.clip((seconds - begin) / (end - begin), 0.0, 1.0)
-        return rot.product(first, rot.exponential(part[:, None] * rot.logarithm(rot.product(rot.inverse(first), last))))
-
-
-@dataclass(frozen=True)
-class _Pushes:
-    """Small pushes that stand for a flight's loads: seconds (k,) ascending, impulses (k, 3) [N s, world], and angular
-    ones about the tracked frame's origin (k, 3) [N m s, world]; where their forces attack is given by ``about``.
-    """
-
-    seconds: np.ndarray
-    impulses: np.ndarray
-    angular: np.ndarray
-    at_com: np.ndarray
-    attitudes: np.ndarray
-
-    def about(self, com: np.ndarray) -> np.ndarray:
-        """Angular impulses (k, 3) about the centre of mass [N m s, world]."""
-        moved = self.angular - rot.cross(rot.turned(self.attitudes, com), self.impulses)
-        return np.where(self.at_com[:, None], self.angular, moved)
-
-    def momentum(self, seconds: np.ndarray, pushes: np.ndarray) -> np.ndarray:
-        """Sums (n, 3) of ``pushes`` (k, 3) up to each time."""
-        sums = np.vstack([np.zeros(3), np.cumsum(pushes, axis=0)])
-        return sums[np.searchsorted(self.seconds, seconds, side="right")]
-
-    def way(self, seconds: np.ndarray) -> np.ndarray:
-        """∬ F dt² (n, 3) up to each time [N s²]."""
-        return self.momentum(seconds, self.impulses) * seconds[:, None] - self.momentum(
-            seconds, self.impulses * self.seconds[:, None]
-        )
-
-
-def balanced_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, values: Values) -> Values | None:
+def balanced_values(poses: Sequence[Poses], unknowns: Unknowns, values: Values) -> Values:
     """``values`` with the free ones of mass, COM, tensor and damping as the poses' balance of momentum says, where it
-    does; None where a flight has no attitudes.
+    does.
     """
-    topics = list(dict.fromkeys(series.topic for flight in flights for series in flight.series))
-    found = [_poses(flight, dict(zip(topics, values.offsets, strict=True))) for flight in flights]
-    poses = [one for one in found if one is not None]
-    if len(poses) < len(found):
-        return None
-    pushes = [_pushes(one) for one in poses]
+    pushes = [pushes_of(one) for one in poses]
     names = {mp.MASS: "mass", 7: "com", 8: "com", 9: "com"}
     free = {name for name, _ in unknowns.slots} | {names.get(index, "shape") for _, index in unknowns.theta_columns}
     body = values.body
@@ -111,40 +55,8 @@ def balanced_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, va
     return replace(values, theta=mp.parameters_of(mass, com, inertia), damping=np.array([drag, damping]))
 
 
-def _poses(flight: ms.MeasuredFlight, offsets: dict[str, float]) -> _Poses | None:
-    attitude = next((s for s in flight.series if s.kind == ms.ATTITUDE), None)
-    if attitude is None or len(attitude.times_ns) < FEWEST:
-        return None
-    seconds = 1e-9 * (attitude.times_ns - flight.begin_ns) + offsets[attitude.topic]
-    position = next((s for s in flight.series if s.kind == ms.POSITION and s.topic == attitude.topic), None)
-    return _Poses(flight, seconds, None if position is None else position.values, attitude.values)
-
-
-def _pushes(poses: _Poses) -> _Pushes:
-    acting, begin_ns = poses.flight.acting, poses.flight.begin_ns
-    begin, end = (1e-9 * (edge - begin_ns) for edge in (acting.begin_ns, acting.end_ns))
-    apart = float(np.median(np.diff(poses.seconds)))
-    counts = np.clip(np.ceil(POINTS * (end - begin) / apart), POINTS, MOST_POINTS).astype(int)
-    counts[begin == end] = 1
-    which = np.repeat(np.arange(len(counts)), counts)
-    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    length = np.where(begin == end, 1.0, end - begin)[which] / counts[which]
-    seconds = begin[which] + (end - begin)[which] * (number + 0.5) / counts[which]
-    order = np.argsort(seconds, kind="stable")
-    which, seconds, length = which[order], seconds[order], length[order, None]
-    rows, attitudes = acting.loads[which], poses.attitude_at(seconds)
-    in_body = (rows[:, ld.LOAD_AXES] != ld.WORLD_AXES)[:, None]
-    force, torque = (
-        np.where(in_body, rot.turned(attitudes, vectors), vectors)
-        for vectors in (rows[:, ld.FORCE : ld.FORCE + 3], rows[:, ld.TORQUE : ld.TORQUE + 3])
-    )
-    has_point = rows[:, ld.HAS_POINT] != 0.0
-    arm = np.where(has_point[:, None], rot.turned(attitudes, rows[:, ld.POINT : ld.POINT + 3]), 0.0)
-    return _Pushes(seconds, length * force, length * (torque + rot.cross(arm, force)), ~has_point, attitudes)
-
-
 def _from_path(
-    poses: Sequence[_Poses], pushes: Sequence[_Pushes], values: Values, com: np.ndarray, free: set[str]
+    poses: Sequence[Poses], pushes: Sequence[Pushes], values: Values, com: np.ndarray, free: set[str]
 ) -> tuple[np.ndarray, float, float]:
     """Centre of mass [m, tracked frame], mass [kg] and linear damping [N s/m]."""
     body, drag = values.body, float(values.damping[0])
@@ -159,23 +71,26 @@ def _from_path(
         assert p is not None
         # Columns of the attitude's matrix are its turned axes.
         turns = turns.transpose(0, 2, 1)
-        moved = -_integral(one.seconds, p + np.einsum("nij,j->ni", turns, com) - p[0])
-        way = push.way(one.seconds)
+        moved = -integral(one.seconds, p + np.einsum("nij,j->ni", turns, com) - p[0])
+        way = push.way(one.seconds, push.impulses)
         known = way + (0.0 if "damping" in free else drag) * moved
-        right = -p + 0.5 * np.array(one.flight.gravity) * t * t
+        right = -p + 0.5 * one.gravity * t * t
         parts = {"com": turns, "mass": -known[:, :, None], "damping": -moved[:, :, None]}
         parts["gravity"] = -0.5 * np.eye(3) * (t * t)[:, :, None]
         if "com" not in free:
             right = right - np.einsum("nij,j->ni", turns, com)
         if ("mass", 1) not in asked:
             right = right + known / body.mass
-        block = np.zeros((len(t), 3, count + 6 * len(with_path)))
+        block = np.zeros((len(t), 3, count + 9 * len(with_path)))
         at = 0
         for name, width in asked:
             block[:, :, at : at + width] = parts[name]
             at += width
-        at += 6 * number
+        at += 9 * number
         block[:, :, at : at + 3], block[:, :, at + 3 : at + 6] = -np.eye(3), -np.eye(3) * t[:, :, None]
+        if one.is_reckoned:
+            # A first attitude that is a little off shows as gravity that is.
+            block[:, :, at + 6 : at + 9] = -0.5 * np.eye(3) * (t * t)[:, :, None]
         blocks.append(block.reshape(-1, block.shape[2]))
         rights.append(right.ravel())
     if not blocks or not asked:
@@ -199,8 +114,8 @@ def _from_path(
 
 
 def _from_turns(
-    poses: Sequence[_Poses],
-    pushes: Sequence[_Pushes],
+    poses: Sequence[Poses],
+    pushes: Sequence[Pushes],
     values: Values,
     before: np.ndarray,
     com: np.ndarray,
@@ -217,7 +132,7 @@ def _from_turns(
         block = np.zeros((len(seconds), 3, shared + 3 * len(poses)))
         for k, basis in enumerate(_SHAPES):
             block[:, :, k] = rot.turned(attitudes, rates @ basis)
-        slowing = -_integral(seconds, turned)
+        slowing = -integral(seconds, turned)
         if loaded:
             block[:, :, 5] = -(push.momentum(seconds, push.about(com)) + known * slowing)
         if damped:
@@ -239,7 +154,7 @@ def _from_turns(
     return trace * mp.possible_tensor(shape, THINNEST), damping
 
 
-def _rates(poses: _Poses, pushes: _Pushes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _rates(poses: Poses, pushes: Pushes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Seconds (m,), attitudes (m, 4) and angular velocities (m, 3) [rad/s, body axes]: a gyro's, or midway between two
     attitudes.
     """
@@ -261,12 +176,6 @@ def _rates(poses: _Poses, pushes: _Pushes) -> tuple[np.ndarray, np.ndarray, np.n
     if np.sum(kept & acts) < MOST_LEFT_OUT * np.sum(kept):
         kept &= ~acts
     return (0.5 * (begin + end))[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
-
-
-def _integral(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """∫ (n, 3) of vectors (n, 3) from the first time on, by trapezoids."""
-    steps = 0.5 * np.diff(seconds)[:, None] * (vectors[1:] + vectors[:-1])
-    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
 def _solved(

@@ -22,6 +22,7 @@ from .residual_checks import ResidualCheck, remarks
 from .unknowns import Values
 from .verdict import Hidden, Quantity, Visibility, summary
 
+MISFIT = "the fit leaves more than noise, so its numbers may be farther off than their standard deviations say"
 TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -54,8 +55,14 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """What this motion can tell, in a sentence."""
-        return summary(self.hidden, self.seen)
+        """What this motion can tell, in a sentence; and first of all whether the model fits it."""
+        said = summary(self.hidden, self.seen)
+        return said if self.fits else f"{MISFIT}; {said}"
+
+    @property
+    def fits(self) -> bool:
+        """Whether what the fit leaves is noise: else its numbers may be far off, whatever their standard deviations."""
+        return all(check.is_noise for check in self.checks)
 
     @property
     def mass(self) -> Quantity:
@@ -123,6 +130,7 @@ def as_json(found: Identification) -> dict:
     """The command's JSON object; what the motion can't tell is null."""
     return {
         "verdict": found.verdict,
+        "fits": found.fits,
         "hidden": [{"what": one.what, "remedy": one.remedy} for one in found.hidden],
         "mass": _pair(found.mass),
         "center_of_mass": _pairs(found.center_of_mass),
@@ -222,4 +230,5 @@ def as_urdf(found: Identification) -> str:
     if any(part.value is None for part in parts):
         raise InputError("--urdf", f"{found.verdict}, and a URDF needs all of mass, centre of mass and tensor")
     body = found.estimate.mass
-    return urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia))
+    written = urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia))
+    return written if found.fits else f"<!-- {MISFIT} -->\n{written}"

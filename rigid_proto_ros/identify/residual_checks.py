@@ -27,6 +27,8 @@ WINDOWS = 10
 """Parts of a flight in which the departures are compared."""
 WORSE = 3.0
 """So many times the mean square of the other parts is something that happened then."""
+NEGLIGIBLE = 1e-7
+"""Of the largest value of a series: what is left of a simulated flight is rounding and no error of the model."""
 TOO_LARGE = 1.5
 """Departures so many times the noise between neighbouring samples are no noise."""
 
@@ -79,7 +81,7 @@ def _check(flight: MeasuredFlight, series: Series, departures: np.ndarray, noise
         UNITS[series.kind],
         len(departures),
         noise,
-        noise_by_differences(series),
+        max(noise_by_differences(series), NEGLIGIBLE * float(np.abs(series.values).max())),
         _whiteness(scaled),
         int(np.sum(np.max(np.abs(scaled), axis=1) > FAR)),
         _worst(scaled, seconds),

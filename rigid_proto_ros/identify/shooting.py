@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.rotation import matrix_from_quaternion
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import rotations as rot
@@ -23,8 +24,8 @@ from .triangles import upper_triangle
 from .unknowns import Unknowns, Values
 
 START = 12
-"""Unknowns of a segment's start: position [m], turn [rad, body axes], velocity [m/s], angular velocity
-[rad/s, body axes].
+"""Unknowns of a segment's start: position [m, world], turn [rad], velocity [m/s] and angular velocity [rad/s], these
+three in body axes: so a turn alone, which nothing shows of a flight without attitudes, changes nothing else.
 """
 START_STEPS = np.array([0.0] * 3 + [mp.STEP] * 3 + [0.0] * 3 + [mp.STEP] * 3)
 """For difference quotients; how a flight shifts with its position and velocity is known in closed form."""
@@ -96,8 +97,9 @@ def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
     moved = starts.copy()
     moved[:, :3] += changes[:, :3]
     attitude = rot.product(starts[:, 3:7], rot.exponential(changes[:, 3:6]))
-    moved[:, 3:7] = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
-    moved[:, 7:13] += changes[:, 6:12]
+    moved[:, 3:7] = attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
+    moved[:, 7:10] = rot.turned(attitude, rot.turned_back(starts[:, 3:7], starts[:, 7:10]) + changes[:, 6:9])
+    moved[:, 10:13] += changes[:, 9:12]
     return moved
 
 
@@ -192,8 +194,13 @@ def _variations(
     return starts, theirs, [*changed.tolist(), *(START + k for k in varied)]
 
 
-def _shift_columns(piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """How a piece changes with its start's position and velocity, (m, 3, 3) each; base (m, SAMPLE), rate c/m [1/s]."""
+def _shift_columns(
+    piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: float, attitude: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """How a piece changes with its start's position and velocity, (m, 3, 3) each; base (m, SAMPLE), rate c/m [1/s].
+
+    attitude (4,): the start's, in whose axes its velocity changes.
+    """
     m, kind = len(base), piece.series.kind
     position, velocity = np.zeros((m, 3, 3)), np.zeros((m, 3, 3))
     decay = np.exp(-rate * seconds)[:, None, None]
@@ -206,7 +213,7 @@ def _shift_columns(piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: fl
         velocity[:] = (back if piece.series.in_body else np.eye(3)) * decay
     elif kind == ms.ACCELERATION:
         velocity[:] = -rate * back * decay
-    return position, velocity
+    return position, velocity @ matrix_from_quaternion(attitude)
 
 
 def linearized(
@@ -231,7 +238,7 @@ def linearized(
     for piece, own, index in zip(segment.pieces, shown, where, strict=True):
         kind = piece.series.kind
         block = np.zeros((len(index), 3, START + len(unknowns)))
-        block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate)
+        block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate, start[3:7])
         # What a flight shows moves by minus what its departure from a nearby one says.
         difference = departure(kind, own[2::2] if central else own[:1], own[1 :: len(sides)])
         block[:, :, columns] = (difference / (len(sides) * widths[columns])[:, None, None]).transpose(1, 2, 0)
@@ -381,5 +388,5 @@ SETTLING = 6
 SETTLED = 0.01
 """Part of the squares that starts could still take away."""
 
-START_WIDTHS = np.repeat([1e3, 1e2, 1e3, 1e3], 3)
+START_WIDTHS = np.repeat([1e3, 1.0, 1e3, 1e3], 3)
 """Of what is assumed of a start beforehand."""

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Thrown bundled bodies, measured with noise and estimated: how far off, in the standard deviations that
 the estimate gives itself.
+
+``python test/identify/calibration_study.py FIRST LAST`` prints the throws of these numbers as one line of JSON each;
+a third word ``wrong`` begins them with a hundred times the mass and a turned tensor. Half of the throws carry a phone.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import sys
+from dataclasses import asdict, dataclass, replace
 
 import measured_flights as mf
 import numpy as np
@@ -15,7 +20,7 @@ from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify.fitting import Estimate, topics_of
 from rigid_proto_ros.identify.identification import Known, identify
-from rigid_proto_ros.identify.measurements import ATTITUDE, POSITION, MeasuredFlight
+from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight
 from rigid_proto_ros.identify.report import Identification
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, Values, make_unknowns
 from rigid_proto_ros.identify.verdict import Quantity, Visibility
@@ -23,6 +28,8 @@ from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.tensor import six_from_tensor
 
 EARTH = (0.0, 0.0, -9.81)
+SIGMAS = dict(zip((POSITION, ATTITUDE, RATE, ACCELERATION), (*mf.MOCAP, *mf.PHONE), strict=True))
+PHONE_FIT = (*DEFAULT_FIT, "offset", "gyro_bias", "accel_bias", "imu_place")
 
 
 @dataclass(frozen=True)
@@ -33,7 +40,7 @@ class Throw:
     """
 
     body: str
-    errors: np.ndarray
+    errors: list[float]
     failed: bool
     against_bound: dict[str, float]
 
@@ -52,7 +59,7 @@ def bundled_truth(name: str) -> tuple[Values, float]:
 @dataclass(frozen=True)
 class MeasuredThrow:
     """A throw of a bundled body, by a number that decides all. size: half its diagonal [m]; start (13,): the tracked
-    frame's.
+    frame's; fit: what is looked for.
     """
 
     number: int
@@ -61,13 +68,13 @@ class MeasuredThrow:
     size: float
     start: np.ndarray
     flight: MeasuredFlight
+    fit: tuple[str, ...] = DEFAULT_FIT
 
     def bound(self) -> Estimate:
         """What nobody has: the truth, with its Fisher information."""
         topics = topics_of([self.flight])
-        unknowns = make_unknowns(DEFAULT_FIT, topics)
-        sigmas = dict(zip((POSITION, ATTITUDE), mf.MOCAP, strict=True))
-        [segment] = sh.cut([self.flight], 1e9, topics, lambda s: sigmas[s.kind], lambda s: np.ones(len(s.times_ns)))
+        unknowns = make_unknowns(self.fit, topics)
+        [segment] = sh.cut([self.flight], 1e9, topics, lambda s: SIGMAS[s.kind], lambda s: np.ones(len(s.times_ns)))
         linear = sh.linearized(segment, self.start, self.truth, unknowns.physical)
         assert linear is not None
         root = sh.compressed(*linear)[sh.START : -1, sh.START : -1]
@@ -83,8 +90,8 @@ class MeasuredThrow:
         return float(np.linalg.norm(self.bound().root @ change) / np.sqrt(mp.PARAMETERS))
 
 
-def measured_throw(number: int, poked: bool, seconds: float = 2.0) -> MeasuredThrow:
-    """One flight, with noise."""
+def measured_throw(number: int, poked: bool, seconds: float = 2.0, phone: bool = False) -> MeasuredThrow:
+    """One flight, with noise; phone: one is fixed on the body, its clock and biases unknown."""
     rng = np.random.default_rng(number)
     names = sorted(body_names())
     name = names[number % len(names)]
@@ -95,16 +102,25 @@ def measured_throw(number: int, poked: bool, seconds: float = 2.0) -> MeasuredTh
         mass = mp.mass_of(truth.theta).mass
         point = tuple((truth.theta[mp.COM] + 0.6 * size * _direction(rng)).tolist())
         load = mf.acting((0.4 * seconds, 0.05, "world", point, 20.0 * mass * _direction(rng), (0.0, 0.0, 0.0)))
-    return MeasuredThrow(number, name, truth, size, start, mf.mocap(truth, start, rng, seconds, load=load))
+    if not phone:
+        return MeasuredThrow(number, name, truth, size, start, mf.mocap(truth, start, rng, seconds, load=load))
+    offset, biases = 0.013, (0.02, 0.1)
+    place = 0.5 * size * _direction(rng)
+    flight = mf.with_imu(truth, start, rng, seconds, load, offset, place, biases)
+    gyro, accel = (np.full(3, bias) for bias in biases)
+    truth = replace(truth, offsets=(0.0, offset), gyro_bias=gyro, accel_bias=accel, imu_place=place)
+    return MeasuredThrow(number, name, truth, size, start, flight, PHONE_FIT)
 
 
-def throw(number: int, poked: bool, first: str = "ball") -> Throw:
+def throw(number: int, poked: bool, first: str = "ball", phone: bool = False) -> Throw:
     """One throw, estimated. first: what the estimate begins with, ``ball`` or ``wrong``."""
-    made = measured_throw(number, poked)
+    made = measured_throw(number, poked, phone=phone)
     begin = _first(first, made.truth, np.random.default_rng([number, 1]))
-    found = identify([made.flight], known=Known(theta=begin, length=made.size))
-    failed = any(check.noise > 1.5 * sd for check, sd in zip(found.checks, mf.MOCAP, strict=True))
-    return Throw(made.body, normalised_errors(found, made.truth), failed, _against_bound(found, made))
+    found = identify([made.flight], made.fit, Known(theta=begin, length=made.size))
+    failed = any(
+        check.noise > 1.5 * SIGMAS[one.kind] for check, one in zip(found.checks, made.flight.series, strict=True)
+    )
+    return Throw(made.body, normalised_errors(found, made.truth).tolist(), failed, _against_bound(found, made))
 
 
 def _against_bound(found: Identification, made: MeasuredThrow) -> dict[str, float]:
@@ -131,8 +147,10 @@ def _numbers(found: Identification, truth: Values) -> tuple[list[str], list[Quan
     tensor, names = found.inertia, ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
     if any(one.value is None for one in tensor):
         tensor, six, names = found.shape, six / np.trace(body.inertia), [f"{name} of the trace" for name in names]
-    told = [found.mass, *found.center_of_mass, *tensor]
-    return ["mass", "x", "y", "z", *names], told, [body.mass, *body.center_of_mass, *six]
+    told = [found.mass, *found.center_of_mass, *tensor, *found.others.values()]
+    others = [float(getattr(truth, name)[k]) for name, k in found.estimate.unknowns.slots if name != "theta"]
+    names = ["mass", "x", "y", "z", *names, *found.others]
+    return names, told, [body.mass, *body.center_of_mass, *six, *others]
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:
@@ -146,3 +164,14 @@ def _first(first: str, truth: Values, rng: np.random.Generator) -> np.ndarray | 
     mass = mp.mass_of(truth.theta)
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     return mp.parameters_of(100.0 * mass.mass, np.zeros(3), 100.0 * turn @ mass.inertia @ turn.T)
+
+
+def main(first: int, last: int, begin: str = "ball") -> None:
+    """Every second one is poked, and of each two neighbouring pairs one carries a phone."""
+    for number in range(first, last):
+        found = throw(number, poked=number % 2 == 0, first=begin, phone=number % 4 >= 2)
+        print(json.dumps({"number": number, "begin": begin, **asdict(found)}), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:])

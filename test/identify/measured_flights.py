@@ -17,6 +17,8 @@ from rigid_proto_ros.motion.loads import Load
 
 MOCAP = (0.5e-3, np.radians(0.2))
 """Of position [m] and attitude [rad], each component."""
+PHONE = (0.005, 0.05)
+"""Of a phone's rates [rad/s] and accelerations [m/s²] at 200 Hz, each component."""
 
 
 def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0), topics=1) -> Values:
@@ -75,11 +77,11 @@ def with_imu(
     """
     flight = mocap(values, start, rng, seconds, load=load)
     times, samples = flown(values, start, np.arange(0.02, seconds - 0.05, 0.005) + offset_s, load)
-    rate = samples[:, 10:13] + bias[0] + 0.005 * rng.standard_normal((len(times), 3))
+    rate = samples[:, 10:13] + bias[0] + PHONE[0] * rng.standard_normal((len(times), 3))
     arm = np.asarray(place) - values.theta[7:10]
     w, angular = samples[:, 10:13], samples[:, 16:19]
     felt = samples[:, 13:16] + np.cross(angular, arm) + np.cross(w, np.cross(w, arm))
-    felt = felt + bias[1] + 0.05 * rng.standard_normal(felt.shape)
+    felt = felt + bias[1] + PHONE[1] * rng.standard_normal(felt.shape)
     stamps = times - round(offset_s * 1e9)
     imu = (
         ms.Series("/imu", ms.RATE, stamps, rate, in_body=True, is_imu=True),

@@ -13,6 +13,7 @@ from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.mass_parameters import second_moments
 from rigid_proto_ros.identify.momentum_balance import balanced_values
+from rigid_proto_ros.identify.poses import poses_of
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, GROUPS, make_unknowns
 
 POKE = (0.5, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.5, 2.0), (0.0, 0.0, 0.01))
@@ -78,9 +79,10 @@ def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
 def test_the_balance_of_momentum_needs_no_guess_of_the_body() -> None:
     truth = _body((0.05, 0.0))
     flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 3.0, load=mf.acting(POKE))
+    poses = poses_of(flight, {"/mocap/pose": 0.0}, truth)
+    assert poses is not None
     guess = mf.values_of(70.0, (1.0, 0.0, 0.0), np.eye(3), study.EARTH, (0.05, 0.0))
-    found = balanced_values([flight], make_unknowns(DEFAULT_FIT, ["/mocap/pose"]), guess)
-    assert found is not None
+    found = balanced_values([poses], make_unknowns(DEFAULT_FIT, ["/mocap/pose"]), guess)
     body, true = found.body, truth.body
     assert abs(body.mass - true.mass) < 0.01 * true.mass  # measured 0.002
     assert np.abs(body.center_of_mass - true.center_of_mass).max() < 1e-3  # 4e-5
@@ -119,7 +121,7 @@ def test_small_sample_of_the_calibration() -> None:
 def test_a_wrong_start_ends_where_the_right_one_does(number: int) -> None:
     throw = study.throw(number, poked=number % 2 == 0, first="wrong")
     assert not throw.failed
-    assert np.mean(throw.errors**2) < 3.0
+    assert np.mean(np.square(throw.errors)) < 3.0
 
 
 @pytest.mark.stress
