@@ -261,6 +261,24 @@ def install_beside_ros(python, stage):
         install(python, "--no-deps", *pins()["rerun-sdk"])
 
 
+def is_whole(inner, version, shares):
+    """Whether .venv is an environment of this Python that pip works in, which it isn't when its making was interrupted."""
+    config = VENV / "pyvenv.cfg"
+    if not config.is_file() or ("include-system-site-packages = true" in config.read_text()) != shares:
+        return False
+    found = interpreter(str(inner))
+    return found is not None and found[1] == version and runs(str(inner), "import pip._internal.cli.main")
+
+
+def remove_what_no_flight_needs(python):
+    """The installer, and in packages their tests and the headers for those who compile against them: 100 MB."""
+    called(python, "-m", "pip", "--disable-pip-version-check", "uninstall", "--quiet", "--yes", "uv")
+    shutil.rmtree(str(VENV / "include"), ignore_errors=True)
+    for pattern in ("*/tests", "*/*/tests", "*/include"):
+        for folder in VENV.glob("lib/python3*/site-packages/" + pattern):
+            shutil.rmtree(str(folder), ignore_errors=True)
+
+
 def compile_kernels(python):
     """Start compiling what the first flight needs, on two cores."""
     script = ROOT / "requirements" / "compile_kernels.py"
@@ -290,9 +308,7 @@ def main(stage):
         stop("disk: got {:.1f} GB free in {}; accepted: {:.1f} GB or more".format(free / 1e9, ROOT, needed / 1e9))
     start = time.monotonic()
     inner = VENV / "bin" / "python"
-    config = VENV / "pyvenv.cfg"
-    shares = config.is_file() and "include-system-site-packages = true" in config.read_text()
-    if not config.is_file() or shares != ros_installed or (interpreter(str(inner)) or (None, None))[1] != version:
+    if not is_whole(inner, version, ros_installed):
         source = "beside the ROS installation's packages" if ros_installed else "with rclpy from PyPI"
         print("making .venv for {}, Python {}.{}, {}".format(stage, version[0], version[1], source), flush=True)
         options = ["--clear"] + (["--system-site-packages"] if ros_installed else [])
@@ -329,9 +345,7 @@ def main(stage):
             if process.poll() is None:
                 process.terminate()
     if stage != "all":
-        # 70 MB that no flight needs: the installer, and headers for C++ packages that come with rclpy's wheels.
-        called(inner, "-m", "pip", "--disable-pip-version-check", "uninstall", "--quiet", "--yes", "uv")
-        shutil.rmtree(str(VENV / "include"), ignore_errors=True)
+        remove_what_no_flight_needs(inner)
     if setup is not None:
         ROS_SETUP.write_text(str(setup), encoding="utf-8")
     elif ROS_SETUP.is_file():
@@ -345,4 +359,8 @@ if __name__ == "__main__":
     asked = sys.argv[1] if len(sys.argv) > 1 else "all"
     if asked not in STAGES:
         stop("stage: got {}; accepted: {}".format(asked, ", ".join(STAGES)))
-    main(asked)
+    try:
+        main(asked)
+    except KeyboardInterrupt:
+        print("\nmake setup: interrupted; the next make goes on from here", file=sys.stderr)
+        sys.exit(130)

@@ -4,6 +4,11 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -74,3 +79,44 @@ def test_a_ros_installation_is_found_by_its_distribution_or_where_it_is_the_only
         script.ros_setup()
     monkeypatch.setenv("ROS_DISTRO", "lyrical")
     assert script.ros_setup() == tmp_path / "lyrical" / "setup.bash"
+
+
+def test_an_environment_whose_making_was_interrupted_is_made_anew(script: ModuleType, tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
+    inner = tmp_path / "bin" / "python"
+    assert not script.is_whole(inner, sys.version_info[:2], False)
+    package = next(tmp_path.glob("lib/python3*/site-packages")) / "pip" / "_internal" / "cli"
+    package.mkdir(parents=True)
+    (package / "main.py").touch()
+    assert script.is_whole(inner, sys.version_info[:2], False)
+    assert not script.is_whole(inner, sys.version_info[:2], True) and not script.is_whole(inner, (3, 1), False)
+
+
+def test_tests_and_headers_in_packages_go_and_nothing_else_does(script, monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr(script, "called", lambda *_: (0, ""))
+    site = tmp_path / "lib" / "python3.13" / "site-packages"
+    gone = [site / name for name in ("numpy/_core/tests", "numba/tests", "pyarrow/include")]
+    kept = [site / name for name in ("numpy/testing", "pyarrow/lib", "numpy/_core/include")]
+    for folder in [*gone, *kept]:
+        folder.mkdir(parents=True)
+        (folder / "file").touch()
+    script.remove_what_no_flight_needs("python")
+    assert not [folder for folder in gone if folder.exists()]
+    assert not [folder for folder in kept if not (folder / "file").is_file()]
+
+
+def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "requirements").mkdir()
+    shutil.copy(SCRIPT, tmp_path / "requirements")
+    slow = tmp_path / "python"
+    slow.write_text(f"#!/bin/sh\ntouch {tmp_path}/started\nexec sleep 60\n", "utf-8")
+    slow.chmod(0o755)
+    command = [sys.executable, tmp_path / "requirements" / "make_venv.py", "run"]
+    environment = {**os.environ, "PYTHON": str(slow), "AMENT_PREFIX_PATH": "/nowhere"}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True) as made:
+        while not (tmp_path / "started").exists() and made.poll() is None:
+            pass
+        os.killpg(made.pid, signal.SIGINT)
+        told = made.communicate(timeout=60)[1]
+    assert made.returncode == 130
+    assert told.strip().splitlines() == ["make setup: interrupted; the next make goes on from here"]
