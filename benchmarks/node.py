@@ -92,7 +92,7 @@ def start_up(note, seconds: float) -> None:
         times = []
         for _ in range(5):
             began = time.monotonic()
-            with node(*parameters, settle_s=0.0):
+            with node(*parameters, wait_s=0.0):
                 times.append(time.monotonic() - began)
         note(label, "median", statistics.median(times), "s")
 

@@ -97,7 +97,7 @@ class Process:
         return self.system.memory_info().rss / 2**20
 
 
-def node(*parameters: str, settle_s: float = 1.0) -> Process:
+def node(*parameters: str, wait_s: float = 1.0) -> Process:
     """Our node on the T-handle with ``name:=value`` parameters, running."""
     arguments = [word for parameter in parameters for word in ("-p", parameter)]
     process = Process("-m", "rigid_proto_ros.ros.main", "--ros-args", "-p", "mesh:=t_handle", *arguments)
@@ -106,7 +106,7 @@ def node(*parameters: str, settle_s: float = 1.0) -> Process:
     except RuntimeError:
         process.end()
         raise
-    time.sleep(settle_s)
+    time.sleep(wait_s)
     return process
 
 

@@ -157,7 +157,7 @@ def start_up_s(*parameters: str, count: int = 3, **environment: str) -> float:
     try:
         for _ in range(count):
             began = time.monotonic()
-            with node(*parameters, settle_s=0.0):
+            with node(*parameters, wait_s=0.0):
                 times.append(time.monotonic() - began)
     finally:
         os.environ.clear()

@@ -134,14 +134,15 @@ def _counters() -> dict[str, str]:
 
 
 def _verdict(history: list[dict], sent: dict, counters: dict[str, str]) -> int:
-    settled, last = history[len(history) // 3], history[-1]
+    after_start, last = history[len(history) // 3], history[-1]
     rates = sorted(report["rate"] for report in history if math.isfinite(report["rate"]))
     unheard = len(history) - len(rates)
     received = int(counters["commands_received"])
     checks = {
-        f"memory {settled['rss']:.1f} to {last['rss']:.1f} MB": last["rss"] - settled["rss"] <= MEMORY_GROWTH_MB,
-        f"handles {settled['handles']} to {last['handles']}": last["handles"] <= settled["handles"] + 10,
-        f"threads {settled['threads']} to {last['threads']}": last["threads"] <= settled["threads"] + 4,
+        f"memory {after_start['rss']:.1f} to {last['rss']:.1f} MB": last["rss"] - after_start["rss"]
+        <= MEMORY_GROWTH_MB,
+        f"handles {after_start['handles']} to {last['handles']}": last["handles"] <= after_start["handles"] + 10,
+        f"threads {after_start['threads']} to {last['threads']}": last["threads"] <= after_start["threads"] + 4,
         f"rate {rates[0]:.2f} to {rates[-1]:.2f}, median {rates[len(rates) // 2]:.2f} of 500": abs(
             rates[len(rates) // 2] - 500.0
         )

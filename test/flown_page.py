@@ -28,8 +28,8 @@ from rigid_proto_ros.scene.yaml_text import load_plain_yaml
 from rigid_proto_ros.simulation.commands import Change, WrenchCommand
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
-from rigid_proto_ros.workbench.ros_link import Heard
-from rigid_proto_ros.workbench.sighting import DrawnPose
+from rigid_proto_ros.workbench.drawn_poses import DrawnPose
+from rigid_proto_ros.workbench.ros_link import Received
 
 PATIENCE_S = 60.0
 PERIOD_NS = 10_000_000
@@ -59,7 +59,7 @@ class FlownLink:
         self.refused: list[str] = []
         self.received = 0
         self._told = 0
-        self._heard = Heard()
+        self._heard = Received()
 
     # The page's side
 
@@ -72,8 +72,8 @@ class FlownLink:
     def close(self) -> None:
         pass
 
-    def take(self) -> Heard:
-        heard, self._heard = self._heard, Heard()
+    def take(self) -> Received:
+        heard, self._heard = self._heard, Received()
         return heard
 
     def wrench(self, topic, frame_id, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0)) -> None:
@@ -235,10 +235,10 @@ class FlownPage(PageInProcess):
                 self.link._publish()
 
         self.do(fly)
-        self.settle()
+        self.wait_until_still()
         return self.link.rows
 
-    def settle(self) -> None:
+    def wait_until_still(self) -> None:
         """Until the page shows what the body does, under the parameters in force."""
 
         def shown() -> bool:
@@ -288,12 +288,12 @@ class FlownPage(PageInProcess):
 
         self.do(update)
         self.until(lambda: not (self.page.announcements.activity or self.page.node.busy), "node that has taken it")
-        self.settle()
+        self.wait_until_still()
 
     def pick(self, title: str) -> None:
         """A lesson of the list."""
         self.set("Lesson", title)
-        self.settle()
+        self.wait_until_still()
 
     def click(self, mesh_point, direction=None) -> None:
         """Click on the body, as it is drawn, where it has this point; direction of the view (3,) [world]."""

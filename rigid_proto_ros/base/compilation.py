@@ -22,7 +22,7 @@ from numba.core import event
 from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 from numba.extending import intrinsic as numba_intrinsic
 
-__all__ = ["INTERPRETED", "intrinsic", "njit", "source_stamp", "told_when_compiling"]
+__all__ = ["INTERPRETED", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
 
 _CONFIG: Any = config  # its settings are made when it is imported
 INTERPRETED = bool(_CONFIG.DISABLE_JIT)
@@ -118,16 +118,16 @@ else:
 
 
 @contextmanager
-def told_when_compiling(tell: Callable[[], None]) -> Iterator[None]:
-    """Call ``tell`` once, when the first kernel is compiled within the context."""
+def notify_when_compiling(notify: Callable[[], None]) -> Iterator[None]:
+    """Call ``notify`` once, when the first kernel is compiled within the context."""
 
     class Listener(event.Listener):
-        told = False
+        notified = False
 
         def on_start(self, _: event.Event) -> None:
-            if not self.told:
-                self.told = True
-                tell()
+            if not self.notified:
+                self.notified = True
+                notify()
 
         def on_end(self, _: event.Event) -> None:
             pass

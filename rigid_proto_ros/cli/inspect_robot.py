@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto inspect`` of a whole robot: ``--compare`` judges its inertials, ``--fix`` rewrites them, ``--lump``
+"""``rigid_proto inspect`` of a whole robot: ``--compare`` checks its inertials, ``--fix`` rewrites them, ``--lump``
 takes it as one rigid body.
 """
 
@@ -112,7 +112,7 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
 
 
 def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
-    """``inspect [MESH] --compare ROBOT``: 0 when every link judged is right to the tolerance, otherwise 1."""
+    """``inspect [MESH] --compare ROBOT``: 0 when every link checked is right to the tolerance, otherwise 1."""
     from ..mass.diagnosis import OFF, OK, UNKNOWN, compare_robot  # XML and all: only who compares pays for it
 
     _check(args, mesh, scale)
@@ -129,7 +129,7 @@ def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass
         print_diagnoses(diagnoses)
     if args.tolerance is None:
         return 0 if all(d.status == OK for d in diagnoses) else 1
-    # A check that judged nothing must not look like one that found nothing.
+    # A check of nothing must not look like one that found nothing.
     off, unknown = (sum(d.status == status for d in diagnoses) for status in (OFF, UNKNOWN))
     return 1 if off or unknown == len(diagnoses) else 0
 

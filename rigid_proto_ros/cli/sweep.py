@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _whole(study: Study, args: argparse.Namespace) -> int:
-    from ..base.compilation import told_when_compiling
+    from ..base.compilation import notify_when_compiling
     from ..sweep.chunk import run_chunk
     from ..sweep.plot import check_plot, plot_table, read_plot
     from ..sweep.run import Interrupted, run_study
@@ -75,7 +75,7 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
     file = Path(args.output or Path(study.name).stem + ".parquet")
     plot = read_plot(args.plot, file) if args.plot else None
     try:
-        with told_when_compiling(lambda: _tell("kernels are being compiled, which takes a while the first time")):
+        with notify_when_compiling(lambda: _tell("kernels are being compiled, which takes a while the first time")):
             if plot:
                 check_plot(plot, run_chunk(study, 0, 0).columns)
             metadata = run_study(study, file, workers=args.threads, dask=args.dask, resume=args.resume)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
-from ..motion.loads import LOAD, Load, settle
+from ..motion.loads import LOAD, Load, resolve_load
 from ..scene.command_codec import command_of_event, frame_names
 from ..scene.scenario import Scenario
 from ..session.recorded_session import RecordedSession
@@ -135,7 +135,7 @@ def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> n
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
         raise InputError("session", f"{where}: where it hit is not in the log; end before it with --to")
     try:
-        load = settle(
+        load = resolve_load(
             command.frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), None
         )
     except CommandRefused as refusal:

@@ -323,11 +323,11 @@ class Problem:
         if self._base is not None:
             self._trial = self._linearized(numbers, self._base.starts_for(numbers))
             return self._trial
-        # What a start could still take counts as taken already: so it has to be near before steps are judged by what is
-        # left.
+        # What a start could still take counts as taken already: so it has to be near before steps are measured by
+        # what is left.
         self._trial = self._linearized(numbers, self._starts)
         for _ in range(SETTLING):
-            if self._trial.is_settled:
+            if self._trial.is_converged:
                 break
             self._trial = self._linearized(numbers, self._trial.starts_for(numbers))
         return self._trial
@@ -361,12 +361,12 @@ class _Linearized:
     jacobian: np.ndarray
 
     @property
-    def is_settled(self) -> bool:
+    def is_converged(self) -> bool:
         """Whether the starts are as good as they can be for these unknowns, or so bad that they can't be flown."""
         if self.triangles is None:
             return True
         could = sum(float(triangle[:START, -1] @ triangle[:START, -1]) for triangle in self.triangles)
-        return could <= SETTLED * float(self.residuals @ self.residuals)
+        return could <= CONVERGED * float(self.residuals @ self.residuals)
 
     def starts_for(self, numbers: np.ndarray) -> np.ndarray:
         """The best starts for other unknowns, as far as the derivatives say."""
@@ -385,7 +385,7 @@ class _Linearized:
 
 SETTLING = 6
 """Most steps of the starts alone before the first step of the unknowns."""
-SETTLED = 0.01
+CONVERGED = 0.01
 """Part of the squares that starts could still take away."""
 
 START_WIDTHS = np.repeat([1e3, 1.0, 1e3, 1e3], 3)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """How far a robot file's inertials are from those of its shapes, and which usual mistake explains the difference.
 
-The file's mass is taken as it is, so that the tensor and the COM are judged for themselves; with a density (or mass)
-given on the command line the mass is judged, too. A mistake counts as the cause when undoing it brings the difference
-below the limit. What a link shows and what it collides with are judged each, and the better of both is named.
+The file's mass is taken as it is, so that the tensor and the COM are checked for themselves; with a density (or mass)
+given on the command line the mass is checked, too. A mistake counts as the cause when undoing it brings the difference
+below the limit. What a link shows and what it collides with are diagnosed each, and the better of both is named.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ class Robot:
         volumes: dict[str, float] = {}
         rest = total
         for link in self.links:
-            diagnosis = self.judge(link)
+            diagnosis = self.diagnose(link)
             volume = diagnosis.volume if diagnosis else 0.0
             known = self.options.mass_of(link.link, volume)
             if known or not (volume or link.problem):
@@ -226,7 +226,7 @@ class Robot:
 
     def diagnoses(self, only: str | None = None) -> list[tuple[LinkInertial, LinkDiagnosis]]:
         """The links that have a shape (or that one) with their diagnoses, in the file's order."""
-        found = [(link, self.judge(link)) for link in self.links if only in (None, link.link)]
+        found = [(link, self.diagnose(link)) for link in self.links if only in (None, link.link)]
         return [(link, diagnosis) for link, diagnosis in found if diagnosis is not None]
 
     def _body(self, file: str) -> MeshBody:
@@ -246,7 +246,7 @@ class Robot:
                 found.append((shape, None))
         return LinkShapes(found)
 
-    def judge(self, link: LinkInertial) -> LinkDiagnosis | None:
+    def diagnose(self, link: LinkInertial) -> LinkDiagnosis | None:
         """The link by what it shows and by what it collides with, the better of both; None without any shape."""
         diagnoses = []
         for role in (VISUAL, COLLISION):
@@ -280,7 +280,7 @@ class Robot:
 
 
 def _quality(diagnosis: LinkDiagnosis) -> tuple[int, float]:
-    """The better of two diagnoses of a link has the smaller one: judged before not, then by error."""
+    """The better of two diagnoses of a link has the smaller one: diagnosed before not, then by error."""
     order = {OK: 0, OFF: 1, MISSING: 2, UNKNOWN: 3}[diagnosis.status]
     return order + (diagnosis.status == MISSING and diagnosis.expected is None), diagnosis.error
 
@@ -327,7 +327,7 @@ def compare_robot(
     """Diagnoses of a file's links that have a shape, those farthest off first; of ``link`` alone when it is named, and
     with ``mesh`` of the one link that the mesh belongs to, by that mesh at ``scale``.
 
-    Raises InputError when the file, or nothing in it, can be judged.
+    Raises InputError when the file, or nothing in it, can be diagnosed.
     """
     robot = Robot(path, read_robot(path, options.folders, options.xacro), options)
     if link is not None:

@@ -2,8 +2,8 @@
 """The solid's moments in rational arithmetic: no rounding at all on the vertices as the doubles they are.
 
 Coordinates become integers over a common power of two; sums over tetrahedra to the origin are integers, too. Numpy's
-object arrays carry them in chunks, some microseconds a triangle. This is the judge of the floating-point path, never
-a part of it.
+object arrays carry them in chunks, some microseconds a triangle. This is the reference for the floating-point path,
+never a part of it.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from ..mesh.union import can_unite
 from .moments import Moments, referenced_vertices
 from .properties import MeshMoments
 from .repair import CRACK, repair_surface, unite_components, weld_cracks
-from .verdict import INFO, NESTED, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, judge_surface
+from .verdict import INFO, NESTED, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, check_surface
 
 UNION = "union"
 """The repair that makes one solid of components that overlap or lie inside others."""
@@ -61,12 +61,12 @@ def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "
         raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
-    judged = _judged(mesh)
-    verdict, known = judged.verdict, judged.moments
-    vertices, triangles, polygon_starts = mesh.vertices, judged.triangles, judged.polygon_starts
+    checked = _checked(mesh)
+    verdict, known = checked.verdict, checked.moments
+    vertices, triangles, polygon_starts = mesh.vertices, checked.triangles, checked.polygon_starts
     if verdict.usable and not np.isfinite(vertices).all():  # vertices that no face uses
         vertices = np.where(np.isfinite(vertices).all(axis=1)[:, None], vertices, vertices[triangles[0, 0]])
-    remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, judged)
+    remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, checked)
     if repair and verdict.usable and _wants_repair(verdict):
         done: tuple[str, ...] = ()
         if repair != UNION or not verdict.closed:
@@ -77,7 +77,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "
             done = (*done, joined) if joined else done
         known, remember = {}, None
         if done:
-            verdict, _ = judge_surface(vertices, triangles, polygon_starts)
+            verdict, _ = check_surface(vertices, triangles, polygon_starts)
             verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
     stand_in = None
     if fallback and verdict.usable and not verdict.closed:
@@ -117,7 +117,7 @@ def _key(mesh: Mesh) -> str:
 
 
 @dataclass(frozen=True)
-class _Judged:
+class _Checked:
     """The verdict on a mesh, the triangles that it holds for (cracks of rounding's size welded), and known moments."""
 
     verdict: Verdict
@@ -127,7 +127,7 @@ class _Judged:
     moments: dict[str, Moments]
 
 
-def _judged(mesh: Mesh) -> _Judged:
+def _checked(mesh: Mesh) -> _Checked:
     """The verdict on the mesh and what is known of its moments, from the cache or anew."""
     kept = mesh_cache.load_json(_key(mesh))
     if kept is not None:
@@ -137,31 +137,31 @@ def _judged(mesh: Mesh) -> _Judged:
             triangles, starts = mesh.triangles, mesh.polygon_starts
             if kept["welded"]:
                 triangles, starts, _ = weld_cracks(mesh.vertices, triangles, starts)
-            return _Judged(Verdict(findings=findings, **kept["verdict"]), triangles, starts, kept["welded"], moments)
+            return _Checked(Verdict(findings=findings, **kept["verdict"]), triangles, starts, kept["welded"], moments)
         except (KeyError, TypeError, ValueError, AttributeError):
             pass
-    judged = _judged_anew(mesh)
-    _keep(mesh, judged, {})
-    return judged
+    checked = _checked_anew(mesh)
+    _keep(mesh, checked, {})
+    return checked
 
 
-def _judged_anew(mesh: Mesh) -> _Judged:
-    verdict, topology = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+def _checked_anew(mesh: Mesh) -> _Checked:
+    verdict, topology = check_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
     if topology is not None and verdict.usable and len(topology.boundary):
         triangles, starts, done = weld_cracks(mesh.vertices, mesh.triangles, mesh.polygon_starts)
         if done:
             # Vertices that others now stand for belong to faces all the same.
             spare = [finding for finding in verdict.findings if finding.code == UNREFERENCED]
-            verdict, _ = judge_surface(mesh.vertices, triangles, starts)
+            verdict, _ = check_surface(mesh.vertices, triangles, starts)
             verdict.findings[:] = spare + [finding for finding in verdict.findings if finding.code != UNREFERENCED]
             verdict.findings.insert(0, Finding("welded", INFO, f"{done}, less than {CRACK:g} of the diagonal"))
-            return _Judged(verdict, triangles, starts, True, {})
-    return _Judged(verdict, mesh.triangles, mesh.polygon_starts, False, {})
+            return _Checked(verdict, triangles, starts, True, {})
+    return _Checked(verdict, mesh.triangles, mesh.polygon_starts, False, {})
 
 
-def _keep(mesh: Mesh, judged: _Judged, moments: dict[str, Moments]) -> None:
+def _keep(mesh: Mesh, checked: _Checked, moments: dict[str, Moments]) -> None:
     if mesh_cache.is_passing(mesh.path):
         return
     known = {name: value.as_dict() for name, value in moments.items()}
-    entry = {"verdict": dataclasses.asdict(judged.verdict), "moments": known, "welded": judged.welded}
+    entry = {"verdict": dataclasses.asdict(checked.verdict), "moments": known, "welded": checked.welded}
     mesh_cache.store_json(_key(mesh), entry)

@@ -255,9 +255,9 @@ def fix_robot(path: Path, options: Options, *, link: str | None = None) -> tuple
     if link is not None:
         robot.require(link)
     written: dict[int, tuple[_Span, bytes]] = {}
-    judged = robot.diagnoses(link)
+    diagnosed = robot.diagnoses(link)
     reasons = []
-    for known, diagnosis in judged:
+    for known, diagnosis in diagnosed:
         if diagnosis.status not in (OFF, MISSING):
             reasons.append(diagnosis.note if diagnosis.status == UNKNOWN else "")
             continue
@@ -272,7 +272,7 @@ def fix_robot(path: Path, options: Options, *, link: str | None = None) -> tuple
     again.body = robot.body
     after = again.diagnoses(link)
     links = []
-    for (known, before), (_, now), left in zip(judged, after, reasons, strict=True):
+    for (known, before), (_, now), left in zip(diagnosed, after, reasons, strict=True):
         links.append(FixedLink(before, now if id(known.element) in written else before, left))
     return data, links
 

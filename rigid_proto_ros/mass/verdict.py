@@ -100,7 +100,7 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _judge_edges(
+def _check_edges(
     verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray, half: np.ndarray
 ) -> None:
     """Open, inconsistently wound, duplicated: each with what is known of the volume."""
@@ -168,7 +168,7 @@ def _capped_volume(topology: Topology, sums: Components, vertices: np.ndarray) -
     return float(np.sum(sums.volume) + np.sum(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6.0)
 
 
-def _judge_components(
+def _check_components(
     verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray, triangles: np.ndarray
 ) -> None:
     """Outward or inward, cavities, parts that count twice; for a surface whose edges are balanced."""
@@ -184,17 +184,17 @@ def _judge_components(
             verdict.add("component_inward", WARNING, f"{inward} of {count} components subtract from the volume")
     else:
         nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
-        _judge_nesting(verdict, nesting, volume)
+        _check_nesting(verdict, nesting, volume)
         if nesting.crossing:
             closed = verdict.closed and not verdict.inward
             lie = topology.corners, topology.component, volume, nesting.depth
             whole = united_volume(vertices, *lie) if closed else None
-            _judge_overlap(verdict, len(nesting.crossing), float(np.sum(volume)), whole)
+            _check_overlap(verdict, len(nesting.crossing), float(np.sum(volume)), whole)
     if verdict.inward:
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 
 
-def _judge_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
+def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
     """Which of the components, of signed volume (k,), count with the wrong sign, and which overlap."""
     count = len(volume)
     expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
@@ -227,7 +227,7 @@ def _judge_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
         verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
 
 
-def _judge_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | None) -> None:
+def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | None) -> None:
     """Components that cross: by how much their volumes' sum exceeds that of the union, ``whole``, where it is known."""
     overlap = f"{_count(pairs, 'pair')} of components overlap"
     if whole is None or not whole > 0.0:
@@ -242,7 +242,7 @@ def _judge_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | N
     verdict.add(OVERLAPPING, WARNING, f"{overlap}; {counts}", "--repair union makes one solid of them")
 
 
-def _judge_polygons(verdict: Verdict, planarity: tuple[float, float], diagonal: float) -> None:
+def _check_polygons(verdict: Verdict, planarity: tuple[float, float], diagonal: float) -> None:
     deviation, spread = planarity
     if deviation > NONPLANAR * diagonal:
         off = f"corners lie up to {deviation:.2g} off the plane"
@@ -251,7 +251,7 @@ def _judge_polygons(verdict: Verdict, planarity: tuple[float, float], diagonal: 
         verdict.add("nonplanar_polygons", INFO, message)
 
 
-def judge_surface(
+def check_surface(
     vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
 ) -> tuple[Verdict, Topology | None]:
     """The verdict on triangles (m, 3) over vertices (n, 3), and the topology it rests on (None when unusable).
@@ -286,12 +286,12 @@ def judge_surface(
         verdict.add("zero_volume", ERROR, "all vertices lie in one point")
         return verdict, topology
     sums = component_sums(vertices, triangles, topology, middle)
-    _judge_edges(verdict, topology, sums, vertices, half)
+    _check_edges(verdict, topology, sums, vertices, half)
     if topology.unbalanced == 0:
         volume = float(np.sum(sums.volume))
         empty = abs(volume) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
         if topology.components > 1 or not empty:
-            _judge_components(verdict, topology, sums, vertices, triangles)
+            _check_components(verdict, topology, sums, vertices, triangles)
         if empty and verdict.closed:
             verdict.add("zero_volume", ERROR, "the surface encloses no volume: it is flat, or folded onto itself")
         elif not empty and abs(volume) < THIN * diagonal**3:
@@ -301,7 +301,7 @@ def judge_surface(
             message = f"the surface passes through itself ({_count(crossings, 'pair')} of triangles)"
             verdict.add(SELF_CROSSING, WARNING, f"{message}; what it encloses twice counts twice")
     if polygon_starts is not None:
-        _judge_polygons(verdict, polygon_planarity(vertices, triangles, polygon_starts, middle), diagonal)
+        _check_polygons(verdict, polygon_planarity(vertices, triangles, polygon_starts, middle), diagonal)
     return verdict, topology
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which triangles meet at which edges: closed or open, wound alike or not, how many components, what lies twice.
 
-Vertices at bit-equal places count as one here, so that a mesh whose corners are split for textures is judged by its
+Vertices at bit-equal places count as one here, so that a mesh whose corners are split for textures is taken by its
 shape. The volume of a surface is the same from every origin exactly when each edge is used as often in one direction
 as in the other; that is what ``balanced`` counts.
 """

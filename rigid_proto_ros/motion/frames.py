@@ -2,7 +2,7 @@
 """The frame of a wrench: which axes its numbers are in, and which point of the body it attacks.
 
 A frame is written ``axes@point[;duration=<s>|;impulse][;slot=<name>]``; README and docs list the forms. This module
-only reads the text; where the point lies on the body is settled by motion/loads.py.
+only reads the text; where the point lies on the body is resolved by motion/loads.py.
 """
 
 from __future__ import annotations

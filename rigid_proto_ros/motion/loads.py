@@ -163,7 +163,7 @@ def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
 
 
 class Load(NamedTuple):
-    """One command's wrench, its point settled on the body.
+    """One command's wrench, its point resolved on the body.
 
     axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,):
     the inward normal there, for ``normal``. force [N, or N s for an impulse], torque about the point [N m, or N m s].
@@ -195,7 +195,7 @@ class Load(NamedTuple):
 
     @property
     def frame_id(self) -> str:
-        """The settled frame: world or body axes, and the point in mesh coordinates."""
+        """The resolved frame: world or body axes, and the point in mesh coordinates."""
         axes = "world" if self.axes == "world" else "body"
         point = ("com",) if self.mesh_point is None else ("point", self.mesh_point)
         return f"{axes}@{point_text(point)}"
@@ -266,8 +266,8 @@ def light_amount(body: Body) -> float:
 
 def light_row(frame: Frame, force: Numbers, torque: Numbers, most: float) -> bytes:
     """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its
-    amount no more than ``most`` (of ``light_amount``). Empty for any other: ``settle`` says what it is, or what is
-    wrong with it.
+    amount no more than ``most`` (of ``light_amount``). Empty for any other: ``resolve_load`` says what it is, or what
+    is wrong with it.
     """
     word, axes = frame.point[0], frame.axes
     fx, fy, fz = force
@@ -287,7 +287,7 @@ def light_row(frame: Frame, force: Numbers, torque: Numbers, most: float) -> byt
     return b""
 
 
-def settle(
+def resolve_load(
     frame: Frame,
     force: Numbers,
     torque: Numbers,
@@ -296,9 +296,9 @@ def settle(
     contacts: Mapping[str, Vector],
     state: State | None,
 ) -> Load:
-    """Settle a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
+    """Resolve a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
 
-    without a body and a state a ray stays unsettled: it is checked again when it takes effect.
+    without a body and a state a ray stays unresolved: it is checked again when it takes effect.
     """
     force, torque = vector(force), vector(torque)
     # Of finite numbers a sum that isn't finite overflowed; only then each is looked at.

@@ -57,7 +57,7 @@ class StringSettings:
 class Tied:
     """A tied string. attach: the knot in mesh coordinates. The free end goes evenly from ``origin`` at begin_ns to
     ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns: when it lets
-    go, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as settled.
+    go, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as computed.
     """
 
     attach: tuple[float, float, float]
@@ -125,7 +125,7 @@ class Tied:
             release_ns=time_ns + timeout_ns if timeout_ns else None,
         )
 
-    def settled(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> Tied:
+    def with_spring(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> Tied:
         """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the
         effective mass of the body as it is.
         """
@@ -154,7 +154,7 @@ def tie(
 ) -> Tied:
     """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
 
-    timeout_ns 0 never lets go. mass: as ``settled`` takes it.
+    timeout_ns 0 never lets go. mass: as ``with_spring`` takes it.
     """
     now_ns = state.time_ns
     point = np.asarray(target, dtype=float)
@@ -173,7 +173,7 @@ def tie(
         rest_length=settings.rest_length,
         bilateral=settings.bilateral,
     )
-    return tied.settled(settings, body, state, mass)
+    return tied.with_spring(settings, body, state, mass)
 
 
 def effective_mass(body: Body, arm: np.ndarray, state: State, span: np.ndarray, least: float) -> float:

@@ -26,7 +26,7 @@ from .viewers import ViewerProcess, open_headless
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0
 DRAWN_STEADY_S = 10.0
-"""How long a picture may keep changing (plots load, the camera settles) before it is taken as it is."""
+"""How long a picture may keep changing (plots load, the camera comes to rest) before it is taken as it is."""
 
 NOTICE_GONE_S = 6.0
 """After this the viewer's note that it runs without a window has left the corner of the window."""
@@ -74,11 +74,11 @@ def take_picture(
         client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
         view_id = bring_to_front(client, view) if view else None
         if view_id is not None:
-            pixels = _settled(client, view_id)
+            pixels = _stable_picture(client, view_id)
         else:
             client.run_command("ui.toggle_top_panel")
             time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
-            pixels = _without_empty_top(_settled(client, None))
+            pixels = _without_empty_top(_stable_picture(client, None))
         if is_blank(pixels):
             raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
         try:
@@ -166,7 +166,7 @@ def complaints(client: Any) -> list[str]:
     return reports + logged
 
 
-def _settled(client: Any, view_id: str | None) -> bytes:
+def _stable_picture(client: Any, view_id: str | None) -> bytes:
     """A screenshot of the view, or the window, once two in a row are alike (the first ones still load)."""
     deadline = time.monotonic() + DRAWN_STEADY_S
     before = client.take_screenshot(view_id)

@@ -12,7 +12,7 @@ import rclpy
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from ..base.compilation import told_when_compiling
+from ..base.compilation import notify_when_compiling
 from ..base.errors import InputError
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds
@@ -53,7 +53,7 @@ class Bodies:
             rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rclpy's own error types differ between versions
             raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
-        with told_when_compiling(_say_that_it_compiles):
+        with notify_when_compiling(_say_that_it_compiles):
             # What the command line gives is for all of them, and comes after the files.
             for name, values in (bodies or {NODE_NAME: {}}).items():
                 self._nodes.append(RigidBodyNode(self._physics, {**values, **given}, _make_viewer, name))

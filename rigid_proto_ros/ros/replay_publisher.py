@@ -150,7 +150,7 @@ def _streams(session: RecordedSession) -> dict[str, StampedRows]:
     return {
         name: StampedRows(
             times,
-            np.array([project(noise.told(name, t, row.tolist()) if noise else row.tolist()) for t, row in states]),
+            np.array([project(noise.measured(name, t, row.tolist()) if noise else row.tolist()) for t, row in states]),
         )
         for name, project in PROJECTIONS.items()
     }

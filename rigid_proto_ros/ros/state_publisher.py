@@ -105,9 +105,9 @@ class StatePublisher:
         for _, message in self._topics():
             message(state.time_ns, state.row.tolist())
 
-    def _told(self, topic: str, time_ns: int, row: list[float]) -> list[float]:
+    def _with_noise(self, topic: str, time_ns: int, row: list[float]) -> list[float]:
         """The state (13,) with its noise."""
-        return row if self._noise is None else self._noise.told(topic, time_ns, row)
+        return row if self._noise is None else self._noise.measured(topic, time_ns, row)
 
     def _topics(self) -> Topics:
         topics: Topics = [(self._pose, self._pose_message), (self._twist, self._twist_message)]
@@ -119,16 +119,16 @@ class StatePublisher:
         return topics
 
     def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
-        row = self._told("pose", time_ns, row)
+        row = self._with_noise("pose", time_ns, row)
         return bytes(self._pose_template.pack(time_ns, row[:7]))
 
     def _twist_message(self, time_ns: int, row: list[float]) -> bytes:
-        row = self._told("twist", time_ns, row)
+        row = self._with_noise("twist", time_ns, row)
         return bytes(self._twist_template.pack(time_ns, [*row[7:10], *rotate(*row[3:7], *row[10:13])]))
 
     def _odom_message(self, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
-        row = self._told("odom", time_ns, row)
+        row = self._with_noise("odom", time_ns, row)
         self._odom_template.pack(time_ns, row[:7])
         for at, covariance in self._odom_covariances(time_ns):
             self._odom_template.pack(time_ns, covariance, at=at)
@@ -156,7 +156,7 @@ class StatePublisher:
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
         message.header.frame_id = self._frames[1]
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
-        o.x, o.y, o.z, o.w = self._told("pose", time_ns, row)[3:7]
+        o.x, o.y, o.z, o.w = self._with_noise("pose", time_ns, row)[3:7]
         noise, turns, force = self._noise, row[10:13], self._specific_force().tolist()
         if noise is not None:
             turns, force = noise.imu(time_ns, turns, force)

@@ -357,7 +357,7 @@ def entry_of(command: ScriptCommand, frames: tuple[str, str] = _WORDS) -> dict:
 
 
 def _load_entry(command: ScriptCommand, frames: tuple[str, str]) -> dict:
-    # What can be the name of a contact is one: the node that has it judges it.
+    # What can be the name of a contact is one: the node that has it decides.
     place = command.frame_id.partition(";")[0].rpartition("@")[2]
     known = {*RESERVED_WORDS, *frames}
     contacts = [place] if CONTACT_NAME.match(place) and place not in known else []

@@ -91,10 +91,11 @@ class SensorNoise:
     resolution: tuple[float, ...]
     seed: int
 
-    def told(self, topic: str, time_ns: int, row: Sequence[float]) -> list[float]:
-        """The state row (13,) as ``pose``, ``twist`` or ``odom`` tells it.
+    def measured(self, topic: str, time_ns: int, row: Sequence[float]) -> list[float]:
+        """The state row (13,) as ``pose``, ``twist`` or ``odom`` publishes it.
 
-        What is told of the velocities errs in the axes that it is told in, and not by the error of the attitude, too.
+        What is measured of the velocities errs in the axes that it is published in, and not by the error of the
+        attitude, too.
         """
         errors = _errors(self.seed, time_ns, self.sigma, self.walk, self.bias).tolist()
         position = self._read(POSITION, row[0:3], errors)

@@ -157,7 +157,7 @@ def _string(again: Resimulation, now_ns: int, notes: list[str]) -> tuple[list[di
         "string.attached": True,
         "string.attach": list(tied.attach),
         "string.target": [float(x) for x in tied.free_end(now_ns)],
-        # Stiffness and damping were settled from it, and stay what they were.
+        # Stiffness and damping were computed from it, and stay what they were.
         "initial.string_mass": tied.effective_mass,
     }
     entries = []

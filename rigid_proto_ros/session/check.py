@@ -16,7 +16,7 @@ from ..messages.session_messages import FIELDS, PROJECTIONS
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Observer
 from .recorded_session import RecordedSession
-from .replay import Resimulation, as_told, mesh_finder, resimulation, session_scenario
+from .replay import Resimulation, as_published, mesh_finder, resimulation, session_scenario
 from .runs import decode_event
 
 
@@ -81,7 +81,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
         difference = _row_difference(
-            time_ns, count + 1, name, row, as_told(session, again.scenario.parameters, name, time_ns, computed)
+            time_ns, count + 1, name, row, as_published(session, again.scenario.parameters, name, time_ns, computed)
         )
         if difference is not None:
             if count == 0 and not recorded and time_ns > 0:
@@ -192,7 +192,7 @@ def _begins_at_its_start(session: RecordedSession, events: list) -> bool:
         return False
     time_ns, name, row = first
     again = Resimulation(session_scenario(session), [], None, mesh_finder(session), session.node_name)
-    told = as_told(session, again.scenario.parameters, name, time_ns, again.advance(time_ns))
+    told = as_published(session, again.scenario.parameters, name, time_ns, again.advance(time_ns))
     return _row_difference(time_ns, 1, name, row, told) is None
 
 

@@ -29,12 +29,14 @@ def recorded_parameters(session: RecordedSession) -> Parameters:
     return Parameters().replaced(scene)
 
 
-def as_told(session: RecordedSession, parameters: Parameters, topic: str, time_ns: int, row: np.ndarray) -> np.ndarray:
+def as_published(
+    session: RecordedSession, parameters: Parameters, topic: str, time_ns: int, row: np.ndarray
+) -> np.ndarray:
     """A state row (13,) as the session has it of a topic: our own recordings are exact, a bag that was recorded of the
     node's topics has their noise.
     """
     noise = sensor_noise(parameters) if topic and not session.made_with else None
-    return row if noise is None else np.array(noise.told(topic, time_ns, row.tolist()))
+    return row if noise is None else np.array(noise.measured(topic, time_ns, row.tolist()))
 
 
 def session_scenario(session: RecordedSession) -> Scenario:

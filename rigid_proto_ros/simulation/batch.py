@@ -251,7 +251,7 @@ def fly_variants(
     stops: np.ndarray,
     measures: np.ndarray,
 ) -> Results:
-    """Fly all variants, each beside its reference if there are any; the rows that it can't judge have status 0."""
+    """Fly all variants, each beside its reference if there are any; the rows that it can't check have status 0."""
     rows = len(variants)
     results = new_results(rows, len(measures))
     filled = (results.status, results.end_ns, results.stop, results.measured, results.states)

@@ -120,7 +120,7 @@ def _spread(
 @njit(cache=True, error_model="numpy")
 def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarray, body: np.ndarray) -> bool:
     """Fill ``body`` (BODY,) from settings (SETTINGS,), ballast (k, 4) and a mesh's constants; False when
-    the simulation has to judge it.
+    the simulation has to check it.
     """
     s = settings[SCALE : SCALE + 3].copy()
     for k in range(3):

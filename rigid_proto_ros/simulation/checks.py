@@ -12,7 +12,7 @@ from ..motion.integrators.integrator import (
     STRING,
     needs_of_load,
 )
-from ..motion.loads import Load, light_row, settle
+from ..motion.loads import Load, light_row, resolve_load
 from ..motion.state import State
 from .commands import Command, MoveString, ThrusterCommand, WrenchCommand
 from .setup import Setup
@@ -47,7 +47,7 @@ def load_row(command: WrenchCommand, setup: Setup, state: State | None) -> bytes
         row = light_row(frame, force, torque, setup.light_amount)
         if row:
             return row
-    load = settle(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
+    load = resolve_load(frame, force, torque, setup.body, setup.surface, setup.contacts, state)
     load.check_magnitude(setup.body)
     check_load_supported(command, load, setup)
     return load.packed

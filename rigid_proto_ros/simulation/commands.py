@@ -37,7 +37,7 @@ class WrenchCommand:
     """One message of the wrench topic (``held``) or the poke topic.
 
     force [N], torque [N m] as sent (N s and N m s for an impulse), frame already read; stamp_ns and frame_id as sent;
-    message: its serialized bytes, which settle the order among equal times.
+    message: its serialized bytes, which decide the order among equal times.
     """
 
     held: bool
@@ -268,13 +268,13 @@ Command = WrenchCommand | ThrusterCommand | SetState | ClearWrench | Change | Ti
 @dataclass(slots=True)
 class Pending:
     """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns, slot and row as
-    the flight's tables hold them, the row empty until its load is settled, and the setup under which that was.
+    the flight's tables hold them, the row empty until its load is resolved, and the setup under which that was.
     """
 
     time_ns: int
     command: Command
     listed: Listed | None = None
-    settled_for: Setup | None = None
+    resolved_for: Setup | None = None
     kind: int = CLEAR
     duration_ns: int = -1
     slot: int = NO_SLOT
@@ -282,10 +282,10 @@ class Pending:
 
     @property
     def load(self) -> Load | None:
-        """The load, where it is settled."""
+        """The load, where it is resolved."""
         return load_of_bytes(self.row) if self.row else None
 
-    def settle(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
-        """The load of the command, a wrench or poke, was settled under this setup."""
-        self.settled_for, self.row = setup, row
+    def set_load(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
+        """The load of the command, a wrench or poke, was resolved under this setup."""
+        self.resolved_for, self.row = setup, row
         self.kind, self.duration_ns, self.slot = command.flight_kind, command.duration_ns, command.slot

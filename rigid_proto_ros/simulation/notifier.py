@@ -7,7 +7,7 @@ import numpy as np
 
 from ..motion.loads import Load
 from ..motion.string import Tied
-from .observer import BodySnapshot, Observer, ShownLoad, ShownString, heard_by, ignores_events
+from .observer import BodySnapshot, Observer, ShownLoad, ShownString, ignores_events, methods_used_by
 from .readings import Readings
 from .setup import Setup
 
@@ -26,12 +26,12 @@ class EventNotifier:
         """Tell this observer from now on, and no other."""
         self.observer = observer
         self._told: dict[str, str] = {}
-        heard = heard_by(observer)
-        self.shows_loads = "load_began" in heard
-        self.wants_loads = not heard.isdisjoint(("applied", "load_began", "load_ended"))
+        used = methods_used_by(observer)
+        self.shows_loads = "load_began" in used
+        self.wants_loads = not used.isdisjoint(("applied", "load_began", "load_ended"))
         self.ignores_commands = not self.wants_loads and ignores_events(observer)
-        self._shows_status = "status" in heard
-        self._shows_string = "string_changed" in heard
+        self._shows_status = "status" in used
+        self._shows_string = "string_changed" in used
 
     def start_over(self) -> None:
         """Simulated time starts again at 0: nothing has been told of it."""

@@ -113,7 +113,7 @@ class Observer:
         """The load with this id acts no longer."""
 
     def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
-        """A wrench or poke took effect: the WrenchCommand, the Load that it settled to, the Body it acts on, and how
+        """A wrench or poke took effect: the WrenchCommand, the Load that it came to, the Body it acts on, and how
         that lay then (4,) xyzw.
         """
 
@@ -168,10 +168,10 @@ class Observers(Observer):
 
 def listens(observer: Observer, method: str) -> bool:
     """Whether the observer does anything with a method of the interface."""
-    return method in heard_by(observer)
+    return method in methods_used_by(observer)
 
 
-def heard_by(observer: Observer) -> frozenset[str]:
+def methods_used_by(observer: Observer) -> frozenset[str]:
     """The methods of the interface that the observer does anything with, among other names."""
     of_its_kind = _methods_of(type(observer))  # type: ignore[arg-type]  # a protocol's class has a hash as every class has
     own = vars(observer)
@@ -181,7 +181,7 @@ def heard_by(observer: Observer) -> frozenset[str]:
 def ignores_events(observer: Observer) -> bool:
     """Whether the observer never wants the line of an event."""
     asked = type(observer).wants_events is not Observer.wants_events
-    return not asked and "event" not in heard_by(observer)
+    return not asked and "event" not in methods_used_by(observer)
 
 
 @functools.cache

@@ -20,7 +20,7 @@ from .setup import Setup
 from .string_control import StringControl
 
 FEWEST_EVALUATIONS = 20_000
-"""In a segment, from which on they are judged: the first tiny steps of a transient say nothing about those after it."""
+"""In a segment, from which on they are checked: the first tiny steps of a transient say nothing about later ones."""
 MOST_EVALUATIONS_A_SECOND = {True: 2e5, False: 5e6}
 """That the clock leaves time for: for methods that choose their steps, a series or an implicit stage
 each, and for fixed steps.

@@ -41,8 +41,8 @@ class Setup:
     """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the
     mesh. contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m
     s]. wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps.
-    initial (13,): the state row at time 0. initial_string_mass [kg]: what settles a string that is tied at time 0; 0
-    for the effective mass of the body as it is then. thrusters: by name, in its order.
+    initial (13,): the state row at time 0. initial_string_mass [kg]: from what stiffness and damping follow of a
+    string that is tied at time 0; 0 for the effective mass of the body as it is then. thrusters: by name, in its order.
     """
 
     body: Body

@@ -125,7 +125,7 @@ class Simulation(Readings):
         row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
         pending = Pending(when_ns, command, listed)
         if row and isinstance(command, WrenchCommand):
-            pending.settle(command, row, setup)
+            pending.set_load(command, row, setup)
         self._push(pending)
         if self.follower is not None:
             self.follower.submit(command, when_ns, listed)
@@ -196,7 +196,7 @@ class Simulation(Readings):
         setup = self.setup
         while pending and pending[0][0] < until_ns:
             first = pending[0][-1]
-            if first.settled_for is not setup and not self._is_ready(first):
+            if first.resolved_for is not setup and not self._is_ready(first):
                 until_ns = first.time_ns
                 break
             heappop(pending)
@@ -235,8 +235,8 @@ class Simulation(Readings):
     def _notify(self, due: list[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier = self.observer, self._notifier
-        heard = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
-        if not (heard or self._arrays.integers[fl.TIMEOUTS]):
+        observed = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
+        if not (observed or self._arrays.integers[fl.TIMEOUTS]):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due
@@ -302,7 +302,7 @@ class Simulation(Readings):
         command = pending.command
         if isinstance(command, WrenchCommand | ClearWrench):
             if isinstance(command, WrenchCommand) and not self._still_holds(pending, command):
-                pending.settle(command, load_row(command, self.setup, self.state), self.setup)
+                pending.set_load(command, load_row(command, self.setup, self.state), self.setup)
             self._arrays.put([pending])
             self._arrays.apply()
             self._notify([pending])
@@ -347,11 +347,11 @@ class Simulation(Readings):
                 self._notifier.load_began(self, load_id, "thruster", loads[row_number - arrays.first_due][1])
 
     def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
-        """Whether the load settled at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
+        """Whether the load resolved at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
 
         Raises CommandRefused when the body or the integrator that there is now can't take it.
         """
-        setup, before = self.setup, pending.settled_for
+        setup, before = self.setup, pending.resolved_for
         if before is setup:
             return True
         if before is None or before.surface is not setup.surface:
@@ -360,7 +360,7 @@ class Simulation(Readings):
         if before.body is not setup.body:
             load.check_magnitude(setup.body)
         check_load_supported(command, load, setup)
-        pending.settled_for = setup
+        pending.resolved_for = setup
         return True
 
     def _change(self, new: Setup) -> None:

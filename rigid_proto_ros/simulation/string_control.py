@@ -38,11 +38,11 @@ class StringControl:
         return self.tied.end_ns == now_ns
 
     def tie_at(self, command: TieString, setup: Setup, state: State) -> None:
-        """Take the knot to a point of the body; a string that is tied stays so, its k and c settled anew."""
+        """Take the knot to a point of the body; a string that is tied stays so, its k and c computed anew."""
         attach = _attach(command, setup, state)
         if self.tied is not None:
             self.tied = _checked(
-                replace(self.tied, attach=attach).settled(setup.string, setup.body, state), setup.body, state
+                replace(self.tied, attach=attach).with_spring(setup.string, setup.body, state), setup.body, state
             )
         self.attach = attach
 
@@ -76,7 +76,7 @@ class StringControl:
             release_ns = max(tied.last_target_ns + after.timeout_ns, state.time_ns)
             tied = replace(tied, release_ns=release_ns if after.timeout_ns else None)
         if after != before or new.body is not old.body:
-            tied = tied.settled(after, new.body, state)
+            tied = tied.with_spring(after, new.body, state)
         self.tied = tied
 
 

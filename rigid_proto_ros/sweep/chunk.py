@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Some rows of a study, flown and measured: what a thread here and a worker of a cluster both do.
 
-Rows that differ in numbers alone go through the compiled batch together. Those that it can't fly or judge are flown
+Rows that differ in numbers alone go through the compiled batch together. Those that it can't fly or check are flown
 one by one by the simulation, with the same bits.
 """
 

@@ -79,7 +79,7 @@ class Group:
         self.integrator = checked_integrator(parameters, loads)
 
     def variants(self, columns: list[np.ndarray], count: int) -> tuple[Variants, np.ndarray]:
-        """Arrays of ``count`` rows with these values of what varies, and which of them the batch may judge (n,)."""
+        """Arrays of ``count`` rows with these values of what varies, and which of them the batch may check (n,)."""
         good = np.ones(count, bool)
         settings, times, ballast = self._numbers(columns, count, good)
         if self.overlay is not None:

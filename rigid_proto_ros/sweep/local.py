@@ -35,7 +35,7 @@ def chunk_rows(study: Study, workers: int) -> int:
 
 
 def goes_in_batches(study: Study) -> bool:
-    """Whether the compiled batch can fly the study's rows, judged by some of them."""
+    """Whether the compiled batch can fly the study's rows, tried with some of them."""
     rows = np.unique(np.linspace(0, study.rows - 1, min(study.rows, 9)).astype(np.int64))
     return is_batchable(study, rows)
 

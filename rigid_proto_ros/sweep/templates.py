@@ -19,7 +19,7 @@ from ..motion.integrators.integrator import (
     needs_of_load,
 )
 from ..motion.integrators.taylor_adaptive import degree_for
-from ..motion.loads import LOAD, Load, settle
+from ..motion.loads import LOAD, Load, resolve_load
 from ..scene.command_codec import ScriptCommand
 from ..scene.parameters import Parameters
 from ..scene.scenario import BodyMesh, nanoseconds
@@ -147,7 +147,7 @@ class LoadResolver:
             if frame.point[0] == "ray":
                 raise NotBatchable
             nothing = (0.0, 0.0, 0.0)
-            load = settle(frame, nothing, nothing, None, self._surface, self._contacts, None)
+            load = resolve_load(frame, nothing, nothing, None, self._surface, self._contacts, None)
             if len(self._known) > 100_000:
                 self._known.clear()
             self._known[text] = (frame, load)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.loads import Load, settle
+from ..motion.loads import Load, resolve_load
 from ..motion.state import State
 from ..motion.string import Tied
 from ..scene.scenario import Scenario, nanoseconds
@@ -108,7 +108,9 @@ class Acting:
 
     def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:
         setup, frame, held = scenario.setup, command.frame, command.held
-        load = settle(frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), state)
+        load = resolve_load(
+            frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), state
+        )
         if command.slot != NO_SLOT:
             self._acting = [acting for acting in self._acting if acting.slot != command.slot]
         if held:

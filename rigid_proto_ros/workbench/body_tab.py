@@ -22,7 +22,7 @@ from .controls import Controls, read_numbers
 from .node_control import NodeControl
 from .scene_loader import SceneLoader
 from .status import Announcements
-from .tensors import comparison, judged
+from .tensors import comparison, tensor_verdict
 
 OWN_FILE = "(a file)"
 ANOTHER = "(another one)"
@@ -74,10 +74,10 @@ class BodyTab:
         if key != self._judged_mesh and scenario.body_mesh is not None:
             self._judged_mesh = key
             asyncio.get_running_loop().create_task(
-                self._judge(scenario.body_mesh.mesh, parameters.mesh_repair, parameters.mesh_fallback)
+                self._check_mesh(scenario.body_mesh.mesh, parameters.mesh_repair, parameters.mesh_fallback)
             )
 
-    async def _judge(self, mesh: Mesh, repair: bool | str, fallback: str) -> None:
+    async def _check_mesh(self, mesh: Mesh, repair: bool | str, fallback: str) -> None:
         body = await asyncio.to_thread(mesh_body, mesh, repair=repair, fallback=fallback)
         self.show_verdict(
             [f"{finding.severity}: {finding.message}" for finding in body.verdict.findings]
@@ -162,15 +162,15 @@ class BodyTab:
                     "Use this tensor", disabled=True, hint="inertia_model explicit, with present mass and COM"
                 )
 
-        def judge() -> list[float] | None:
+        def check() -> list[float] | None:
             numbers = read_numbers(tensor.value, 6)
-            valid, verdict.content = judged(numbers)
+            valid, verdict.content = tensor_verdict(numbers)
             apply.disabled = not valid
             return numbers if valid else None
 
         @tensor.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:
-            judge()
+            check()
 
         @present.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -180,7 +180,7 @@ class BodyTab:
 
         @apply.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            numbers = judge()
+            numbers = check()
             if numbers is not None and self._scenes.scenario is not None:
                 self._node.set(_explicit(self._scenes.scenario, numbers))
 

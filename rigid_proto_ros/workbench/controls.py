@@ -172,13 +172,13 @@ class Controls:
                 return  # we wrote it ourselves
             touched_s = control.touched_s = time.monotonic()
             if wait_s:
-                asyncio.get_running_loop().call_later(wait_s, self._settle, control, touched_s)
+                asyncio.get_running_loop().call_later(wait_s, self._take, control, touched_s)
             else:
-                self._settle(control, touched_s)
+                self._take(control, touched_s)
 
         return handle
 
-    def _settle(self, control: _Control, touched_s: float) -> None:
+    def _take(self, control: _Control, touched_s: float) -> None:
         if control.touched_s != touched_s:
             return  # touched again since
         changes = control.changes(control.handle.value)

@@ -63,7 +63,7 @@ class Follower:
         self._events.clear()
         self._newest = self._reset_due_s = None
 
-    def hear(self, states: Sequence[tuple[int, np.ndarray]], lines: Sequence[str]) -> None:
+    def receive(self, states: Sequence[tuple[int, np.ndarray]], lines: Sequence[str]) -> None:
         """States (time_ns, row (13,) in world axes) and event lines, as they came."""
         self._events.extend(event for line in lines if (event := self._event(line)) is not None)
         for time_ns, row in states:

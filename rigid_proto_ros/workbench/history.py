@@ -132,7 +132,7 @@ class History:
         time_ns, kind, _ = decode_event(line, 1)
         with self._lock:
             if kind == "reset":
-                self._hear_reset()
+                self._on_reset()
             run = self._runs[-1]
             run.is_new &= kind == "reset"
             if run.whole and len(run.events) < MAX_EVENTS:
@@ -195,12 +195,12 @@ class History:
         """What the node must be told to go on from the last state at or before a moment, with another future.
 
         Takes as long as computing the run anew up to there: call it where that may take a second. Raises InputError
-        when nothing was heard yet, or a mesh that flew then is gone.
+        when nothing was received yet, or a mesh that flew then is gone.
         """
         with self._lock:
             row = self._states.at(moment_ns)
             if row is None or not self._scene:
-                raise InputError("rewind", moment_ns / 1e9, "a moment since the first state was heard")
+                raise InputError("rewind", moment_ns / 1e9, "a moment since the first state was received")
             k = max(int(np.searchsorted(self._states.times, moment_ns, side="right")) - 1, 0)
             moment_ns = int(self._states.times[k])
             run = self._run_at(moment_ns)
@@ -219,7 +219,7 @@ class History:
             run = self._runs[-1]
             if not run.whole or not run.scene:
                 accepted = f"at most {MAX_EVENTS} events since the last reset or rewind: reset, or rewind, and go on"
-                raise InputError("history", "more than is kept" if run.scene else "no scene heard", accepted)
+                raise InputError("history", "more than is kept" if run.scene else "no scene received", accepted)
             row = self._states.at(self._live_ns)
             return self._session(run, self._live_ns - run.offset_ns, row)
 
@@ -237,7 +237,7 @@ class History:
     def _run_at(self, moment_ns: int) -> _Run:
         return next((run for run in reversed(self._runs) if run.offset_ns <= moment_ns), self._runs[0])
 
-    def _hear_reset(self) -> None:
+    def _on_reset(self) -> None:
         if self._restarted_by_state:
             self._restarted_by_state = False
             # What came in between still belongs to the run before.

@@ -14,8 +14,8 @@ from typing import Any
 
 import viser
 
-from .look_back import LookBack
 from .node_control import NodeControl
+from .past_view import PastView
 from .scene_view import SceneView
 from .situation import SituationControl
 from .status import Announcements
@@ -29,7 +29,7 @@ class Keyboard:
     """What the keys act on."""
 
     node: NodeControl
-    look_back: LookBack
+    past_view: PastView
     situations: SituationControl
     view: SceneView
     announcements: Announcements
@@ -47,15 +47,15 @@ class Key:
 
 
 async def _pause(page: Keyboard) -> None:
-    if page.look_back.moment_ns is not None:
+    if page.past_view.moment_ns is not None:
         await page.situations.go_on_from_here()
     else:
         page.node.pause(not page.node.paused)
 
 
 async def _step(page: Keyboard) -> None:
-    if page.look_back.moment_ns is not None:
-        page.look_back.step(-1)
+    if page.past_view.moment_ns is not None:
+        page.past_view.step(-1)
     elif page.node.paused:
         page.node.call("step")
     else:
@@ -63,19 +63,19 @@ async def _step(page: Keyboard) -> None:
 
 
 async def _back_a_step(page: Keyboard) -> None:
-    page.look_back.step(1)
+    page.past_view.step(1)
 
 
 async def _back(page: Keyboard) -> None:
-    page.look_back.look_by(BACK_S)
+    page.past_view.move_by(BACK_S)
 
 
 async def _now(page: Keyboard) -> None:
-    page.look_back.resume()
+    page.past_view.resume()
 
 
 async def _reset(page: Keyboard) -> None:
-    page.look_back.reset()
+    page.past_view.reset()
 
 
 async def _centre(page: Keyboard) -> None:

@@ -96,7 +96,7 @@ class NodeControl:
         """Stop or resume simulated time."""
         self.call("pause", paused)
 
-    def heard_paused(self, paused: bool) -> None:
+    def on_paused(self, paused: bool) -> None:
         """The node says whether simulated time stands still."""
         self.paused = paused
         if not paused:

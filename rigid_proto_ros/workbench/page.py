@@ -20,13 +20,14 @@ from ..motion.state import State
 from ..scene.scenario import Scenario
 from .body_tab import BodyTab
 from .controls import Controls
+from .drawn_poses import DrawnPose, DrawnPoses
 from .follower import Follower
 from .history import History
 from .keys import Keyboard, add_keys
 from .lesson_folder import LessonFolder
-from .look_back import LookBack
 from .node_control import NodeControl
 from .panel import Panel
+from .past_view import PastView
 from .pointer import Pointer, Tools, suggested_force
 from .readout_panel import ReadoutPanel
 from .rewind import core_row
@@ -36,7 +37,6 @@ from .scene_view import SceneView
 from .session_tab import SessionTab
 from .show_tab import ShowTab
 from .side_by_side import SideBySide, names
-from .sighting import DrawnPose, Sightings
 from .situation import SituationControl
 from .status import ENDED, Announcements, Status
 from .upload_button import UploadButton
@@ -69,7 +69,7 @@ class Page:
         self.link = RosLink(target, self.deliver, self._on_scene, self._on_diagnostics)
         self._status_of = Status(self.link.target)
         self.node = NodeControl(self.link, lambda text: self.announcements.say(text), self._refused)
-        self.scenes = SceneLoader(self.loop, self._take_on, self._unshown)
+        self.scenes = SceneLoader(self.loop, self._on_loaded, self._unshown)
         self.history = History(target.strip("/"), lambda: self._upload.attachments())
         self.follower = Follower(
             self.link.target, self.scenes, self.history, self.announcements, self._on_event, self._on_begin
@@ -77,17 +77,17 @@ class Page:
         # The picture, and the hand in it.
         self.view = SceneView(server)
         self._com: Any = None
-        self.sightings = Sightings()
+        self.drawn_poses = DrawnPoses()
         self.tools = Tools()
-        self.pointer = Pointer(self.node.hand, self.scenes, self.sightings, self.tools)
+        self.pointer = Pointer(self.node.hand, self.scenes, self.drawn_poses, self.tools)
         # The past, and other beginnings.
-        self.look_back = LookBack(self.node, self.history, self.scenes)
+        self.past_view = PastView(self.node, self.history, self.scenes)
         self.situations = SituationControl(
-            self.node, self.history, self.look_back, self.announcements, self.pointer.let_go
+            self.node, self.history, self.past_view, self.announcements, self.pointer.let_go
         )
         self._make_panel(address)
         self.lessons.show_lesson_named(lesson)
-        keyboard = Keyboard(self.node, self.look_back, self.situations, self.view, self.announcements)
+        keyboard = Keyboard(self.node, self.past_view, self.situations, self.view, self.announcements)
         add_keys(server.gui, keyboard)
         self._open = asyncio.Event()
         self._slow_due_s = 0.0
@@ -102,7 +102,7 @@ class Page:
         self.side_by_side = SideBySide(gui, lambda: self.lessons.fly_lesson(COMPARED))
         tabs = gui.add_tab_group()
         self._panel = Panel(
-            gui, tabs, self._controls, self.tools, self.node, self.look_back, self.situations, announcements
+            gui, tabs, self._controls, self.tools, self.node, self.past_view, self.situations, announcements
         )
         self.body_tab = BodyTab(gui, tabs, self._controls, self.scenes, self.node, announcements)
         self.session_tab = SessionTab(
@@ -110,7 +110,7 @@ class Page:
             tabs,
             address,
             self.history,
-            self.look_back,
+            self.past_view,
             self.situations,
             announcements,
             lambda scene, script: self.lessons.fly(scene, script),
@@ -155,7 +155,7 @@ class Page:
 
     def close(self) -> None:
         """Leave ROS, the node as it was before somebody looked back, and nothing on the disk."""
-        self.look_back.close()
+        self.past_view.close()
         self.link.close()
         self._upload.close()
 
@@ -180,7 +180,7 @@ class Page:
 
     async def _on_connect(self, _: viser.ClientHandle) -> None:
         if not self._open.is_set():
-            self._status_of.heard(time.monotonic())  # it has time to be heard
+            self._status_of.received(time.monotonic())  # it has time to be heard
             self.link.listen()
             self._open.set()
 
@@ -189,12 +189,12 @@ class Page:
         if not self.server.get_clients() and self._open.is_set():
             self._open.clear()
             self.pointer.let_go()
-            self.look_back.resume()
+            self.past_view.resume()
             self.link.stop_listening()
             # What happens from now on isn't heard: the memory of the flight ends here.
             self.follower.forget()
             self.history.forget()
-            self.sightings.forget()
+            self.drawn_poses.forget()
             self.view.trails.forget()
             self._readouts.restart()
             self.scenes.forget()
@@ -208,10 +208,10 @@ class Page:
     def _unshown(self, error: InputError) -> None:
         self.announcements.say(f"The node's scene can't be shown: {error}")
 
-    def _take_on(self, old: Scenario | None, scenario: Scenario) -> None:
+    def _on_loaded(self, old: Scenario | None, scenario: Scenario) -> None:
         another = self.situations.another_body
         if self.view.set_body(scenario, zoom=another):
-            self.sightings.forget()
+            self.drawn_poses.forget()
             self.pointer.attach(self.view.body.mesh)
             another = True
         if self.view.body.com is not self._com:
@@ -229,7 +229,7 @@ class Page:
             self._panel.show_force()
         if self._begin_anew:
             self._begin_anew = False
-            self.look_back.reset()
+            self.past_view.reset()
 
     def _on_diagnostics(self, values: dict[str, str]) -> None:
         self.node.diagnostics = values
@@ -238,7 +238,7 @@ class Page:
 
     def _set_paused(self, paused: bool) -> None:
         self._panel.show_state(paused)
-        self.node.heard_paused(paused)
+        self.node.on_paused(paused)
 
     def _refused(self, reason: str) -> None:
         self.announcements.say(f"Refused: {reason}")
@@ -248,7 +248,7 @@ class Page:
         if kind == "reset":
             self.node.hand.forget()
             self.view.trails.forget()
-            if self.look_back.moment_ns is None:
+            if self.past_view.moment_ns is None:
                 self.view.origin = np.zeros(3)
         elif kind == "pause":
             self._set_paused(bool(content.get("data")))
@@ -264,16 +264,16 @@ class Page:
 
     def tick(self, now_s: float) -> None:
         """Take what the node has said and draw it."""
-        heard = self.link.take()
-        self.follower.hear(heard.states, heard.events)
-        for time_ns, row in heard.states:
+        received = self.link.take()
+        self.follower.receive(received.states, received.events)
+        for time_ns, row in received.states:
             self.view.trails.add(time_ns, row)
-        if heard.states:
-            self._status_of.heard(now_s)
+        if received.states:
+            self._status_of.received(now_s)
         if self.scenes.scenario is not None:
             self.follower.follow(self.scenes.scenario, now_s)
             if self.follower.state is not None:
-                self.lessons.watched([time_ns for time_ns, _ in heard.states])
+                self.lessons.watched([time_ns for time_ns, _ in received.states])
                 self._draw(now_s, self.scenes.scenario, self.follower.state)
         self.pointer.hold()
         if now_s >= self._slow_due_s:
@@ -282,7 +282,7 @@ class Page:
 
     def _draw(self, now_s: float, scenario: Scenario, present: State) -> None:
         state, setup, view, acting = self._shown_state(present), scenario.setup, self.view, self.follower.acting
-        looking_at = self.look_back.moment_ns
+        looking_at = self.past_view.moment_ns
         looking = looking_at is not None
         left = self.history.ghost is not None
         ghost, com = self.follower.ghost_row(scenario, looking_at)
@@ -300,12 +300,12 @@ class Page:
             view.show_ghost(ghost, com, names(scenario, left))
             began_ns = None if left else self.follower.ghost.began_ns
             self.side_by_side.show(now_s, scenario, state, ghost, began_ns)
-        self.sightings.drew(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
+        self.drawn_poses.add(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
         stretched = 0.0 if looking else acting.string_energy(setup, state)
         self._readouts.show(now_s, scenario, state, stretched, scales, self.side_by_side.angle)
 
     def _shown_state(self, present: State) -> State:
-        moment_ns = self.look_back.moment_ns
+        moment_ns = self.past_view.moment_ns
         if moment_ns is not None:
             row = self.history.row(moment_ns)
             if row is not None:

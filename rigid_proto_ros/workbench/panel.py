@@ -11,8 +11,8 @@ import viser
 
 from ..motion.integrators import INTEGRATORS
 from .controls import TYPING_S, Controls, log_slider, on_slider, read_numbers
-from .look_back import LookBack
 from .node_control import NodeControl
+from .past_view import PastView
 from .pointer import POKE, PUSH, Tools
 from .situation import SituationControl
 from .status import Announcements
@@ -47,7 +47,7 @@ class Panel:
         controls: Controls,
         tools: Tools,
         node: NodeControl,
-        look_back: LookBack,
+        past_view: PastView,
         situations: SituationControl,
         announcements: Announcements,
     ) -> None:
@@ -55,7 +55,7 @@ class Panel:
         self._controls = controls
         self._tools = tools
         self._node = node
-        self._look_back = look_back
+        self._past_view = past_view
         self._situations = situations
         self._announcements = announcements
         self.play_tab = tabs.add_tab("Play")
@@ -89,7 +89,7 @@ class Panel:
     # Play
 
     def _time_folder(self) -> None:
-        gui, node, look_back = self._gui, self._node, self._look_back
+        gui, node, past_view = self._gui, self._node, self._past_view
         with gui.add_folder("Time"):
             buttons = gui.add_button_group("Simulation", (PAUSE, GO_ON, STEP, RESET), hint="~/pause, ~/step, ~/reset")
             self._running = gui.add_markdown("")
@@ -100,14 +100,14 @@ class Panel:
         @buttons.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
             pressed = buttons.value
-            if look_back.moment_ns is not None and pressed == GO_ON:
+            if past_view.moment_ns is not None and pressed == GO_ON:
                 await self._situations.go_on_from_here()
-            elif look_back.moment_ns is not None and pressed == STEP:
-                look_back.step(-1)
+            elif past_view.moment_ns is not None and pressed == STEP:
+                past_view.step(-1)
             elif pressed in (PAUSE, GO_ON):
                 node.pause(pressed == PAUSE)
             elif pressed == RESET:
-                look_back.reset()
+                past_view.reset()
             else:
                 node.call("step")
 

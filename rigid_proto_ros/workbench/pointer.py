@@ -14,9 +14,9 @@ import viser
 
 from ..scene.command_codec import MESH_FRAME, ScriptCommand
 from ..scene.scenario import Scenario
+from .drawn_poses import DrawnPose, DrawnPoses
 from .hand_commands import HandCommands
 from .scene_loader import SceneLoader
-from .sighting import DrawnPose, Sightings
 
 HOLD_S = 0.2
 """A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that
@@ -66,10 +66,10 @@ class _Drag:
 class Pointer:
     """Turns pointer events of any page into commands. One string, so one drag at a time: the first page has it."""
 
-    def __init__(self, hand: HandCommands, scenes: SceneLoader, sightings: Sightings, tools: Tools) -> None:
+    def __init__(self, hand: HandCommands, scenes: SceneLoader, drawn_poses: DrawnPoses, tools: Tools) -> None:
         self._hand = hand
         self._scenes = scenes
-        self._sightings = sightings
+        self._drawn_poses = drawn_poses
         self._tools = tools
         self._drag: _Drag | None = None
         self._knot_by_message = False
@@ -110,7 +110,7 @@ class Pointer:
     # Click
 
     async def _on_click(self, event: viser.SceneNodePointerEvent[Any]) -> None:
-        seen = self._sightings.usual(time.monotonic())
+        seen = self._drawn_poses.usual(time.monotonic())
         if seen is not None and event.ray_origin is not None and event.ray_direction is not None:
             push = (event.modifier == "shift") != (self._tools.click == PUSH)
             self.click(event.ray_origin, event.ray_direction, seen, push)
@@ -161,7 +161,7 @@ class Pointer:
             return
         body, surface = scenario.setup.body, scenario.setup.surface
         now = time.monotonic()
-        seen = self._sightings.of_point(start, now, surface, body)
+        seen = self._drawn_poses.of_point(start, now, surface, body)
         if seen is None:
             return
         commands: list[ScriptCommand] = []

@@ -49,7 +49,7 @@ LAST_ANSWER_S = 1.0
 
 
 @dataclass(frozen=True)
-class Heard:
+class Received:
     """states: (time_ns, pose and twist) pairs in order, each (13,): position, attitude xyzw, velocity of the COM,
     angular velocity, all in world axes. events: lines of the event log in order.
     """
@@ -178,11 +178,11 @@ class RosLink:
                 values = {v.key: v.value for v in status.values}
                 self._deliver(self._on_diagnostics, values)
 
-    def take(self) -> Heard:
+    def take(self) -> Received:
         """All states and event lines since the last call."""
         taken = self._taken
         if not taken:
-            return Heard()
+            return Received()
         events = [message.data for message in _drain(taken["events"], String)]
         for pose in _drain(taken["pose"], PoseStamped):
             self._poses[_stamp_ns(pose)] = pose
@@ -194,7 +194,7 @@ class RosLink:
                 states.append((time_ns, _row(pose, twist)))
         while len(self._poses) > 2 * qos.STATE.depth:
             del self._poses[next(iter(self._poses))]
-        return Heard(states, events)
+        return Received(states, events)
 
     # Saying
 

@@ -152,7 +152,7 @@ class _Writer(Observer):
 def _load_entry(command: ScriptCommand, applied: tuple[WrenchCommand, Load, Body], frames: tuple[str, str]) -> dict:
     its_own, load, body = applied
     if its_own.frame.axes == "normal" and its_own.frame.impulse:
-        # A script's push is a force: the settled normal impulse, in body axes, is the same numbers.
+        # A script's push is a force: the resolved normal impulse, in body axes, is the same numbers.
         frame = Frame("body", ("point", load.mesh_point), impulse=True)
         command = replace(command, frame_id=frame.text, force=tuple(load.own_force(body).tolist()))
     return entry_of(command, frames)

@@ -14,20 +14,20 @@ from ..scene.scene_file import read_scene_text
 
 
 class SceneLoader:
-    """Takes on the newest text, one after the other: a big mesh is read beside the loop that this runs on.
+    """Loads the newest text, one after the other: a big mesh is read beside the loop that this runs on.
 
-    scenario: the last one that was taken on; take_on is told of each, and refused of what can't be taken on.
+    scenario: the last one that was loaded; on_loaded is called with each, and refused with the error of others.
     """
 
     def __init__(
         self,
         loop: asyncio.AbstractEventLoop,
-        take_on: Callable[[Scenario | None, Scenario], None],
+        on_loaded: Callable[[Scenario | None, Scenario], None],
         refused: Callable[[InputError], None],
     ) -> None:
         self.scenario: Scenario | None = None
         self._loop = loop
-        self._take_on = take_on
+        self._on_loaded = on_loaded
         self._refused = refused
         self._newest = self._loaded = ""
         self._ahead: Scenario | None = None
@@ -47,7 +47,7 @@ class SceneLoader:
 
     def string_changed(self, changes: Mapping[str, object]) -> None:
         """Take on parameters of the string as their event says them, before their text comes: what is tied next, in the
-        same instant, is settled by them.
+        same instant, is decided by them.
         """
         present = self.scenario
         if present is None or not all(name.startswith("string.") for name in changes):
@@ -62,7 +62,7 @@ class SceneLoader:
         self._ahead = self.scenario
         if not self.busy:
             self._newest = self._loaded = self.scenario.text
-        self._take_on(present, self.scenario)
+        self._on_loaded(present, self.scenario)
 
     async def known(self) -> Scenario:
         """Wait until the node's scenario is known."""
@@ -94,7 +94,7 @@ class SceneLoader:
                 ):
                     continue  # its event came first
                 before, self.scenario = self.scenario, scenario
-                self._take_on(before, scenario)
+                self._on_loaded(before, scenario)
                 self._known.set()
         finally:
             self._loading = None

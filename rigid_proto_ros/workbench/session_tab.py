@@ -13,7 +13,7 @@ import viser
 from ..base.errors import InputError
 from .history import History
 from .link import decode, encode
-from .look_back import LookBack
+from .past_view import PastView
 from .situation import SituationControl
 from .status import Announcements
 
@@ -35,7 +35,7 @@ class SessionTab:
         tabs: viser.GuiTabGroupHandle,
         address: str,
         history: History,
-        look_back: LookBack,
+        past_view: PastView,
         situations: SituationControl,
         announcements: Announcements,
         open_scene: Callable[[str, str], Awaitable[None]],
@@ -43,7 +43,7 @@ class SessionTab:
         self._gui = gui
         self._address = address
         self._history = history
-        self._look_back = look_back
+        self._past_view = past_view
         self._situations = situations
         self._announcements = announcements
         self._open_scene = open_scene
@@ -51,7 +51,7 @@ class SessionTab:
             self._rewind_folder()
             self._save_folder()
             self._link_folder()
-        look_back.on_change = self._show_moment
+        past_view.on_change = self._show_moment
 
     # Rewind
 
@@ -67,7 +67,7 @@ class SessionTab:
         @self._back.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                self._look_back.look(float(self._back.value))
+                self._past_view.show(float(self._back.value))
 
         @self._go_on.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -80,20 +80,20 @@ class SessionTab:
     def every_second(self) -> None:
         """How far back one can go grows while the body flies."""
         first_ns, last_ns = self._history.span
-        if self._look_back.moment_ns is None:
+        if self._past_view.moment_ns is None:
             available = max(10.0, 10.0 * math.ceil((last_ns - first_ns) * 1e-10))
             if self._back.max != available:
                 self._back.max = available
         self._forget.visible = self._history.ghost is not None
 
     def _show_moment(self) -> None:
-        moment_ns = self._look_back.moment_ns
+        moment_ns = self._past_view.moment_ns
         self._go_on.disabled = moment_ns is None
         if moment_ns is None:
             self._looking.content = ""
         else:
             self._looking.content = f"Looking at {self._history.simulated_ns(moment_ns) * 1e-9:.2f} s"
-        back_s = min(self._look_back.back_s, self._back.max)
+        back_s = min(self._past_view.back_s, self._back.max)
         # What a hand has just set may be more than there is; only what differs by a step is written over it.
         if moment_ns is None or abs(self._back.value - back_s) > 0.5 * STEP_S:
             self._back.value = back_s

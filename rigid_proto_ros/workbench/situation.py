@@ -19,8 +19,8 @@ from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
 from ..scene.script import parse_script, with_contacts
 from .history import History
-from .look_back import LookBack
 from .node_control import NodeControl
+from .past_view import PastView
 from .rewind import Rewind, changes_to
 from .ros_link import Answered, RosLink
 from .status import Announcements
@@ -79,13 +79,13 @@ class SituationControl:
         self,
         node: NodeControl,
         history: History,
-        look_back: LookBack,
+        past_view: PastView,
         announcements: Announcements,
         let_go: Callable[[], None],
     ) -> None:
         self._node = node
         self._history = history
-        self._look_back = look_back
+        self._past_view = past_view
         self._announcements = announcements
         self._let_go = let_go
         self._going_back = False
@@ -94,22 +94,22 @@ class SituationControl:
     async def take_to(self, situation: Situation, rewind: Rewind | None = None) -> None:
         """Take the node there; ``rewind`` is what it goes back by. Raises InputError."""
         self._let_go()
-        paused = self._look_back.paused_before
+        paused = self._past_view.paused_before
 
         def before_reset() -> None:
             self._history.rewinding(rewind)
             if rewind is None:
                 self._history.forget_ghost()
-                self._look_back.end()  # the past was another body's
+                self._past_view.end()  # the past was another body's
 
         try:
             await take_to(self._node.link, situation, paused, lambda: self._node.received, before_reset)
         except InputError:
             self._history.rewinding(None)
-            self._look_back.resume()
+            self._past_view.resume()
             raise
         self._node.paused = paused
-        self._look_back.end()
+        self._past_view.end()
 
     async def go_on_from_here(self) -> None:
         """Take the node to the moment that is looked at, and let time go on from there; once, however
@@ -119,13 +119,13 @@ class SituationControl:
             return
         self._going_back = True
         try:
-            self._look_back.run_afterwards()
+            self._past_view.run_afterwards()
             await self._announcements.while_doing("going back", self._rewind())
         finally:
             self._going_back = False
 
     async def _rewind(self) -> None:
-        moment_ns = self._look_back.moment_ns
+        moment_ns = self._past_view.moment_ns
         if moment_ns is None:
             return
         try:
@@ -134,7 +134,7 @@ class SituationControl:
             for note in rewind.notes:
                 self._announcements.say(note)
         finally:
-            self._look_back.resume()
+            self._past_view.resume()
 
 
 async def take_to(

@@ -34,7 +34,7 @@ class Status:
     def report(self, values: Mapping[str, str], now_s: float) -> None:
         """A report of /diagnostics."""
         last, self._last = self._last, values
-        self.heard(now_s)
+        self.received(now_s)
         if last:
             said = command_warnings(last, values)
             lost_s = increase("real_time_lost_s", last, values)
@@ -42,7 +42,7 @@ class Status:
                 said.append(f"too much to compute here: {lost_s:.2g} s behind real time")
             self._troubles |= dict.fromkeys(said, now_s + SHOWN_S)
 
-    def heard(self, now_s: float) -> None:
+    def received(self, now_s: float) -> None:
         """The node has said something."""
         self._heard_s = now_s
 

@@ -127,7 +127,7 @@ def _alone(scenario: Scenario, reason: str) -> str:
     return "\n".join(lines)
 
 
-def judged(numbers: list[float] | None) -> tuple[bool, str]:
+def tensor_verdict(numbers: list[float] | None) -> tuple[bool, str]:
     """Whether six numbers ixx ixy ixz iyy iyz izz are a tensor that a body can have, and why not or what it means."""
     if numbers is None:
         return False, "✗ six numbers: ixx ixy ixz iyy iyz izz [kg m²]"

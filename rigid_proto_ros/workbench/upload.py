@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes that come as bytes through a page: judged as ``inspect`` judges files, kept as one file while they are flown.
+"""Meshes that come as bytes through a page: checked as ``inspect`` checks files, kept as one file while they are flown.
 
 The node reads a mesh by path, so the file must be there; it lies in a folder of this process alone, under a name made
 here. The next upload replaces it, and the folder goes with the process; one that was killed is swept up by the next.

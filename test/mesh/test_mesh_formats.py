@@ -222,7 +222,7 @@ class TestCache:
             raise AssertionError("computed again")
 
         monkeypatch.setattr("rigid_proto_ros.mesh.reading._read", never)
-        monkeypatch.setattr("rigid_proto_ros.mass.from_mesh.judge_surface", never)
+        monkeypatch.setattr("rigid_proto_ros.mass.from_mesh.check_surface", never)
         for kernel in ("solid_moments", "shell_moments", "point_moments"):
             monkeypatch.setattr(f"rigid_proto_ros.mass.properties.{kernel}", never)
         again = mesh_body(load_mesh(str(tmp_path / "a.obj")))

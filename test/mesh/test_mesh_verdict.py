@@ -14,7 +14,7 @@ from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
 from rigid_proto_ros.mass.repair import RepairedSurface
-from rigid_proto_ros.mass.verdict import judge_surface, unit_suspicion
+from rigid_proto_ros.mass.verdict import check_surface, unit_suspicion
 from rigid_proto_ros.mesh import nesting as mesh_topology_nesting
 from rigid_proto_ros.mesh.hull import box_surface, convex_hull
 from rigid_proto_ros.mesh.reading import Mesh, load_mesh
@@ -280,7 +280,7 @@ def test_nonplanar_polygons_say_how_far_and_how_much(tmp_path):
     lifted[7, 2] += 0.3
     (tmp_path / "q.obj").write_bytes(obj(lifted, CUBE_QUADS))
     mesh = load_mesh(str(tmp_path / "q.obj"))
-    verdict, _ = judge_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    verdict, _ = check_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
     (finding,) = [f for f in verdict.findings if f.code == "nonplanar_polygons"]
     # The lifted corner and its neighbours' diagonal span a tetrahedron of 0.3·1·1/6.
     assert "by up to 0.05" in finding.message

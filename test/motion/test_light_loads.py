@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The short way to settle a load gives what the long one does, or leaves it to that."""
+"""The short way to resolve a load gives what the long one does, or leaves it to that."""
 
 import math
 
@@ -9,7 +9,7 @@ import pytest
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.motion.loads import light_amount, light_row, settle
+from rigid_proto_ros.motion.loads import light_amount, light_row, resolve_load
 
 POINTS = ("com", "origin", "point/0.1,-0.2,3e5", "point/1e-3,0,-0.0")
 
@@ -21,7 +21,7 @@ def random_body(rng: np.random.Generator):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_light_load_is_settled_as_any_other_and_none_too_strong_is_light(seed):
+def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light(seed):
     rng = np.random.default_rng(seed)
     light = 0
     for _ in range(200):
@@ -33,7 +33,7 @@ def test_a_light_load_is_settled_as_any_other_and_none_too_strong_is_light(seed)
         if not row:
             continue
         light += 1
-        load = settle(frame, force, torque, body, None, {}, None)
+        load = resolve_load(frame, force, torque, body, None, {}, None)
         load.check_magnitude(body)
         assert row == load.packed
     assert light > 10
@@ -47,9 +47,9 @@ def test_what_is_not_finite_is_never_light(bad, place):
     body, frame = make_body(1.0, np.zeros(3), np.eye(3)), parse_frame("body@point/1,2,3")
     assert light_row(frame, numbers[:3], numbers[3:], light_amount(body)) == b""
     with pytest.raises(CommandRefused):
-        settle(frame, numbers[:3], numbers[3:], body, None, {}, None)
+        resolve_load(frame, numbers[:3], numbers[3:], body, None, {}, None)
 
 
 @pytest.mark.parametrize("point", ["origin", "ray/0,0,5/0,0,-1", "vertex/0"])
-def test_a_point_that_takes_more_than_its_numbers_is_settled_the_long_way(point):
+def test_a_point_that_takes_more_than_its_numbers_is_resolved_the_long_way(point):
     assert light_row(parse_frame(f"body@{point}"), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1e9) == b""

@@ -39,14 +39,14 @@ def flood(rig, count: int, messages: int, rate: float) -> tuple[int, dict]:
         for client in clients:
             client.do("acknowledged", topic=rig.name("wrench"))
 
-        def settled() -> bool:
+        def accounted_for() -> bool:
             """All are taken, or some were lost and no more come."""
             earlier, now = rig.counters_now(), rig.counters_now()
             taken = now["wrench_received"] - before["wrench_received"]
             lost = now["queue_full"] > before["queue_full"]
             return taken == count * messages or (lost and earlier["wrench_received"] == now["wrench_received"])
 
-        rig.until(settled, "all messages, or their loss")
+        rig.until(accounted_for, "all messages, or their loss")
         gained = rig.gained(before, "wrench_received")
     finally:
         for client in clients:

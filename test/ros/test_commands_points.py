@@ -68,7 +68,7 @@ def corner(scene) -> np.ndarray:
 @pytest.mark.parametrize("held", [True, False], ids=["wrench", "poke"])
 @pytest.mark.parametrize("axes", ["world", "body"])
 def test_a_point_named_by_vertex_contact_or_coordinates_is_one_point(scene, corner, axes, held):
-    # Equal to the bit: all three settle on the same doubles.
+    # Equal to the bit: all three resolve to the same doubles.
     start = SECOND // 10
     points = (f"vertex/{VERTEX}", "tip", f"point/{text(corner)}")
     ends = [flown(scene, (start, f"{axes}@{p}", FORCE, (0.0, 0.0, 0.0), held)) for p in points]
@@ -127,7 +127,7 @@ def test_a_ray_that_misses_when_it_takes_effect_is_refused_and_the_motion_goes_o
 
 
 def test_normal_axes_push_along_the_inward_normal_of_the_scaled_surface(scene):
-    """Inward normals of a scaled surface go with the inverse of the scale; a corner's is settled at the mesh."""
+    """Inward normals of a scaled surface go with the inverse of the scale; a corner's is found at the mesh."""
     surface, scale = scene.setup.surface, np.array(SCENE["scale"])
     a, b, c = surface.vertices[surface.triangles[40]]
     centre = (a + b + c) / 3

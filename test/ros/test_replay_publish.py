@@ -98,7 +98,7 @@ def test_states_go_out_with_the_noise_that_the_node_gave_them_and_their_stamps_o
     own = sensor_noise(Parameters().replaced(noise))
     again = resimulation(exact)
     states = [(t, again.advance(t).tolist()) for t in exact.times.tolist()]
-    told = {name: [PROJECTIONS[name](own.told(name, t, row)) for t, row in states] for name in ("pose", "twist")}
+    told = {name: [PROJECTIONS[name](own.measured(name, t, row)) for t, row in states] for name in ("pose", "twist")}
     assert verify(exact) is None
     # As somebody else's recorder has it, who heard the topics.
     heard = replace(

@@ -17,7 +17,7 @@ pytest.importorskip("rclpy")
 from geometry_msgs.msg import TransformStamped
 
 from rigid_proto_ros.base.errors import CommandRefused
-from rigid_proto_ros.motion.loads import settle
+from rigid_proto_ros.motion.loads import resolve_load
 from rigid_proto_ros.scene.command_codec import frame_names
 from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -75,7 +75,7 @@ def test_a_wrench_in_a_frame_fixed_to_the_body_is_the_same_wrench_in_body_axes(s
     # Tool y is flange z, tool z is flange -y; flange x is body y, flange y is body -x.
     assert read.force == pytest.approx((3.0, 1.0, 2.0)) and read.torque == pytest.approx((4.0, 0.0, 0.0))
     assert read.frame.axes == "body" and read.frame.duration_s == 0.5
-    load = settle(read.frame, read.force, read.torque, setup.body, setup.surface, {}, None)
+    load = resolve_load(read.frame, read.force, read.torque, setup.body, setup.surface, {}, None)
     assert load.arm(setup.body) == pytest.approx(np.array([0.0, 0.3, 0.0]), abs=1e-12)
 
 

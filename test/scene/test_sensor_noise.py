@@ -76,9 +76,9 @@ def test_a_walk_has_independent_steps_that_grow_with_the_root_of_time() -> None:
 def test_an_error_belongs_to_seed_and_stamp_alone() -> None:
     one, again, other = noise(), noise(), noise(noise_seed=6)
     for time_ns in (0, 10_000_000, 7_123_456_789, 2**40):
-        later = one.told("odom", time_ns + 10_000_000, ROW)
-        assert one.told("odom", time_ns, ROW) == again.told("odom", time_ns, ROW) != later
-        assert one.told("odom", time_ns, ROW) != other.told("odom", time_ns, ROW)
+        later = one.measured("odom", time_ns + 10_000_000, ROW)
+        assert one.measured("odom", time_ns, ROW) == again.measured("odom", time_ns, ROW) != later
+        assert one.measured("odom", time_ns, ROW) != other.measured("odom", time_ns, ROW)
         assert one.imu(time_ns, ROW[:3], ROW[3:6]) == again.imu(time_ns, ROW[:3], ROW[3:6])
 
 
@@ -92,7 +92,7 @@ def test_range_and_resolution_hold() -> None:
 def test_covariances_are_the_mean_squares_of_the_errors() -> None:
     own, times = noise(), [k * 10_000_000 for k in range(4000)]
     true = {name: np.array(project(ROW)) for name, project in PROJECTIONS.items()}
-    told = np.array([PROJECTIONS["odom"](own.told("odom", t, ROW)) for t in times])
+    told = np.array([PROJECTIONS["odom"](own.measured("odom", t, ROW)) for t in times])
     pose = (told[:, :3] - true["odom"][:3]) ** 2
     assert pose.mean() == pytest.approx(own.variance(POSITION, 0), rel=0.05)
     # Velocities in the axes of the message err by their own noise alone, though the attitude errs.

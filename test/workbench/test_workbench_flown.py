@@ -129,7 +129,7 @@ def test_a_factors_box_holds_the_factor_itself_and_its_slider_the_logarithm(flow
 
 def test_the_ballast_form_shows_the_prepared_weight_at_its_place(flown: FlownPage) -> None:
     flown.do(lambda: flown.link.set_parameters({"ballast.tip": [0.0, 0.0, 0.0, 0.07]}))
-    flown.settle()
+    flown.wait_until_still()
     assert [flown.widget(label).value for label in ("Weight", "Its mass [kg]", "At x y z")] == ["tip", "0", "0 0 0.07"]
     flown.set("Its mass [kg]", "heavy")
     flown.press("Put it there")

@@ -15,9 +15,9 @@ pytest.importorskip("viser")
 from flown_page import FlownLink
 
 from rigid_proto_ros.session.runs import decode_event
+from rigid_proto_ros.workbench.drawn_poses import DrawnPose
 from rigid_proto_ros.workbench.hand_commands import HandCommands
 from rigid_proto_ros.workbench.pointer import Pointer, Tools
-from rigid_proto_ros.workbench.sighting import DrawnPose
 
 SECOND = 10**9
 
@@ -33,8 +33,8 @@ class Hand:
         self.hand = HandCommands(self.link, lambda: self.page.paused)
         state = self.link.simulation.state
         self.seen = DrawnPose(0.0, state.position, state.orientation_xyzw, np.zeros(3), 1.0)
-        sightings = SimpleNamespace(of_point=lambda *_: self.seen)
-        self.pointer = Pointer(self.hand, self.page, sightings, Tools(force=0.01))
+        drawn_poses = SimpleNamespace(of_point=lambda *_: self.seen)
+        self.pointer = Pointer(self.hand, self.page, drawn_poses, Tools(force=0.01))
 
     def kinds(self) -> list[str]:
         return [decode_event(line, 1)[1] for line in self.link._log.lines]

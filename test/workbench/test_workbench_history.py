@@ -111,7 +111,7 @@ def test_after_a_rewind_the_string_is_what_it_was_and_not_what_the_body_would_ma
     now = hand.simulation.string
     assert (now.stiffness, now.damping) == (was.stiffness, was.damping)
     # Settled anew it would be another one, by far.
-    anew = was.settled(hand.scenario.setup.string, hand.scenario.setup.body, hand.simulation.state)
+    anew = was.with_spring(hand.scenario.setup.string, hand.scenario.setup.body, hand.simulation.state)
     assert abs(anew.stiffness / was.stiffness - 1.0) > 0.01
     # The same future: measured 4e-12, as auto begins its steps anew.
     assert np.abs(hand.simulation.state.row[:7] - future).max() < 1e-9

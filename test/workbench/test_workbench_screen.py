@@ -81,10 +81,10 @@ def test_keys_pause_step_look_back_reset_and_are_listed(desk, browser_page) -> N
     desk.page.node.paused = False
     pressed(desk, page, "r", lambda: told[-1] == ("reset", None))
     desk.fly(3.0, begin_s=1.1)
-    pressed(desk, page, "Backspace", lambda: desk.page.look_back.moment_ns == 2_000_000_000)
-    pressed(desk, page, "ArrowLeft", lambda: desk.page.look_back.moment_ns == 1_990_000_000)
-    pressed(desk, page, "ArrowRight", lambda: desk.page.look_back.moment_ns == 2_000_000_000)
-    pressed(desk, page, "n", lambda: desk.page.look_back.moment_ns is None and told[-1] == ("pause", False))
+    pressed(desk, page, "Backspace", lambda: desk.page.past_view.moment_ns == 2_000_000_000)
+    pressed(desk, page, "ArrowLeft", lambda: desk.page.past_view.moment_ns == 1_990_000_000)
+    pressed(desk, page, "ArrowRight", lambda: desk.page.past_view.moment_ns == 2_000_000_000)
+    pressed(desk, page, "n", lambda: desk.page.past_view.moment_ns is None and told[-1] == ("pause", False))
     for key in ("Shift+?", "h"):
         desk.said.clear()
         pressed(desk, page, key, lambda: any("Backspace: rewind 1 s" in text for text in desk.said))
@@ -94,9 +94,9 @@ def test_space_after_a_rewind_continues_from_there(desk, browser_page) -> None:
     page, told = browser_page, desk.link.told
     desk.fly(6.0, begin_s=5.0)
     back_ns = desk.page.history.span[1] - 1_000_000_000
-    pressed(desk, page, "Backspace", lambda: desk.page.look_back.moment_ns == back_ns)
+    pressed(desk, page, "Backspace", lambda: desk.page.past_view.moment_ns == back_ns)
     count = len(told)
-    pressed(desk, page, "Space", lambda: desk.page.look_back.moment_ns is None and told[-1] == ("pause", False))
+    pressed(desk, page, "Space", lambda: desk.page.past_view.moment_ns is None and told[-1] == ("pause", False))
     kinds = [kind for kind, *_ in told[count:]]
     # The state at that moment is set as the initial one, and time begins anew from it.
     assert "set" in kinds and kinds.index("set") < kinds.index("reset") and kinds[-1] == "pause", told[count:]

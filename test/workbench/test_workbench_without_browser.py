@@ -18,7 +18,7 @@ from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
 from rigid_proto_ros.workbench import node_control  # noqa: E402
 from rigid_proto_ros.workbench import page as page_module  # noqa: E402
 from rigid_proto_ros.workbench.node_control import ParameterSetter  # noqa: E402
-from rigid_proto_ros.workbench.ros_link import Heard  # noqa: E402
+from rigid_proto_ros.workbench.ros_link import Received  # noqa: E402
 
 PATIENCE_S = 60.0
 STEP_NS = 100_000_000
@@ -33,7 +33,7 @@ class StandIn:
         self.taken = True
         self.values: dict = {}
         self._deliver, self._on_scene = deliver, on_scene
-        self._heard = Heard()
+        self._heard = Received()
 
     def listen(self) -> None:
         self.told.append(("listen",))
@@ -50,8 +50,8 @@ class StandIn:
         self._heard.states.extend(states)
         self._heard.events.extend(events)
 
-    def take(self) -> Heard:
-        heard, self._heard = self._heard, Heard()
+    def take(self) -> Received:
+        heard, self._heard = self._heard, Received()
         return heard
 
     def call(self, service, data=None, done=None) -> None:
@@ -98,16 +98,16 @@ class Desk(PageInProcess):
         update = {"type": "GuiUpdateMessage", "uuid": self.input(label)._impl.uuid, "updates": {"value": value}}
         socket.send(msgspec.msgpack.encode(update))
 
-    def look_back(self, socket) -> None:
+    def past_view(self, socket) -> None:
         """A page scrubs one second back."""
         self.drag(socket, "Seconds back", 1.0)
-        self.until(lambda: self.page.look_back.moment_ns == 1_000_000_000, "looking back")
+        self.until(lambda: self.page.past_view.moment_ns == 1_000_000_000, "looking back")
         assert self.link.told[-1] == ("pause", True)
 
     @property
     def shows_now(self) -> bool:
         button = self.page.session_tab._go_on
-        return self.page.look_back.moment_ns is None and self.input("Seconds back").value == 0.0 and button.disabled
+        return self.page.past_view.moment_ns is None and self.input("Seconds back").value == 0.0 and button.disabled
 
 
 @pytest.fixture
@@ -124,7 +124,7 @@ def test_the_last_page_that_closes_while_it_looks_back_leaves_the_node_as_it_was
     with bare_page(desk.server.get_port()) as socket:
         desk.fly()
         desk.page.node.paused = paused
-        desk.look_back(socket)
+        desk.past_view(socket)
     desk.until(lambda: ("stop_listening",) in desk.link.told, "end of listening")
     assert desk.link.told[-2:] == [("pause", paused), ("stop_listening",)]
     assert desk.shows_now
@@ -133,7 +133,7 @@ def test_the_last_page_that_closes_while_it_looks_back_leaves_the_node_as_it_was
 def test_a_page_server_that_ends_while_somebody_looks_back_leaves_the_node_as_it_was(desk: Desk, recwarn) -> None:
     with bare_page(desk.server.get_port()) as socket:
         desk.fly()
-        desk.look_back(socket)
+        desk.past_view(socket)
         desk.end()
     assert desk.link.told[-2:] == [("pause", False), ("close",)]
     assert not [str(warning.message) for warning in recwarn]
@@ -142,7 +142,7 @@ def test_a_page_server_that_ends_while_somebody_looks_back_leaves_the_node_as_it
 def test_a_lesson_chosen_while_looking_back_is_shown_as_it_is_now(desk: Desk) -> None:
     with bare_page(desk.server.get_port()) as socket:
         desk.fly()
-        desk.look_back(socket)
+        desk.past_view(socket)
         lesson = desk.input("Lesson").options[-1]
         desk.drag(socket, "Lesson", lesson)
         desk.until(lambda: desk.link.told[-1] == ("pause", False), "lesson")
@@ -153,7 +153,7 @@ def test_a_lesson_chosen_while_looking_back_is_shown_as_it_is_now(desk: Desk) ->
 def test_a_lesson_that_the_node_refuses_while_somebody_looks_back_leaves_it_running_and_shown_as_it_is(desk) -> None:
     with bare_page(desk.server.get_port()) as socket:
         desk.fly()
-        desk.look_back(socket)
+        desk.past_view(socket)
         desk.link.taken = False
         desk.drag(socket, "Lesson", desk.input("Lesson").options[-1])
         desk.until(lambda: any("not that" in text for text in desk.said), "refusal")

@@ -67,7 +67,7 @@ def tube(
     radius = (np.abs(cosine) ** power + np.abs(sine) ** power) ** (-1.0 / power)
     a = half_axes[:, :1] * (radius * cosine)
     b = half_axes[:, 1:] * (radius * sine)
-    # (across, up, tangent) is right-handed or left-handed alike for a whole path; signed_volume settles which.
+    # (across, up, tangent) is right-handed or left-handed alike for a whole path; signed_volume decides which.
     rings = path[:, None] + a[:, :, None] * across[:, None] + b[:, :, None] * np.asarray(up, dtype=float)
     surface = loft(rings, closed)
     return surface if signed_volume(surface) > 0.0 else reverse(surface)

@@ -20,7 +20,7 @@ from .first_root import NONE
 from .radau import radau_step, stage_rates, within
 from .radau_tableau import HALVES, STAGES
 from .runge_kutta import is_good
-from .slack import first_spell, knot_of
+from .slack import first_interval, knot_of
 from .string_law import is_one_sided
 
 SAFETY = 0.8
@@ -76,7 +76,7 @@ def two_halves(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _judged(  # noqa: PLR0913
+def _compared(  # noqa: PLR0913
     y: np.ndarray,
     p: np.ndarray,
     h: float,
@@ -133,7 +133,7 @@ def _switch_in_half(y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.nd
         if (margin > 0.0) == taut:
             hidden = 0.0
             if not taut and x0 < 0.0 and x < 0.0:
-                hidden = first_spell(place0, place, (s - before) * h, x0, p, False)[0] / h
+                hidden = first_interval(place0, place, (s - before) * h, x0, p, False)[0] / h
             before_, x0, place0 = before, x, place
             before = s
             if hidden <= 0.0:
@@ -178,7 +178,7 @@ def implicit_step(  # noqa: PLR0913
     accuracy = control[ctl.ACCURACY]
     last = math.inf
     while True:
-        spent, error = _judged(y, p, h, taut, elapsed, whole, first, second, middle, out)
+        spent, error = _compared(y, p, h, taut, elapsed, whole, first, second, middle, out)
         control[ctl.PENDING] += spent
         allowed = max(accuracy * h, FLOOR)
         noisy = error < _NOISE and error > 0.5 * last

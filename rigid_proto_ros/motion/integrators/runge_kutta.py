@@ -120,7 +120,7 @@ def repeated_on_string(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: i
         slack.begin(search, new, p, h)
         while search[slack.REMAINING] > 0.0:
             step(new, p, search[slack.TRIAL], search[slack.TAUT] != 0.0, trial)
-            if slack.judge(search, trial, p):
+            if slack.check_trial(search, trial, p):
                 new[:] = trial
         if not is_good(new):
             return done
@@ -142,7 +142,7 @@ def tableau_steps_on_string(y: np.ndarray, p: np.ndarray, h: float, n: int, A: n
             rates(new, p, taut, k[0])
             stages(new, p, search[slack.TRIAL], taut, A, count, k, z)
             advance(new, p, search[slack.TRIAL], B, count, k, trial)
-            if slack.judge(search, trial, p):
+            if slack.check_trial(search, trial, p):
                 new[:] = trial
         if not is_good(new):
             return done

@@ -3,9 +3,9 @@
 
 The law of tension has a kink (a jump, with a damper) where min(k x, k x + c x') changes sign, and a step across it
 loses its order. So a step is cut there. An integrator asks in turn: ``begin`` says with which law and how long to step,
-the integrator takes that trial step, ``judge`` accepts it or asks for another. The root is bracketed and found by
-regula falsi (Illinois variant: Dowell and Jarratt, BIT 11, 1971). Which spell is the first is told beforehand, by the
-first time (integrators/first_root.py) at which |a|² − rest² changes sign on the cubic through the knot's place and
+the integrator takes that trial step, ``check_trial`` accepts it or asks for another. The root is bracketed and found by
+regula falsi (Illinois variant: Dowell and Jarratt, BIT 11, 1971). Which interval is the first is known beforehand, by
+the first time (integrators/first_root.py) at which |a|² − rest² changes sign on the cubic through the knot's place and
 velocity at both ends; a trial step to the middle of it confirms it.
 """
 
@@ -37,7 +37,7 @@ _EDGE = 12  # 1 while the start itself lies on the kink, so that either law may 
 _KNOT = 13  # (6,) its place and velocity where the trial starts
 _SIZE = 19
 
-_WHOLE, _PEEK, _BRACKET, _LAST, _SETTLED = 0.0, 1.0, 2.0, 3.0, 4.0
+_WHOLE, _PEEK, _BRACKET, _LAST, _CONFIRMED = 0.0, 1.0, 2.0, 3.0, 4.0
 
 _MAX_SWITCHES = 1000
 """In one step: more is chatter of a step far too long for its string, and the rest of it is taken with one law."""
@@ -75,7 +75,7 @@ def _begin_part(s: np.ndarray, x: float, margin: float, y: np.ndarray, p: np.nda
 
 
 @njit(cache=True, error_model="numpy")
-def judge(s: np.ndarray, trial: np.ndarray, p: np.ndarray) -> bool:
+def check_trial(s: np.ndarray, trial: np.ndarray, p: np.ndarray) -> bool:
     """Whether the trial step is accepted (its heat then completed); s says what is to be done next until
     nothing remains.
     """
@@ -85,14 +85,14 @@ def judge(s: np.ndarray, trial: np.ndarray, p: np.ndarray) -> bool:
     phase = s[_PHASE]
     if phase == _LAST:
         return _accept(s, trial, p, x, margin, True)
-    if phase == _SETTLED or not math.isfinite(margin):
+    if phase == _CONFIRMED or not math.isfinite(margin):
         return _accept(s, trial, p, x, margin, False)
     if phase == _WHOLE and not right and s[_EDGE] != 0.0:
         s[TAUT] = 1.0 - s[TAUT]
         s[_EDGE] = 0.0
         return False
     if phase == _WHOLE:
-        middle, passes = first_spell(s[_KNOT : _KNOT + 6], knot_of(trial, p), s[TRIAL], s[_X], p, s[TAUT] != 0.0)
+        middle, passes = first_interval(s[_KNOT : _KNOT + 6], knot_of(trial, p), s[TRIAL], s[_X], p, s[TAUT] != 0.0)
         if right and middle <= 0.0:
             return _accept(s, trial, p, x, margin, False)
         if not right:
@@ -103,10 +103,10 @@ def judge(s: np.ndarray, trial: np.ndarray, p: np.ndarray) -> bool:
             return False
     if phase == _PEEK and right:
         if s[_HIGH] == 0.0:
-            s[_PHASE] = _SETTLED
+            s[_PHASE] = _CONFIRMED
             s[TRIAL] = s[REMAINING]
         else:
-            # No such spell, but the end is one.
+            # No such interval, but the end is one.
             s[_PHASE] = _BRACKET
             s[_LOW], s[_MARGIN_LOW] = s[TRIAL], margin
             _next_trial(s)
@@ -158,7 +158,7 @@ def _accept(s: np.ndarray, trial: np.ndarray, p: np.ndarray, x: float, margin: f
         s[_SWITCHES] += 1.0
     _begin_part(s, x, margin, trial, p)
     if s[_SWITCHES] > _MAX_SWITCHES:
-        s[_PHASE] = _SETTLED
+        s[_PHASE] = _CONFIRMED
     return True
 
 
@@ -169,10 +169,10 @@ def knot_of(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
 
 
 @njit(cache=True, error_model="numpy")
-def first_spell(
+def first_interval(
     start: np.ndarray | tuple[float, ...], end: tuple[float, ...], h: float, x0: float, p: np.ndarray, taut: bool
 ) -> tuple[float, bool]:
-    """Middle of the first spell within h seconds, 0 for none, that the string is stretched (slack for a taut one) on
+    """Middle of the first interval within h seconds, 0 for none, that the string is stretched (slack for a taut one) on
     the cubic through the knot's place and velocity at both ends (6,), and whether it ends before h. x0: stretch at the
     start.
     """
@@ -197,7 +197,7 @@ def first_spell(
     begin = first_rise(g, 6)
     if begin == NONE or begin >= 1.0:
         return 0.0, False
-    # The same from there on, turned over: where it rises again the spell ends.
+    # The same from there on, turned over: where it rises again the interval ends.
     left = 1.0 - begin
     for k in range(6):
         for j in range(5, k - 1, -1):

@@ -157,7 +157,7 @@ def workspace(degree: int) -> np.ndarray:
 
 @njit(cache=True, error_model="numpy")
 def _sample(y: np.ndarray, p: np.ndarray, control: np.ndarray, room: np.ndarray, span: float) -> bool:
-    """Take y ``span`` seconds on, less than the step that waits: one step mostly, but judged as that was;
+    """Take y ``span`` seconds on, less than the step that waits: one step mostly, but checked as that was;
     whether it was possible.
     """
     law, one_sided, out = control[ctl.LAW], is_one_sided(p), np.empty(STORED)

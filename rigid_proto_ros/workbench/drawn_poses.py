@@ -52,13 +52,13 @@ class DrawnPose:
         return np.array(list(direction)) @ matrix_from_quaternion(self.orientation_xyzw)
 
 
-class Sightings:
+class DrawnPoses:
     """The poses drawn lately, and which of them a pointer event belongs to."""
 
     def __init__(self) -> None:
         self._drawn: deque[DrawnPose] = deque()
 
-    def drew(self, pose: DrawnPose) -> None:
+    def add(self, pose: DrawnPose) -> None:
         """A pose went to the pages."""
         self._drawn.append(pose)
         while self._drawn[0].time_s < pose.time_s - KEPT_S:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Looking back along the history: the body is shown as it was, and the node is paused meanwhile."""
+"""A view of the past: the body is shown as it was at a moment of the history, and the node is paused meanwhile."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .node_control import NodeControl
 from .scene_loader import SceneLoader
 
 
-class LookBack:
+class PastView:
     """moment_ns: on the history's time, what is looked at; None while the present is shown. on_change()
     is called at each change.
     """
@@ -34,7 +34,7 @@ class LookBack:
         """Whether simulated time stood still before somebody looked back; now, where nobody does."""
         return self._node.paused if self.moment_ns is None else self._paused_before
 
-    def look(self, back_s: float) -> None:
+    def show(self, back_s: float) -> None:
         """Show the body as it was so many seconds before the present, or before where looking back began."""
         if back_s <= 0.0:
             self.resume()
@@ -48,16 +48,16 @@ class LookBack:
         self.moment_ns = max(self._from_ns - round(back_s * 1e9), first_ns)
         self.on_change()
 
-    def look_by(self, seconds: float) -> None:
+    def move_by(self, seconds: float) -> None:
         """Look further back than now, or less far with a negative number."""
-        self.look(max(0.0, self.back_s + seconds))
+        self.show(max(0.0, self.back_s + seconds))
 
     def step(self, count: int) -> None:
         """Look back by so many publication periods, which is what ``~/step`` goes on by; less far with a
         negative number.
         """
         scenario = self._scenes.scenario
-        self.look_by(count * (0.01 if scenario is None else 1.0 / float(scenario.parameters.publish_rate)))
+        self.move_by(count * (0.01 if scenario is None else 1.0 / float(scenario.parameters.publish_rate)))
 
     def run_afterwards(self) -> None:
         """Simulated time goes on after this look back, though it stood still before."""
