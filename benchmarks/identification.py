@@ -28,18 +28,18 @@ from scipy.optimize import least_squares
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE.parent / "test" / "identify")]
 
-import calibration_study as study  # noqa: E402
-import measured_flights as mf  # noqa: E402
+import calibration_study as study
+import measured_flights as mf
 
-from result_table import ResultTable  # noqa: E402
-from rigid_proto_ros import __version__  # noqa: E402
-from rigid_proto_ros.identify import mass_parameters as mp  # noqa: E402
-from rigid_proto_ros.identify import measurements as ms  # noqa: E402
-from rigid_proto_ros.identify.identification import Known, identify  # noqa: E402
-from rigid_proto_ros.identify.local_motion import local_start  # noqa: E402
-from rigid_proto_ros.identify.sensors import departure  # noqa: E402
-from rigid_proto_ros.identify.shooting import moved_starts  # noqa: E402
-from rigid_proto_ros.motion import loads as ld  # noqa: E402
+from result_table import ResultTable
+from rigid_proto_ros import __version__
+from rigid_proto_ros.identify import mass_parameters as mp
+from rigid_proto_ros.identify import measurements as ms
+from rigid_proto_ros.identify.identification import Known, identify
+from rigid_proto_ros.identify.local_motion import local_start
+from rigid_proto_ros.identify.sensors import departure
+from rigid_proto_ros.identify.shooting import moved_starts
+from rigid_proto_ros.motion import loads as ld
 
 COLUMNS = ("tool", "version", "body", "throw", "begins_from", "seconds", "cpu_seconds", "error", "mass_error")
 STEP = 1e-3

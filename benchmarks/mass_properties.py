@@ -29,13 +29,13 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE.parent / "test")]
 
-from mass_solids import box, moved, sphere  # noqa: E402
+from mass_solids import box, moved, sphere
 
-from result_table import ResultTable  # noqa: E402
-from rigid_proto_ros import __version__  # noqa: E402
-from rigid_proto_ros.mass.exact_moments import exact_solid_moments, relative_errors  # noqa: E402
-from rigid_proto_ros.mass.moments import solid_moments  # noqa: E402
-from rigid_proto_ros.mass.properties import MeshMoments  # noqa: E402
+from result_table import ResultTable
+from rigid_proto_ros import __version__
+from rigid_proto_ros.mass.exact_moments import exact_solid_moments, relative_errors
+from rigid_proto_ros.mass.moments import solid_moments
+from rigid_proto_ros.mass.properties import MeshMoments
 
 COLUMNS = (
     *(
@@ -243,7 +243,7 @@ def one_mesh(
                 wall, cpu, (volume, center, inertia) = timed(tool, there, triangles)
                 first.setdefault(tool.name, (wall, cpu))
                 errors[tool.name, place] = relative_errors(exact, volume, center, inertia, diagonal)
-            except Exception as error:  # noqa: BLE001 - a peer may refuse in any way it likes
+            except Exception as error:
                 notes[tool.name, place] = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
     cold: dict[str, list[float]] = {tool.name: [] for tool in everything}
     warm: dict[str, list[tuple[float, float]]] = {tool.name: [] for tool in everything}

@@ -32,13 +32,13 @@ os.environ["RIGID_PROTO_CACHE"] = "off"
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE.parent / "test")]
 
-from mass_solids import sphere  # noqa: E402
-from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text  # noqa: E402
+from mass_solids import sphere
+from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text
 
-from result_table import ResultTable  # noqa: E402
-from rigid_proto_ros import __version__  # noqa: E402
-from rigid_proto_ros.base.errors import MeshError  # noqa: E402
-from rigid_proto_ros.mesh.reading import load_mesh  # noqa: E402
+from result_table import ResultTable
+from rigid_proto_ros import __version__
+from rigid_proto_ros.base.errors import MeshError
+from rigid_proto_ros.mesh.reading import load_mesh
 
 COLUMNS = ("what", "format", "file", "tool", "version", "triangles", "best_ms", "median_ms", "result")
 REPETITIONS = 7
@@ -148,7 +148,7 @@ def judged(read: Callable[[Path], Surface], path: Path, vertices: int) -> str:
             surface = read(path)
     except MeshError:
         return "refused"
-    except Exception as error:  # noqa: BLE001 - a foreign reader fails in as many ways as files are broken
+    except Exception as error:
         return f"refused ({type(error).__name__})"
     if vertices < 0:
         return f"wrong: {len(surface[1])} triangles, no word"

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from feature_scenes import Scene, numbers_of
 
-from rigid_proto_ros.mesh.locate import bundled_names
+from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.scene.scenario import make_scenario
 
@@ -22,7 +22,7 @@ def _signed(rng, numbers) -> float:
 def everyday_scene(seed: int) -> Scene:
     """A throw; the same for every run of a seed."""
     rng = np.random.default_rng([1000, seed])
-    mesh = str(rng.choice(bundled_names()))
+    mesh = str(rng.choice(body_names()))
     attach = [0.0, 0.0, 0.0]
     if rng.random() < 0.6:
         attach = [round(float(c), 3) for c in rng.choice(load_mesh(mesh).vertices)]

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from rigid_proto_ros.simulation.observer import BodySnapshot, Observer, ShownLoad
@@ -63,3 +65,21 @@ def fly(observer: Observer, states: np.ndarray, body: BodySnapshot = BODY) -> No
 def event_line(time_ns: int, kind: str) -> str:
     """A line as the event log writes it."""
     return f'{{"time_ns": {time_ns}, "kind": "{kind}", "content": {{"force": [0.0, 3.0, 0.0]}}, "sha256": "00"}}'
+
+
+def flush(observer: Observer, timeout_s: float = 60.0) -> None:
+    """Wait until everything so far was handed to the file and the viewers."""
+    flusher, passes = observer._flusher, []
+    own = flusher._flush
+
+    def counted() -> None:
+        own()
+        passes.append(1)
+
+    flusher._flush = counted
+    flusher.mailbox.wake()
+    deadline = time.monotonic() + timeout_s
+    while not passes:
+        assert time.monotonic() < deadline, "nothing was flushed"
+        time.sleep(0.001)
+    flusher._flush = own

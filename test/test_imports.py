@@ -2,6 +2,7 @@
 """Every folder of the package knows only the folders before it, and each outside package is imported in its own place."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -133,6 +134,17 @@ def test_imports_inside_the_package_are_relative() -> None:
         or (isinstance(node, ast.Import) and any(is_ours(alias.name) for alias in node.names))
     ]
     assert not absolute
+
+
+def test_every_exception_from_a_check_says_its_reason() -> None:
+    bare = [
+        f"{path.relative_to(ROOT.parent)}:{number}"
+        for path in MODULES.values()
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(r"#.*(noqa|type: ignore)", line)
+        and not re.search(r"(noqa: [A-Z0-9, ]+|type: ignore\[[a-z, -]+\])\s*[(#-] ?\w", line)
+    ]
+    assert not bare
 
 
 def test_each_outside_package_is_imported_in_its_own_place_alone() -> None:

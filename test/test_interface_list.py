@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed: no topics, services and executables to list")
 pytest.importorskip("viser", reason="viser is not installed: no page whose controls could be listed")
 
-from interface_list import interface_list  # noqa: E402
+from interface_list import interface_list
 
 LIST = Path(__file__).parent / "interface.txt"
 

@@ -57,7 +57,7 @@ def installed_bundle(site: Path, cwd: Path, **environment: str) -> list[str]:
     """What an installed copy finds: the paths of a scene and a body, then the names of all scenes."""
     code = (
         "from rigid_proto_ros.base import bundled as b; "
-        "print(b.scene_path('t_handle')); print(b.body_path('t_handle')); print(*b.scene_names())"
+        "print(b.scene_path('t_handle')); print(b.resolve_mesh('t_handle')); print(*b.scene_names())"
     )
     return run(sys.executable, "-c", code, cwd=cwd, PYTHONPATH=str(site), **environment).stdout.split("\n")[:3]
 
@@ -224,7 +224,7 @@ def test_every_body_has_a_scene_and_every_scene_a_body() -> None:
 def test_contacts_of_the_scenes_lie_on_the_surface() -> None:
     for name in bundled.scene_names():
         parameters = scene_parameters(name)
-        rows = [line.split() for line in bundled.body_path(parameters["mesh"]).read_text("utf-8").splitlines()]
+        rows = [line.split() for line in bundled.resolve_mesh(parameters["mesh"]).read_text("utf-8").splitlines()]
         vertices = np.array([row[1:] for row in rows if row[0] == "v"], dtype=float)
         corners = vertices[np.array([row[1:] for row in rows if row[0] == "f"], dtype=int) - 1]
         for contact, point in parameters["contacts"].items():
@@ -246,7 +246,7 @@ def distance_to_surface(point: np.ndarray, corners: np.ndarray) -> float:
     return float(min(to_edges, to_planes.min(initial=np.inf)))
 
 
-@pytest.mark.parametrize("find", [bundled.scene_path, bundled.body_path, bundled.example_path])
+@pytest.mark.parametrize("find", [bundled.scene_path, bundled.study_path, bundled.example_path])
 def test_an_unknown_name_is_refused_with_what_there_is(find) -> None:
     with pytest.raises(InputError) as refused:
         find("no_such_thing")

@@ -42,7 +42,7 @@ from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "benchmarks"))
 
-from work_precision_ratios import time_at_error  # noqa: E402 (not of the package)
+from work_precision_ratios import time_at_error
 
 _MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 

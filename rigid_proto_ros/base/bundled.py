@@ -9,16 +9,12 @@ from .errors import InputError, one_of
 
 PACKAGE = "rigid_proto_ros"
 PACKAGE_FOLDER = Path(__file__).parent.parent
-
-
-def body_path(name: str) -> Path:
-    """Mesh file (.obj, metres) of the bundled body ``name``. Raises InputError naming the bodies there are."""
-    return _named("mesh", name, _files(_bodies(), ".obj"))
+BODIES = PACKAGE_FOLDER / "bodies"
 
 
 def body_names() -> list[str]:
-    """Names of the bundled bodies, sorted."""
-    return sorted(_files(_bodies(), ".obj"))
+    """Names of the bundled bodies, which are meshes (.obj, metres) in ``BODIES``, sorted."""
+    return sorted(_files(BODIES, ".obj"))
 
 
 def scene_path(name: str) -> Path:
@@ -60,10 +56,6 @@ def _named(field: str, name: str, files: dict[str, Path]) -> Path:
 
 def _files(folder: Path | None, suffix: str) -> dict[str, Path]:
     return {} if folder is None else {path.stem: path for path in folder.glob(f"*{suffix}")}
-
-
-def _bodies() -> Path:
-    return PACKAGE_FOLDER / "bodies"
 
 
 def _shared(folder: str) -> Path | None:

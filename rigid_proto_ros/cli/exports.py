@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, one_of
-from ..base.output_file import output_file
+from ..base.files import output_file
 from ..base.progress import Progress
 from .options import pixels
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.output_file import whole_file
+from ..base.files import whole_file
 from ..mass.tensor import principal_axes, six_from_tensor
 from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links, print_lump
 

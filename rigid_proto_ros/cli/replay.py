@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
-from ..base.output_file import output_file
+from ..base.files import output_file
 from ..base.progress import Progress
 from .exports import add_exports, asked, check_exports, write_exports
 from .options import add_session

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..base.command_line import completes
 from ..base.errors import InputError
-from ..base.output_file import output_file
+from ..base.files import output_file
 from .exports import add_exports, asked, check_exports, write_exports
 from .options import add_json, add_scene
 from .terminal import line, table
@@ -58,7 +58,7 @@ def _settings() -> list[str]:
 
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
-    from ..rerun_view.recorder import is_mcap
+    from ..rerun_view.session_files import is_mcap
     from ..scene.offline import (
         OfflineRun,
         parse_setting,
@@ -127,7 +127,7 @@ def _observer(files: list[str], parameters: Parameters, record: FlightRecord | N
     """One observer that records to all of these files, and to a record for exports; None without any."""
     if not files and record is None:
         return None
-    from ..rerun_view.recorder import make_recorder
+    from ..rerun_view.session_files import make_recorder
     from ..scene.ghost import GhostRefusals
     from ..simulation.observer import Observers
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import InputError
-from ..rerun_view.recorder import make_recorder
+from ..rerun_view.session_files import make_recorder
 from ..scene.offline import OfflineRun
 from ..scene.scenario import publication_ns
 from ..sweep.study import Study

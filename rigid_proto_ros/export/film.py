@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, is_missing
-from ..base.output_file import whole_file
+from ..base.files import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, HAND_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from .flight_record import FlightRecord
 from .looks import Looks
@@ -41,8 +41,8 @@ def check_film() -> None:
     try:
         # Without it libraries of the display complain on the terminal, though there is none.
         os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
-        import imageio_ffmpeg  # noqa: F401
-        import pygfx  # noqa: F401
+        import imageio_ffmpeg  # noqa: F401 (whether it is installed)
+        import pygfx  # noqa: F401 (whether it is installed)
     except ImportError as error:
         raise InputError("--video", is_missing(str(error.name), "video")) from None
 

@@ -73,20 +73,20 @@ class FlightRecord(Observer):
 
     def started(
         self,
-        scene: str,  # noqa: ARG002
+        scene: str,  # noqa: ARG002 (an observer gets it)
         vertices: np.ndarray | None,
         triangles: np.ndarray | None,
-        mesh_sha256: str,  # noqa: ARG002
+        mesh_sha256: str,  # noqa: ARG002 (an observer gets it)
     ) -> None:
         """A run begins."""
         self._take_mesh(vertices, triangles)
 
     def mesh_changed(
         self,
-        time_ns: int,  # noqa: ARG002
+        time_ns: int,  # noqa: ARG002 (an observer gets it)
         vertices: np.ndarray | None,
         triangles: np.ndarray | None,
-        mesh_sha256: str,  # noqa: ARG002
+        mesh_sha256: str,  # noqa: ARG002 (an observer gets it)
     ) -> None:
         """The body is drawn as this mesh from now on."""
         self._take_mesh(vertices, triangles)
@@ -111,11 +111,11 @@ class FlightRecord(Observer):
             self._times.append(time_ns)
             self._rows.append(np.array(row, dtype=float))
 
-    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:  # noqa: ARG002
+    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:  # noqa: ARG002 (an observer gets it)
         """A load begins to act."""
         self.breaks.append(time_ns)
 
-    def load_ended(self, time_ns: int, load_id: int) -> None:  # noqa: ARG002
+    def load_ended(self, time_ns: int, load_id: int) -> None:  # noqa: ARG002 (an observer gets it)
         """A load acts no longer."""
         self.breaks.append(time_ns)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import __version__
 from ..base.errors import InputError, is_missing
-from ..base.output_file import whole_file
+from ..base.files import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from .animation import Animation
 from .flight_record import DrawnBody, DrawnMesh, FlightRecord
@@ -40,7 +40,7 @@ STRING_WIDTH, STRING_SIDES = 0.012, 8
 def check_gltf() -> None:
     """Raise InputError where the library isn't installed."""
     try:
-        import pygltflib  # noqa: F401
+        import pygltflib  # noqa: F401 (whether it is installed)
     except ImportError:
         raise InputError("--gltf", is_missing("pygltflib", "export")) from None
 

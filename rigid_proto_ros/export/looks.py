@@ -26,7 +26,7 @@ class Looks(Observer):
         self._make = make
         self._ghost = np.full(POSE, np.nan)
 
-    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:  # noqa: ARG002
+    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:  # noqa: ARG002 (an observer gets it)
         """One state of the ghost."""
         self._ghost = row[:POSE].copy()
 

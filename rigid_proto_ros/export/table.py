@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..base.errors import InputError, is_missing
-from ..base.output_file import whole_file
+from ..base.files import whole_file
 from ..base.provenance import cpu, versions
 from ..simulation.quantities import QUANTITIES
 from .flight_record import FlightRecord
@@ -47,7 +47,7 @@ def write_csv(
 def check_parquet() -> None:
     """Raise InputError where pyarrow isn't installed."""
     try:
-        import pyarrow.parquet  # noqa: F401
+        import pyarrow.parquet  # noqa: F401 (whether it is installed)
     except ImportError:
         raise InputError("--parquet", is_missing("pyarrow", "export")) from None
 

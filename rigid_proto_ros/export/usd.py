@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import InputError, is_missing
-from ..base.output_file import whole_file
+from ..base.files import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from ..rerun_view.inertia_shapes import PrincipalFrame
@@ -36,7 +36,7 @@ TRAIL_WIDTH, STRING_WIDTH = 0.01, 0.012
 def check_usd() -> None:
     """Raise InputError where the library isn't installed."""
     try:
-        import pxr  # noqa: F401
+        import pxr  # noqa: F401 (whether it is installed)
     except ImportError:
         raise InputError("--usd", is_missing("usd-core", "export")) from None
 

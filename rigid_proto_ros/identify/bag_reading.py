@@ -22,8 +22,6 @@ from .session_reading import as_acting
 WRENCH_TIMEOUT_NS = 1_500_000_000
 """A wrench holds until the next message, and at most as long as the node's own default."""
 EARTH = (0.0, 0.0, -9.81)
-MOST_APART_S = 5.0
-"""Topics of one flight whose stamps begin further apart than they are long were stamped by different clocks."""
 
 POSES = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
 KINDS = {

@@ -130,22 +130,10 @@ def difference_steps(theta: np.ndarray) -> np.ndarray:
     return STEP * np.array([1.0, 1.0, 1.0, 1.0, middle, last, last, size, size, size])
 
 
-def physical_change(theta: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How far another body is from this one (10,), in the order of ``SEEN``.
-
-    The mass by its logarithm, the tensor's difference in this one's principal axes, each entry by the root of its two
-    moments, the COM in metres. Unlike angles of axes these stay regular where two moments agree.
-    """
-    this, that = mass_of(theta), mass_of(other)
-    moments, axes = principal_axes(this.inertia)
-    change = (axes.T @ (that.inertia - this.inertia) @ axes) / np.sqrt(np.outer(moments, moments))
-    a, b, c = np.diag(change)
-    tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, change[1, 2], change[0, 2], change[0, 1])
-    return np.array([math.log(that.mass / this.mass), *tensor, *(that.center_of_mass - this.center_of_mass)])
-
-
 def changed_tensor(body: MassEstimate, change: np.ndarray) -> MassEstimate:
-    """A body with the tensor changed (6,) as ``physical_change`` would say it, but for its first number."""
+    """A body with the tensor changed (6,) in its own principal axes, each entry by the root of its two moments: the
+    trace's third, the last moment less the mean of the others, the second less the first, and products 23, 13, 12.
+    """
     moments, axes = principal_axes(body.inertia)
     size, ratio, smaller, turn23, turn13, turn12 = change.tolist()
     a, b, c = size - ratio / 3.0 - 0.5 * smaller, size - ratio / 3.0 + 0.5 * smaller, size + 2.0 * ratio / 3.0

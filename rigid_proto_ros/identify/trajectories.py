@@ -118,7 +118,7 @@ def _fly_all(
     degree: int,
     samples: np.ndarray,
     good: np.ndarray,
-) -> int:  # noqa: PLR0913
+) -> int:
     """Each row of flown (n, FLOWN) through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
     came through.
 

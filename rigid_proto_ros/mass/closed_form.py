@@ -80,7 +80,7 @@ def stretched(
 
 
 @njit(cache=True, nogil=True)
-def spread_mass(  # noqa: PLR0913 - a kernel
+def spread_mass(
     mass: float,
     measure: float,
     scale: np.ndarray,

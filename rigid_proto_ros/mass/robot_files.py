@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
+from ..base.files import read_bounded
 from ..base.rotation import matrix_from_quaternion
 from ..mesh.locate import Search
 from .robot_xacro import expand_xacro
@@ -113,7 +113,7 @@ def symmetric(six: ArrayLike) -> np.ndarray:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
-def link_inertial(  # noqa: PLR0913 - the numbers of one element, each with what its printing leaves open
+def link_inertial(
     link: str,
     mass: str,
     center: str | None,

@@ -14,8 +14,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
-from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
+from ..base.files import read_bounded
 from .diagnosis import MISSING, OFF, UNKNOWN, LinkDiagnosis, Options, Robot
 from .export import is_flat, quaternion_wxyz
 from .properties import MassProperties

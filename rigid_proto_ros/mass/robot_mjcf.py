@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
+from ..base.files import read_bounded
 from .robot_files import (
     COLLISION,
     MAX_BYTES,

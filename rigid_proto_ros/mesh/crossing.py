@@ -192,7 +192,7 @@ def self_crossings(vertices: np.ndarray, corners: np.ndarray, component: np.ndar
     return int(_crossings(vertices, corners, component, order, boxes, within, SELF_LIMIT)[0])
 
 
-def crossing_components(  # noqa: PLR0913 - a mesh, its tree, and what is asked
+def crossing_components(
     vertices: np.ndarray,
     triangles: np.ndarray,
     component: np.ndarray,

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ..base.bundled import PACKAGE_FOLDER
+from ..base.bundled import BODIES, PACKAGE_FOLDER, body_names
 from ..base.errors import MeshError, did_you_mean
 
-BODIES = PACKAGE_FOLDER / "bodies"
-"""Folder of the bundled meshes."""
 RESOURCE_PATHS = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "ROS_PACKAGE_PATH")
 """Environment variables with folders, colon separated, in which Gazebo and ROS look for models and packages."""
 
@@ -29,11 +27,6 @@ class Search:
 
 
 NOWHERE_ELSE = Search()
-
-
-def bundled_names() -> tuple[str, ...]:
-    """Names of the meshes that come with the package."""
-    return tuple(sorted(path.stem for path in BODIES.glob("*.obj")))
 
 
 def _installed_package(package: str) -> Path | None:
@@ -121,7 +114,7 @@ def _found_mesh(name: str, search: Search) -> Path:
         return bundled.resolve()
     if path.is_dir():
         raise MeshError("mesh", f"{name!r} is a folder, not a mesh file")
-    names = bundled_names()
+    names = body_names()
     siblings = [p.name for p in path.parent.iterdir() if p.is_file()] if path.parent.is_dir() and "/" in name else []
     hint = did_you_mean(path.name, [*names, *siblings])
     known = f"the bundled meshes are {', '.join(names)}"

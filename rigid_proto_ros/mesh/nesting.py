@@ -85,7 +85,7 @@ def _hit(
 
 
 @njit(cache=True, nogil=True)
-def _shoot(  # noqa: PLR0913 - a kernel
+def _shoot(
     vertices: np.ndarray,
     triangles: np.ndarray,
     component: np.ndarray,
@@ -131,7 +131,7 @@ def _shoot(  # noqa: PLR0913 - a kernel
 
 
 @njit(cache=True, nogil=True)
-def _sides(  # noqa: PLR0913 - a kernel
+def _sides(
     vertices: np.ndarray,
     triangles: np.ndarray,
     component: np.ndarray,

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.bounded_file import read_bounded
 from ..base.compilation import njit
 from ..base.errors import MeshError, is_missing
 from . import cache as mesh_cache

@@ -57,7 +57,6 @@ class Flusher:
         self._writer = SceneWriter(initial_view)
         self._ghost_block: Block | None = None
         self._ghost_sent = 0
-        self._passed: list[threading.Event] = []
         self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         self._thread.start()
 
@@ -81,17 +80,16 @@ class Flusher:
         """Finish the file, if there is one; returns when it is whole."""
         if self.file is not None:
             self.file = None
-            self._wait_for("record")
+            finished = threading.Event()
+            self.mailbox.mark(-1, "record", None, finished)
+            self.mailbox.wake()
+            finished.wait(TIMEOUT_S)
 
     def serve(self, port: int, memory_limit: str) -> str:
         """Host the live stream; returns its address."""
         self.server = LiveServer(port, memory_limit)
         self.mailbox.mark(-1, "live", self.server.open_run(self.run_id, self.run_name))
         return self.server.address
-
-    def flush_now(self) -> None:
-        """Return when everything so far was handed to the file and the viewers."""
-        self._wait_for("pass")
 
     def close(self) -> None:
         """Send the rest, finish the file, end the thread."""
@@ -102,12 +100,6 @@ class Flusher:
             end_without_waiting()
             self._lost("recording stopped: the last states could not be written")
 
-    def _wait_for(self, kind: str) -> None:
-        done = threading.Event()
-        self.mailbox.mark(-1, kind, None, done)
-        self.mailbox.wake()
-        done.wait(TIMEOUT_S)
-
     # The thread
 
     def _flush_until_closed(self) -> None:
@@ -117,7 +109,7 @@ class Flusher:
                 self._flush()
                 if closing:
                     self._writer.send_pictures()
-            except Exception as error:  # noqa: BLE001
+            except Exception as error:
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
                 self._finish_file()
                 self._writer.streams.clear()
@@ -151,8 +143,6 @@ class Flusher:
                 self._give_up_file(error)
             if stream.missed and not stream.behind:
                 self._writer.catch_up(stream)
-        while self._passed:
-            self._passed.pop().set()
 
     def _flush_ghost(self, upto_reset: bool = False) -> None:
         """Send the ghost's states that wait, or those of the run that ends."""
@@ -188,8 +178,6 @@ class Flusher:
                 self._writer.attach(file)
             finished.set()
             self._forget_closed_recordings()
-        elif mark.kind == "pass":
-            self._passed.append(mark.content[1])
         elif mark.kind == "live":
             self._writer.attach(*mark.content)
 

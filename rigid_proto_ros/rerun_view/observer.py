@@ -201,11 +201,6 @@ class RerunObserver(Observer):
         """
         self._begin().open_file(Path(path))
 
-    def stop_recording(self) -> None:
-        """Finish the file; returns when it is whole."""
-        if self._flusher is not None:
-            self._flusher.close_file()
-
     # Inside
 
     def _mark(self, time_ns: int, kind: str, *content: Any) -> None:

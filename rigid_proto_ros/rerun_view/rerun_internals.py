@@ -17,7 +17,7 @@ import rerun as rr
 import rerun_bindings
 from rerun.recording_stream import RecordingStream
 
-# ruff: noqa: SLF001
+# ruff: noqa: SLF001 (what this module is for)
 
 
 class BlueprintStream:

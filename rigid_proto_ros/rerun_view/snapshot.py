@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from ..base.errors import InputError, one_of
-from ..base.output_file import output_file
+from ..base.files import output_file
 from ..session.recorded_session import RecordedSession
 from . import entities as e
 from .ports import LOOPBACK, any_free_port
@@ -30,9 +30,6 @@ DRAWN_STEADY_S = 10.0
 
 NOTICE_GONE_S = 6.0
 """After this the viewer's note that it runs without a window has left the corner of the window."""
-
-MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wgpu", "winit")
-"""Parts of the viewer whose warnings are about the machine, such as drawing without a graphics card."""
 
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
@@ -127,7 +124,7 @@ def _connected(address: str, process: ViewerProcess, log: Any) -> Any:
             client = ViewerClient.connect(address)
             client.get_state()
             return client
-        except Exception:  # noqa: BLE001
+        except Exception:
             # Not listening yet; the client raises errors of several kinds.
             time.sleep(0.1)
     log.seek(0)
@@ -149,21 +146,6 @@ def show(client: Any, recording: Path) -> None:
             return
         time.sleep(0.1)
     raise InputError("session", str(recording), f"a recording that the viewer loads within {LOAD_TIMEOUT_S:g} s")
-
-
-def complaints(client: Any) -> list[str]:
-    """What the viewer finds wrong with the recording: reports of the views shown at present, warnings it logged."""
-    reports = [
-        f"{view.name}: {report.severity}: {report.summary}"
-        for view in client.get_state().views
-        for report in view.reports
-    ]
-    logged = [
-        entry.message
-        for entry in client.get_logs()
-        if entry.level in ("WARN", "ERROR") and not entry.target.startswith(MACHINE_TARGETS)
-    ]
-    return reports + logged
 
 
 def _stable_picture(client: Any, view_id: str | None) -> bytes:

@@ -18,7 +18,7 @@ from typing import Any
 import rerun as rr
 
 from ..base.errors import InputError
-from ..base.output_file import output_file
+from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from .layout import Subject
 from .ports import LOOPBACK

@@ -18,7 +18,7 @@ from . import appearance
 from . import entities as e
 from .arrows import ArrowScale
 from .columns import Ticks, one_time, scalar_columns, time_columns
-from .disturbances import Disturbances
+from .derived import Disturbances
 from .ghost_picture import GhostPicture
 from .inertia_shapes import skewed
 from .layout import Subject

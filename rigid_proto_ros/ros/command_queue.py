@@ -38,7 +38,7 @@ class Unserved(CallbackGroup):
         """Never."""
         return False
 
-    def beginning_execution(self, entity: object) -> bool:  # noqa: ARG002
+    def beginning_execution(self, entity: object) -> bool:  # noqa: ARG002 (rclpy calls it so)
         """Never."""
         return False
 

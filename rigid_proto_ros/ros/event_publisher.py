@@ -48,7 +48,7 @@ class EventPublisher(Observer):
         self._events = publisher(String, "events", qos.EVENT)
         self._warned: dict[str, float] = {}
 
-    def scene_changed(self, time_ns: int, scene: str) -> None:  # noqa: ARG002 (an observer is told)
+    def scene_changed(self, time_ns: int, scene: str) -> None:  # noqa: ARG002 (an observer gets it)
         """All parameters, and the mesh's hash in a comment, as a parameter file."""
         self._scene.publish(cdr.string(scene))
 
@@ -73,7 +73,7 @@ class EventPublisher(Observer):
         if self._applied.get_subscription_count():
             self._applied.publish(applied_bytes(time_ns, self._body_frame, load, body, attitude))
 
-    def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002
+    def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002 (an observer gets it)
         """A warning, for what is refused when it comes and for what turns out impossible when it is to act.
 
         At most one a second for each reason: a flood of one kind doesn't hide what else goes wrong.
@@ -83,7 +83,7 @@ class EventPublisher(Observer):
             self._warned[reason] = now
             self._logger.warning(f"refused: {message}")
 
-    def event(self, time_ns: int, line: str) -> None:  # noqa: ARG002
+    def event(self, time_ns: int, line: str) -> None:  # noqa: ARG002 (an observer gets it)
         """A line of the event log."""
         if self.wants_events():
             self._events.publish(cdr.string(line))

@@ -154,7 +154,7 @@ class BackgroundThread:
             work, message, done = self._work.get()
             try:
                 work()
-            except Exception as error:  # noqa: BLE001 (a thread that ended would leave all later messages waiting)
+            except Exception as error:
                 message.refusal = CommandRefused(
                     "schedule", "schedule", repr(error)[:200], "a message that can be read"
                 )

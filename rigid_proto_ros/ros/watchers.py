@@ -34,7 +34,7 @@ class Watchers:
         path = scenario.parameters.record
         if not path:
             return None
-        from ..rerun_view.recorder import make_recorder
+        from ..rerun_view.session_files import make_recorder
 
         return make_recorder(path, self._node_name, scenario.parameters, self._on_error)
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
-from ..base.bounded_file import read_bounded
 from ..base.errors import InputError
+from ..base.files import read_bounded
 
 MAX_BYTES = 16 << 20
 """Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
@@ -69,7 +69,7 @@ def load_plain_yaml(text: str, name: str) -> Any:
     anything else.
     """
     try:
-        return yaml.load(text, Loader=_PlainLoader)  # noqa: S506 (it is a SafeLoader)
+        return yaml.load(text, Loader=_PlainLoader)
     except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
         raise _unreadable(error, name, "plain YAML") from None
 

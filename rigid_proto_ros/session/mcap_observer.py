@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.output_file import output_file
+from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from ..mesh.locate import resolve_mesh
 from ..messages import cdr, session_messages
@@ -169,7 +169,7 @@ class McapObserver(Observer):
                 self._write_waiting()
                 if closing and self._file is not None:
                     self._file.close()
-            except Exception as error:  # noqa: BLE001
+            except Exception as error:
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
                 self._lost(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
             if closing:

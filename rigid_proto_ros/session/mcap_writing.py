@@ -36,7 +36,7 @@ class McapFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         # Unbuffered: what was written survives a kill -9.
-        self._stream = open(path, "wb", buffering=0)  # noqa: SIM115
+        self._stream = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by close)
         self._inode = path.stat().st_ino
         self._at = 0
         self._schemas: list[records.Schema] = []

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.bundled import body_names
 from ..base.errors import InputError, MeshError
-from ..mesh.locate import bundled_names
 from ..mesh.reading import Mesh, load_mesh
 from ..messages.session_messages import StampedRows
 
@@ -96,7 +96,7 @@ def find_mesh(
     places = [name]
     if folder is not None:
         places.append(str(folder / Path(name).name))
-    for place in (*places, *bundled_names()):
+    for place in (*places, *body_names()):
         try:
             mesh = load_mesh(place)
         except InputError:

@@ -87,7 +87,7 @@ _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1]
 
 
 @njit(cache=True, error_model="numpy")
-def _fly(  # noqa: PLR0913
+def _fly(
     settings: np.ndarray,
     times: np.ndarray,
     body: np.ndarray,
@@ -145,7 +145,7 @@ def _fly(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _one(  # noqa: PLR0913
+def _one(
     i: int,
     settings: np.ndarray,
     ballast: np.ndarray,
@@ -190,7 +190,7 @@ def _tables(variants: tuple, references: tuple) -> tuple[np.ndarray, ...]:
     return f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
 
 
-def _fly_block(  # noqa: PLR0913
+def _fly_block(
     first: int,
     last: int,
     variants: _Flights,

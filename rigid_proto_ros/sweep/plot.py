@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, is_missing
-from ..base.output_file import output_file
+from ..base.files import output_file
 from .table import read_columns
 
 _KEYS = ("x", "y", "color", "to", "log")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.output_file import output_file
+from ..base.files import output_file
 from ..scene.command_codec import ScriptCommand
 from ..scene.declaration import Value
 from ..scene.parameters import Parameters

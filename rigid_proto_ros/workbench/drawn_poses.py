@@ -68,11 +68,6 @@ class DrawnPoses:
         """Another body, or another flight: old poses mean nothing."""
         self._drawn.clear()
 
-    @property
-    def latest(self) -> DrawnPose | None:
-        """The pose drawn last."""
-        return self._drawn[-1] if self._drawn else None
-
     def usual(self, now_s: float) -> DrawnPose | None:
         """The pose that an event arriving now has most likely seen."""
         for pose in reversed(self._drawn):

@@ -100,11 +100,6 @@ class LessonFolder:
         )
         self._text.content = "\n".join(steps) + f"\n\n{lesson.reason}"
 
-    @property
-    def steps_done(self) -> int:
-        """How many steps of the lesson are marked as carried out."""
-        return self._progress.done
-
     def did(self, what: str) -> None:
         """Something that a step may ask for, as lesson_progress.STEPS names it, was done on the page."""
         if self._progress.did(what):

@@ -16,8 +16,8 @@ import zlib
 from collections.abc import Mapping
 from typing import Any
 
+from ..base.bundled import body_names
 from ..base.errors import InputError
-from ..mesh.locate import bundled_names
 from ..scene.command_codec import flow
 from ..scene.parameters import PARAMETERS, convert_all
 from ..scene.scenario import scene_text
@@ -133,5 +133,5 @@ def _check_parameters(values: Mapping[str, object], where: str) -> None:
             f"{where}, {name}", values[name], "a scene to look at: a link sets nothing of the program itself"
         )
     mesh = values.get("mesh", "")
-    if mesh and mesh not in bundled_names():
-        raise InputError(f"{where}, mesh", mesh, f"a bundled body, which a link can name: {', '.join(bundled_names())}")
+    if mesh and mesh not in body_names():
+        raise InputError(f"{where}, mesh", mesh, f"a bundled body, which a link can name: {', '.join(body_names())}")

@@ -24,7 +24,7 @@ from websockets.http11 import Request, Response
 
 from .upload import ACCEPTED, MAX_BYTES, shown_name
 
-# ruff: noqa: SLF001
+# ruff: noqa: SLF001 (what this module is for)
 
 PART_BYTES = 512 * 1024
 """viser's pages send files in parts of this size."""

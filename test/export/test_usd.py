@@ -16,7 +16,7 @@ from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 
 pxr = pytest.importorskip("pxr")
-from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation  # noqa: E402
+from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 
 
 def broken_rules(stage) -> list[str]:

@@ -86,7 +86,7 @@ class MeasuredThrow:
         """
         alike = self.truth.theta.copy()
         alike[mp.MASS] = theta[mp.MASS]
-        change = np.array([theta[mp.MASS] - self.truth.theta[mp.MASS], *mp.physical_change(alike, theta)[1:]])
+        change = np.array([theta[mp.MASS] - self.truth.theta[mp.MASS], *mf.physical_change(alike, theta)[1:]])
         return float(np.linalg.norm(self.bound().root @ change) / np.sqrt(mp.PARAMETERS))
 
 

@@ -5,20 +5,38 @@ seeded generator.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import measurements as ms
 from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify import trajectories as tr
 from rigid_proto_ros.identify.mass_parameters import parameters_of
 from rigid_proto_ros.identify.unknowns import Values
+from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.motion.loads import Load
 
 MOCAP = (0.5e-3, np.radians(0.2))
 """Of position [m] and attitude [rad], each component."""
 PHONE = (0.005, 0.05)
 """Of a phone's rates [rad/s] and accelerations [m/s²] at 200 Hz, each component."""
+
+
+def physical_change(theta: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """How far another body is from this one (10,), in the order of ``SEEN``.
+
+    The mass by its logarithm, the tensor's difference in this one's principal axes, each entry by the root of its two
+    moments, the COM in metres. Unlike angles of axes these stay regular where two moments agree.
+    """
+    this, that = mp.mass_of(theta), mp.mass_of(other)
+    moments, axes = principal_axes(this.inertia)
+    change = (axes.T @ (that.inertia - this.inertia) @ axes) / np.sqrt(np.outer(moments, moments))
+    a, b, c = np.diag(change)
+    tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, change[1, 2], change[0, 2], change[0, 1])
+    return np.array([math.log(that.mass / this.mass), *tensor, *(that.center_of_mass - this.center_of_mass)])
 
 
 def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0), topics=1) -> Values:

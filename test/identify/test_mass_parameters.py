@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from measured_flights import physical_change
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.identify import mass_parameters as mp
@@ -57,7 +58,7 @@ def test_a_changed_tensor_is_as_far_off_as_it_was_changed() -> None:
     theta = np.random.default_rng(4).normal(0.0, 0.3, 10)
     change = np.array([0.03, -0.02, 0.01, 0.02, -0.01, 0.015])
     changed = mp.changed_tensor(mp.mass_of(theta), change)
-    found = mp.physical_change(theta, mp.parameters_of(changed.mass, changed.center_of_mass, changed.inertia))
+    found = physical_change(theta, mp.parameters_of(changed.mass, changed.center_of_mass, changed.inertia))
     assert found[1:7] == pytest.approx(change, abs=1e-12)
     assert np.abs(found[[0, 7, 8, 9]]).max() < 1e-12
 

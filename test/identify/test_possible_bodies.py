@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from measured_flights import physical_change
 
 from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify.possible_bodies import is_possible, possible_step
@@ -34,7 +35,7 @@ def test_a_held_step_is_possible_and_no_possible_one_beside_it_is_better() -> No
             other = rng.normal(0.0, 1.0, 10)
             towards = mp.possible_tensor(mp.changed_tensor(body, other[1:7]).inertia, 1e-9)
             theta = mp.parameters_of(body.mass, body.center_of_mass, towards)
-            other[1:7] = mp.physical_change(mp.parameters_of(body.mass, body.center_of_mass, body.inertia), theta)[1:7]
+            other[1:7] = physical_change(mp.parameters_of(body.mass, body.center_of_mass, body.inertia), theta)[1:7]
             beside = step + 1e-3 * (other - step)
             assert np.sum((jacobian @ beside + residuals) ** 2) > best * (1.0 - 1e-6)
     assert held > 10

@@ -6,8 +6,8 @@ import pytest
 from flights import SECOND, bundled_body, flight, spinning, wrench
 from reference_motion import angle_between, free_motion
 
+from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.mass.properties import MeshMoments
-from rigid_proto_ros.mesh.locate import bundled_names
 from rigid_proto_ros.motion.body import make_body
 
 # Check case 2, a tumbling brick without torque: Jackson, Shelton, Jackson, Castro, Noble, "Further Development of
@@ -48,7 +48,7 @@ def test_nasa_tumbling_brick_from_its_mesh():
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
-@pytest.mark.parametrize("name", bundled_names())
+@pytest.mark.parametrize("name", body_names())
 def test_bundled_bodies_tumble_as_they_should_with_rk4(name, direction):
     """10 rad/s at 1 kHz: energy and L over 60 s, attitude against the closed form after 10 s."""
     body = bundled_body(name)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_proto_ros.base.bundled import body_names, body_path
+from rigid_proto_ros.base.bundled import body_names
+from rigid_proto_ros.mesh.locate import resolve_mesh
 
 NAMES = ("book", "hammer", "hollow_box", "l_bracket", "spinning_top", "t_handle", "teapot", "tennis_racket")
 
@@ -51,7 +52,7 @@ def test_the_bodies_are_the_promised_ones() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_body_is_a_closed_outward_wound_solid(name: str) -> None:
-    vertices, triangles = read(body_path(name))
+    vertices, triangles = read(resolve_mesh(name))
     assert np.isfinite(vertices).all()
     assert len(np.unique(vertices, axis=0)) == len(vertices), "duplicate vertices"
     assert np.array_equal(np.unique(triangles), np.arange(len(vertices))), "unused or missing vertices"
@@ -75,7 +76,7 @@ def test_body_is_a_closed_outward_wound_solid(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_surface_encloses_each_point_once_or_not_at_all(name: str) -> None:
-    vertices, triangles = read(body_path(name))
+    vertices, triangles = read(resolve_mesh(name))
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -98,7 +99,7 @@ def winding_number(point: np.ndarray, corners: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_body_is_one_solid_of_a_size_one_holds(name: str) -> None:
-    vertices, triangles = read(body_path(name))
+    vertices, triangles = read(resolve_mesh(name))
     assert parts(triangles) == (2 if name == "hollow_box" else 1)
     assert 250 <= len(triangles) <= 7000
     assert 0.05 <= np.ptp(vertices, axis=0).max() <= 0.7
@@ -111,7 +112,7 @@ def test_body_has_the_size_that_its_description_states(name: str) -> None:
 
     stated = re.search(r"Size ([0-9.]+) x ([0-9.]+) x ([0-9.]+) m\.", BODIES[name].__doc__)
     assert stated, name
-    assert np.ptp(read(body_path(name))[0], axis=0) == pytest.approx([float(x) for x in stated.groups()], abs=5.1e-4)
+    assert np.ptp(read(resolve_mesh(name))[0], axis=0) == pytest.approx([float(x) for x in stated.groups()], abs=5.1e-4)
 
 
 def test_the_lesson_states_the_size_of_the_book() -> None:
@@ -119,11 +120,11 @@ def test_the_lesson_states_the_size_of_the_book() -> None:
     if not page.is_file():
         pytest.skip("not run from a source tree")
     stated = re.search(r"([0-9.]+) cm wide, ([0-9.]+) cm high\s+and ([0-9.]+) cm thick", page.read_text("utf-8"))
-    assert 100.0 * np.ptp(read(body_path("book"))[0], axis=0) == pytest.approx([float(x) for x in stated.groups()])
+    assert 100.0 * np.ptp(read(resolve_mesh("book"))[0], axis=0) == pytest.approx([float(x) for x in stated.groups()])
 
 
 def test_hollow_box_weighs_the_walls_alone() -> None:
-    vertices, triangles = read(body_path("hollow_box"))
+    vertices, triangles = read(resolve_mesh("hollow_box"))
     volume = moments(vertices, triangles)[0]
     walls = 0.20 * 0.12 * 0.08 - 0.19 * 0.11 * 0.07
     # Rounded edges take away a little: measured 0.9905 of the sharp box's walls.
@@ -131,7 +132,7 @@ def test_hollow_box_weighs_the_walls_alone() -> None:
 
 
 def test_t_handle_spins_about_its_middle_axis() -> None:
-    _, com, inertia = moments(*read(body_path("t_handle")))
+    _, com, inertia = moments(*read(resolve_mesh("t_handle")))
     ixx, iyy, izz = np.diag(inertia)
     # Measured 1 : 1.418 : 2.376.
     assert 1.2 * iyy < izz < ixx / 1.2
@@ -140,7 +141,7 @@ def test_t_handle_spins_about_its_middle_axis() -> None:
 
 
 def test_hammer_com_lies_far_from_the_box_centre() -> None:
-    vertices, triangles = read(body_path("hammer"))
+    vertices, triangles = read(resolve_mesh("hammer"))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     offset = np.linalg.norm(moments(vertices, triangles)[1] - (low + high) / 2.0) / np.linalg.norm(high - low)
     # Measured 0.23 of the diagonal.
@@ -148,14 +149,14 @@ def test_hammer_com_lies_far_from_the_box_centre() -> None:
 
 
 def test_l_bracket_has_all_three_products_of_inertia() -> None:
-    inertia = moments(*read(body_path("l_bracket")))[2]
+    inertia = moments(*read(resolve_mesh("l_bracket")))[2]
     off_diagonal = np.abs(inertia[np.triu_indices(3, 1)]) / inertia.max()
     # Measured 0.0087, 0.235 and 0.0019 of the largest entry.
     assert off_diagonal.min() > 1e-3
 
 
 def test_spinning_top_is_symmetric_about_its_axis() -> None:
-    inertia = moments(*read(body_path("spinning_top")))[2]
+    inertia = moments(*read(resolve_mesh("spinning_top")))[2]
     # Coordinates are rounded to 10 nm on a radius of 36 mm.
     assert abs(inertia[0, 0] - inertia[1, 1]) < 1e-6 * inertia[2, 2]
 
@@ -166,7 +167,7 @@ def test_generator_reproduces_the_committed_body(name: str) -> None:
     from bundled_bodies.catalogue import BODIES
 
     made_vertices, made_triangles = BODIES[name]()
-    vertices, triangles = read(body_path(name))
+    vertices, triangles = read(resolve_mesh(name))
     # Another machine's sine may differ in its last bit and so move one written digit, 10 nm; mass properties don't notice.
     made, kept = moments(made_vertices, made_triangles), moments(vertices, triangles)
     assert made[0] == pytest.approx(kept[0], rel=1e-6)

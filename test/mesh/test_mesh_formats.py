@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text
 
+from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh import reading as mesh_io
-from rigid_proto_ros.mesh.locate import bundled_names
 from rigid_proto_ros.mesh.numbers_in_text import read_numbers
 from rigid_proto_ros.mesh.reading import load_mesh
 
@@ -196,8 +196,8 @@ def test_our_readers_agree_with_trimesh_on_files_it_writes(tmp_path, meshes):
         assert np.max(np.abs(corners - expected)) <= 1e-7 * np.max(np.abs(expected)), name
 
 
-def test_bundled_names_and_package_uris_find_the_same_file():
-    assert {"t_handle", "hammer", "hollow_box"} <= set(bundled_names())
+def test_names_of_bundled_bodies_and_package_uris_find_the_same_file():
+    assert {"t_handle", "hammer", "hollow_box"} <= set(body_names())
     by_name, by_uri = load_mesh("t_handle"), load_mesh("package://rigid_proto_ros/bodies/t_handle.obj")
     assert by_name.path == by_uri.path
     assert by_name.sha256 == by_uri.sha256

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from rigid_proto_ros.messages import cdr
 
 pytest.importorskip("rclpy")
-from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped  # noqa: E402
-from nav_msgs.msg import Odometry  # noqa: E402
-from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import String
 
-from rigid_proto_ros.ros.command_intake import read_wrench_stamped  # noqa: E402
+from rigid_proto_ros.ros.command_intake import read_wrench_stamped
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=40)
 stamps = st.integers(0, 2**31 * 10**9 - 1)

@@ -9,8 +9,8 @@ import pytest
 
 rr = pytest.importorskip("rerun", reason="rerun-sdk is not installed: no recordings")
 
-import rerun.blueprint as rrb  # noqa: E402
-import rerun_bindings  # noqa: E402
+import rerun.blueprint as rrb
+import rerun_bindings
 
 HINT = f"rerun-sdk {rr.__version__}: see rerun_view/rerun_internals.py"
 

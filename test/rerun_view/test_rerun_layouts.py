@@ -10,18 +10,18 @@ import pytest
 
 pytest.importorskip("rerun", reason="rerun-sdk is not installed: no recordings")
 
-from rerun.chunk import RrdReader  # noqa: E402
+from rerun.chunk import RrdReader
 
-from rigid_proto_ros.cli.main import main  # noqa: E402
-from rigid_proto_ros.rerun_view import appearance  # noqa: E402
-from rigid_proto_ros.rerun_view import entities as e  # noqa: E402
-from rigid_proto_ros.rerun_view.derived import angle_to  # noqa: E402
-from rigid_proto_ros.rerun_view.inertia_shapes import skewed  # noqa: E402
-from rigid_proto_ros.rerun_view.layout import Subject, layout  # noqa: E402
-from rigid_proto_ros.rerun_view.plot_range import with_two_ticks  # noqa: E402
-from rigid_proto_ros.rerun_view.plots import Ranges  # noqa: E402
-from rigid_proto_ros.rerun_view.reader import record_batches  # noqa: E402
-from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view import appearance
+from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.derived import angle_to
+from rigid_proto_ros.rerun_view.inertia_shapes import skewed
+from rigid_proto_ros.rerun_view.layout import Subject, layout
+from rigid_proto_ros.rerun_view.plot_range import with_two_ticks
+from rigid_proto_ros.rerun_view.plots import Ranges
+from rigid_proto_ros.rerun_view.reader import record_batches
+from rigid_proto_ros.scene.offline import read_scene
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,26 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.rerun_view import RerunObserver, ports, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.snapshot import DRIVERS, complaints, headless_viewer, show
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, headless_viewer, show
+
+MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wgpu", "winit")
+"""Parts of the viewer whose warnings are about the machine, such as drawing without a graphics card."""
+
+
+def complaints(client) -> list[str]:
+    """What the viewer finds wrong with the recording: reports of the views shown at present, warnings it logged."""
+    reports = [
+        f"{view.name}: {report.severity}: {report.summary}"
+        for view in client.get_state().views
+        for report in view.reports
+    ]
+    logged = [
+        entry.message
+        for entry in client.get_logs()
+        if entry.level in ("WARN", "ERROR") and not entry.target.startswith(MACHINE_TARGETS)
+    ]
+    return reports + logged
+
 
 WAIT_S = 180.0
 

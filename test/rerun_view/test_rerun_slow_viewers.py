@@ -84,7 +84,7 @@ def test_resets_and_bodies_of_every_size_leave_no_threads_behind(tmp_path):
         for k, row in enumerate(flight.rows(4)):
             observer.body_changed(k, replace(flight.BODY, scale=flight.SCALE * 10.0 ** (k % 2)))
             observer.state(k * flight.PERIOD_NS, row)
-        observer._flusher.flush_now()
+        flight.flush(observer)
 
     observer = RerunObserver(record=str(tmp_path / "session.rrd"), viewer="serve")
     try:
@@ -119,7 +119,7 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
             observer.state(k * 1_000_000, states[k % 1000])
             if k % 2000 == 1999:
                 # Or viewers would be spared most of it, and nothing would have to be dropped.
-                observer._flusher.flush_now()
+                flight.flush(observer)
         watcher = viewers.ViewerProcess("--connect", observer.live_address, "--save", str(saved))
         _wait_for(lambda: e.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
         seen = _entities(saved)
@@ -145,7 +145,7 @@ def _entities(path: Path) -> dict[str, list[int]]:
                 times += [int(t.value) for t in batch.column(e.SIM_TIME)]
             else:
                 times.append(-1)
-    except Exception:  # noqa: BLE001
+    except Exception:
         # Cut where the viewer has got to.
         pass
     return found

@@ -283,7 +283,7 @@ def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services)
 
 def test_the_only_entity_is_found_by_name_category_and_place(services):
     answer, node = services
-    find = lambda **filters: answer._entity.get_entities(filtered(**filters), response())  # noqa: E731
+    find = lambda **filters: answer._entity.get_entities(filtered(**filters), response())  # noqa: E731 (one line, used in the next ones)
     assert [find(filter=text).entities for text in ("", "^to+l$", "chair")] == [["tool"], ["tool"], []]
     assert find(categories=[1]).entities == [] and find(categories=[1, 4]).entities == ["tool"]
     assert find(tags=["red"]).result.result == UNSUPPORTED and find(bounds=1).result.result == UNSUPPORTED

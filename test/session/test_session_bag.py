@@ -22,9 +22,9 @@ from flights import SECOND
 from mcap.writer import CompressionType
 from ros_process import running_node
 
-from rigid_proto_ros.base.bundled import body_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.messages.session_messages import read_text
 from rigid_proto_ros.rerun_view.session_files import read_runs
@@ -35,7 +35,7 @@ from rigid_proto_ros.session.check import verify
 def flown(ros_environment, tmp_path_factory) -> list[Logged]:
     """Two runs of a node, poked, pulled and changed in both; the reset between them takes changed parameters along."""
     folder = tmp_path_factory.mktemp("flown")
-    shutil.copy(body_path("l_bracket"), folder / "bracket.obj")
+    shutil.copy(resolve_mesh("l_bracket"), folder / "bracket.obj")
     recorder = BagRecorder(ros_environment)
     arguments = ["-p", f"mesh:={folder / 'bracket.obj'}", "-p", "initial.angular_velocity:=[0.3, 2.0, 0.1]"]
     arguments += ["-p", "contacts.tip:=[0.01, 0.0, 0.0]", "-p", "start_paused:=true"]
@@ -75,7 +75,7 @@ def _fly(client: RosClient) -> None:
 @pytest.fixture
 def mesh_beside(tmp_path) -> None:
     """The file that the node flew, where a bag's reader looks for it."""
-    shutil.copy(body_path("l_bracket"), tmp_path / "bracket.obj")
+    shutil.copy(resolve_mesh("l_bracket"), tmp_path / "bracket.obj")
 
 
 LAYOUTS = {
@@ -123,7 +123,7 @@ def test_the_second_run_begins_with_the_scene_in_force_at_its_reset(flown, tmp_p
 
 
 def test_a_mesh_that_is_nowhere_is_named_with_its_hash(flown, tmp_path, monkeypatch):
-    monkeypatch.setattr("rigid_proto_ros.session.recorded_session.bundled_names", tuple)
+    monkeypatch.setattr("rigid_proto_ros.session.recorded_session.body_names", tuple)
     LAYOUTS["bare"](tmp_path / "bag", flown)
     (run, _) = read_runs(tmp_path / "bag.mcap")
     with pytest.raises(InputError, match=f"bracket.obj.*{run.mesh_sha256}"):

@@ -20,9 +20,10 @@ pytest.importorskip("mcap_ros2")
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from rigid_proto_ros.base.bundled import body_path, example_path, scene_path
+from rigid_proto_ros.base.bundled import example_path, scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.messages.session_messages import twist_row
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
@@ -124,7 +125,7 @@ def test_the_summary_counts_what_is_there_and_the_mesh_file_is_inside(flown):
     assert all("offered_qos_profiles" in c.metadata for c in summary.channels.values())
     # A cut costs a chunk: none holds more than half a second.
     assert all(c.message_end_time - c.message_start_time <= SECOND // 2 for c in summary.chunk_indexes)
-    assert hashlib.sha256(attachment.data).digest() == hashlib.sha256(body_path("t_handle").read_bytes()).digest()
+    assert hashlib.sha256(attachment.data).digest() == hashlib.sha256(resolve_mesh("t_handle").read_bytes()).digest()
 
 
 def test_a_session_is_read_back_and_verified(flown):
@@ -142,7 +143,7 @@ def test_a_session_is_read_back_and_verified(flown):
 def test_the_mesh_comes_from_inside_where_its_file_is_gone(tmp_path):
     mesh = tmp_path / "mine.obj"
     # Not a bundled one's bytes.
-    mesh.write_text("# mine\n" + body_path("book").read_text())
+    mesh.write_text("# mine\n" + resolve_mesh("book").read_text())
     session = tmp_path / "session.mcap"
     scene = tmp_path / "scene.yaml"
     scene.write_text(
@@ -155,7 +156,7 @@ def test_the_mesh_comes_from_inside_where_its_file_is_gone(tmp_path):
 
 def test_a_mesh_changed_in_flight_is_inside_too(tmp_path):
     for name in ("book", "hammer"):
-        (tmp_path / f"{name}.obj").write_text("# mine\n" + body_path(name).read_text())
+        (tmp_path / f"{name}.obj").write_text("# mine\n" + resolve_mesh(name).read_text())
     script = tmp_path / "script.yaml"
     script.write_text(
         f"- {{t: 0.2, set: {{mesh: {tmp_path / 'hammer.obj'}}}}}\n- {{t: 0.3, at: com, impulse: [1, 0, 0]}}\n"

@@ -19,12 +19,11 @@ import numpy as np
 from sweep_studies import PULLED, study
 
 from rigid_proto_ros.base import elementary as el
-from rigid_proto_ros.base.bundled import scene_names
+from rigid_proto_ros.base.bundled import body_names, scene_names
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.provenance import MOTION
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import principal_axes
-from rigid_proto_ros.mesh.locate import bundled_names
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
@@ -171,7 +170,7 @@ def elementary() -> dict[str, str]:
 
 def hashes() -> dict[str, str]:
     found = {f"function {name}": value for name, value in elementary().items()}
-    for name in sorted(bundled_names()):
+    for name in sorted(body_names()):
         mesh = load_mesh(name)
         found[f"mass of {name}"] = mass_properties(MeshMoments(mesh.vertices, mesh.triangles, name=name))
     found["mass of 19200 triangles"] = mass_properties(rounded_cube(40))

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from rigid_proto_ros.workbench.lesson_progress import LessonProgress  # noqa: E402
+from rigid_proto_ros.workbench.lesson_progress import LessonProgress
 
 PERIOD_NS = 100_000_000
 

@@ -13,15 +13,15 @@ from scene_stand_in import SceneStandIn
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from rigid_proto_ros.rerun_view.plot_range import plot_range  # noqa: E402
-from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
-from rigid_proto_ros.simulation.simulation import Simulation  # noqa: E402
-from rigid_proto_ros.workbench.keys import KEYS  # noqa: E402
-from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text  # noqa: E402
-from rigid_proto_ros.workbench.poke_mark import PokeMark  # noqa: E402
-from rigid_proto_ros.workbench.soft_shadow import CELLS, sampled, shadow_picture  # noqa: E402
-from rigid_proto_ros.workbench.surroundings import CELL, SECTION, Surroundings  # noqa: E402
-from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point  # noqa: E402
+from rigid_proto_ros.rerun_view.plot_range import plot_range
+from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.simulation.simulation import Simulation
+from rigid_proto_ros.workbench.keys import KEYS
+from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text
+from rigid_proto_ros.workbench.poke_mark import PokeMark
+from rigid_proto_ros.workbench.soft_shadow import CELLS, sampled, shadow_picture
+from rigid_proto_ros.workbench.surroundings import CELL, SECTION, Surroundings
+from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point
 
 
 def test_every_key_stands_in_the_docs() -> None:

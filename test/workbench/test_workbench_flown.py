@@ -11,10 +11,10 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 
-from flown_page import FlownLink, FlownPage  # noqa: E402
+from flown_page import FlownLink, FlownPage
 
-from rigid_proto_ros.workbench import controls  # noqa: E402
-from rigid_proto_ros.workbench import page as page_module  # noqa: E402
+from rigid_proto_ros.workbench import controls
+from rigid_proto_ros.workbench import page as page_module
 
 
 @pytest.fixture

@@ -20,9 +20,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser to drive")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the PATH: no browser to drive")
 
-from test_workbench_without_browser import Desk, StandIn  # noqa: E402
+from test_workbench_without_browser import Desk, StandIn
 
-from rigid_proto_ros.workbench import page as page_module  # noqa: E402
+from rigid_proto_ros.workbench import page as page_module
 
 DESKTOP, PHONE = {"width": 1100, "height": 700}, {"width": 390, "height": 844}
 

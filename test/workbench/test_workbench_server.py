@@ -13,15 +13,15 @@ import pytest
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from rigid_proto_ros.base.errors import InputError  # noqa: E402
-from rigid_proto_ros.cli.main import main  # noqa: E402
-from rigid_proto_ros.cli.processes import Processes  # noqa: E402
-from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port  # noqa: E402
-from rigid_proto_ros.workbench.controls import Controls  # noqa: E402
-from rigid_proto_ros.workbench.listening import choose_page_port  # noqa: E402
-from rigid_proto_ros.workbench.server import make_server, refusal, stop_server  # noqa: E402
-from rigid_proto_ros.workbench.upload import MAX_BYTES  # noqa: E402
-from rigid_proto_ros.workbench.viser_internals import MAX_TRANSFERS, PART_BYTES, guard_uploads  # noqa: E402
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.cli.processes import Processes
+from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+from rigid_proto_ros.workbench.controls import Controls
+from rigid_proto_ros.workbench.listening import choose_page_port
+from rigid_proto_ros.workbench.server import make_server, refusal, stop_server
+from rigid_proto_ros.workbench.upload import MAX_BYTES
+from rigid_proto_ros.workbench.viser_internals import MAX_TRANSFERS, PART_BYTES, guard_uploads
 
 OPENED: list[str] = []
 

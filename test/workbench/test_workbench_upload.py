@@ -13,15 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from rigid_proto_ros.base.bundled import body_path
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh import cache as mesh_cache
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.workbench.upload import MAX_BYTES, Uploads, shown_name
 
-BOOK = body_path("book").read_bytes()
+BOOK = resolve_mesh("book").read_bytes()
 OPEN = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n"
 
 
@@ -214,7 +214,7 @@ def test_a_thousand_uploads_in_a_row_leave_one_file_then_none(place: Path) -> No
 def test_the_end_of_the_process_removes_its_uploads(place: Path) -> None:
     code = (
         "import sys; from rigid_proto_ros.workbench.upload import Uploads; u = Uploads()\n"
-        f"print(u.take('x.obj', open({str(body_path('book'))!r}, 'rb').read()).path)\n1/0\n"
+        f"print(u.take('x.obj', open({str(resolve_mesh('book'))!r}, 'rb').read()).path)\n1/0\n"
     )
     environment = {**os.environ, "TMPDIR": str(place), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)

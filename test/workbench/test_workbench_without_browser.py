@@ -14,11 +14,11 @@ from workbench_page import bare_page
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 
-from rigid_proto_ros.scene.offline import read_scene  # noqa: E402
-from rigid_proto_ros.workbench import node_control  # noqa: E402
-from rigid_proto_ros.workbench import page as page_module  # noqa: E402
-from rigid_proto_ros.workbench.node_control import ParameterSetter  # noqa: E402
-from rigid_proto_ros.workbench.ros_link import Received  # noqa: E402
+from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.workbench import node_control
+from rigid_proto_ros.workbench import page as page_module
+from rigid_proto_ros.workbench.node_control import ParameterSetter
+from rigid_proto_ros.workbench.ros_link import Received
 
 PATIENCE_S = 60.0
 STEP_NS = 100_000_000

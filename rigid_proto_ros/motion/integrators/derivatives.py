@@ -42,7 +42,7 @@ def _cross_into(M: np.ndarray, scale: float, x: float, y: float, z: float, row: 
 
 
 @njit(cache=True, error_model="numpy")
-def derivatives(  # noqa: PLR0913
+def derivatives(
     q: np.ndarray,
     w: np.ndarray,
     d: np.ndarray,
@@ -111,7 +111,7 @@ def derivatives(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _string_derivatives(  # noqa: PLR0913
+def _string_derivatives(
     q: np.ndarray,
     w: np.ndarray,
     d: np.ndarray,

@@ -88,7 +88,7 @@ def added_acceleration(
 
 
 @njit(cache=True, error_model="numpy")
-def knot(  # noqa: PLR0913
+def knot(
     qx: float,
     qy: float,
     qz: float,
@@ -113,7 +113,7 @@ def knot(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def string_pull(  # noqa: PLR0913
+def string_pull(
     qx: float,
     qy: float,
     qz: float,
@@ -155,7 +155,7 @@ def string_pull(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def accelerations(  # noqa: PLR0913
+def accelerations(
     qx: float,
     qy: float,
     qz: float,

@@ -64,7 +64,7 @@ _WEIGHTS_8 = (
 
 
 @njit(cache=True, error_model="numpy")
-def free_step(  # noqa: PLR0913
+def free_step(
     qx: float,
     qy: float,
     qz: float,
@@ -171,7 +171,7 @@ def _third(w3: float, twist: float, beta: float, rate: float, m: float, t: float
 
 
 @njit(cache=True, error_model="numpy")
-def _short(  # noqa: PLR0913
+def _short(
     A: float, B: float, C: float, w1: float, w2: float, w3: float, P: float, rate: float, m: float, h: float
 ) -> tuple[float, float, float, float]:
     """w and ψ after a short h; w as increments, which keeps energy and momentum from drifting."""
@@ -215,7 +215,7 @@ def _short(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _long(  # noqa: PLR0913
+def _long(
     A: float, B: float, C: float, w1: float, w2: float, w3: float, P: float, Q: float, rate: float, h: float
 ) -> tuple[float, float, float, float]:
     """w and ψ after any h."""

@@ -50,7 +50,7 @@ def _guess(y: np.ndarray, V: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def two_halves(  # noqa: PLR0913
+def two_halves(
     y: np.ndarray,
     p: np.ndarray,
     h: float,
@@ -76,7 +76,7 @@ def two_halves(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _compared(  # noqa: PLR0913
+def _compared(
     y: np.ndarray,
     p: np.ndarray,
     h: float,
@@ -156,7 +156,7 @@ def _switch_in_half(y: np.ndarray, p: np.ndarray, h: float, taut: bool, V: np.nd
 
 
 @njit(cache=True, error_model="numpy")
-def implicit_step(  # noqa: PLR0913
+def implicit_step(
     y: np.ndarray,
     p: np.ndarray,
     control: np.ndarray,

@@ -62,7 +62,7 @@ def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float, float,
 
 
 @njit(cache=True, error_model="numpy")
-def _moved(  # noqa: PLR0913
+def _moved(
     y: np.ndarray,
     p: np.ndarray,
     k: int,

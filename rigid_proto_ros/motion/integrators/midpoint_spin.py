@@ -66,7 +66,7 @@ def gyroscopic_torque(ox: float, oy: float, oz: float, p: np.ndarray) -> tuple[f
 
 
 @njit(cache=True, error_model="numpy")
-def newton_correction(  # noqa: PLR0913
+def newton_correction(
     ox: float,
     oy: float,
     oz: float,

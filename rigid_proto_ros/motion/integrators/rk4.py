@@ -43,7 +43,7 @@ _Ten = tuple[float, float, float, float, float, float, float, float, float, floa
 
 
 @njit(cache=True, error_model="numpy")
-def _rates(  # noqa: PLR0913
+def _rates(
     qx: float,
     qy: float,
     qz: float,
