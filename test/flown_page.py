@@ -15,7 +15,7 @@ from workbench_page import bare_page
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.messages.cdr import wrench_stamped
-from rigid_proto_ros.messages.session_messages import read_text
+from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import core_command, of_message, string_attach, string_target
 from rigid_proto_ros.scene.scenario import Scenario, make_scenario, nanoseconds
@@ -94,7 +94,7 @@ class FlownLink:
         if topic != "schedule":
             self.command(of_message(topic, data))
             return
-        entries = read_schedule(read_text(data, topic))
+        entries = read_schedule(read_string(data, topic))
         for number, command in enumerate(expand_schedule(entries, 1.5)):
             self.command(command, (data, number) if isinstance(entries, list) else None)
 

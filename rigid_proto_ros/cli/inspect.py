@@ -15,7 +15,7 @@ from ..base.errors import InputError
 from ..base.progress import Progress
 from ..mass.export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.from_mesh import FALLBACKS, UNION, mesh_body
-from ..mass.inspection import JSON_KEYS, MODELS, Inspection, as_json, inspect_mesh, verify
+from ..mass.inspection import JSON_KEYS, MODELS, Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.properties import scale_vector
 from ..mass.verdict import ERROR, Finding
 from ..mesh.locate import resolve_mesh
@@ -230,7 +230,7 @@ def _verify(inspection: Inspection, report: dict) -> int:
     report["verification"] = None
     body = inspection.body
     with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
-        report["verification"] = verify(body, inspection.scale, progress.fraction)
+        report["verification"] = verify_moments(body, inspection.scale, progress.fraction)
     if max(report["verification"].values()) <= VERIFIED:
         return 0
     print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)

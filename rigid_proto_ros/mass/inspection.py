@@ -142,7 +142,9 @@ def as_json(inspection: Inspection) -> dict:
     }
 
 
-def verify(body: MeshBody, scale: np.ndarray, progress: Callable[[int, int], None] | None = None) -> dict[str, float]:
+def verify_moments(
+    body: MeshBody, scale: np.ndarray, progress: Callable[[int, int], None] | None = None
+) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
     moments.solid_raw()  # refuses what bounds no solid

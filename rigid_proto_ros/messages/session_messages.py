@@ -122,7 +122,7 @@ FIELDS = {
 _DOUBLES = {"pose": 7, "twist": 6, "odom": cdr.ODOMETRY_DOUBLES}
 
 
-def read_text(data: bytes, topic: str) -> str:
+def read_string(data: bytes, topic: str) -> str:
     """The text of a std_msgs/String; raises InputError."""
     try:
         (length,) = _LENGTH.unpack_from(data, 4)

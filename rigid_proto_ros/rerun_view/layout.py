@@ -111,7 +111,7 @@ def layout(size: float, initial_view: str, subject: Subject) -> Layout:
         body_view(size, "Plain", PLAIN, subject),
     )
     tabs = {
-        "lesson": lesson(body_views[0], subject, plots),
+        "lesson": lesson_layout(body_views[0], subject, plots),
         "debugging": debugging(body_views[1], plots),
         "plain": body_views[2],
     }
@@ -138,7 +138,7 @@ def _orbital(position: np.ndarray, target: np.ndarray) -> Any:
     return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=[0.0, 0.0, 1.0])
 
 
-def lesson(flight: Any, subject: Subject, plots: PlotViews) -> Any:
+def lesson_layout(flight: Any, subject: Subject, plots: PlotViews) -> Any:
     """How the tensor governs the motion: the flight, and beside it what tells most of a flight of its kind."""
     if subject.ghost:
         # How far the two have come apart matters more than the energy, which both keep.

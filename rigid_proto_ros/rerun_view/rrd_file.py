@@ -70,7 +70,7 @@ def whole_part(path: Path) -> Iterator[Path]:
         yield copy
 
 
-def repair(path: Path, repaired: Path) -> None:
+def repair_rrd(path: Path, repaired: Path) -> None:
     """Write a finished recording with all that is whole in ``path``; InputError where that can't be."""
     if repaired.exists() and repaired.samefile(path):
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")

@@ -73,7 +73,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
     output_file("--repair", repaired)
     if not bag:
-        from .rrd_file import repair as repair_rrd
+        from .rrd_file import repair_rrd
 
         repair_rrd(path, repaired)
         return

@@ -76,7 +76,7 @@ def take_picture(
             client.run_command("ui.toggle_top_panel")
             time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
             pixels = _without_empty_top(_stable_picture(client, None))
-        if is_blank(pixels):
+        if is_one_colour(pixels):
             raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
         try:
             picture.write_bytes(pixels)
@@ -155,7 +155,7 @@ def _stable_picture(client: Any, view_id: str | None) -> bytes:
     while True:
         time.sleep(0.3)
         after = client.take_screenshot(view_id)
-        if after == before and not is_blank(after) or time.monotonic() > deadline:
+        if after == before and not is_one_colour(after) or time.monotonic() > deadline:
             return after
         before = after
 
@@ -211,7 +211,7 @@ def _walk(
     return found
 
 
-def is_blank(png: bytes) -> bool:
+def is_one_colour(png: bytes) -> bool:
     """Whether a picture is one colour all over, give or take."""
     with Image.open(io.BytesIO(png)) as image:
         pixels = np.asarray(image.convert("RGB").resize((128, 128)), dtype=float)

@@ -21,7 +21,7 @@ from .replay import Resimulation, mesh_finder, session_scenario
 
 
 @dataclass
-class _Acting:
+class _RecordedLoad:
     began_ns: int
     frame_id: str
     kind: str
@@ -33,14 +33,14 @@ class ActingLoads(Observer):
     """Which wrenches and pokes act, as they took effect."""
 
     def __init__(self) -> None:
-        self.acting: dict[int, _Acting] = {}
-        self._latest: _Acting | None = None
+        self.acting: dict[int, _RecordedLoad] = {}
+        self._latest: _RecordedLoad | None = None
 
     def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body, _attitude: np.ndarray) -> None:
         """Remember the command until it is said to act."""
         force = load.force if load.axes == "world" else load.own_force(body)
         frame_id = load.frame_id + command.frame.options
-        self._latest = _Acting(time_ns, frame_id, command.kind, [float(f) for f in force], list(load.torque))
+        self._latest = _RecordedLoad(time_ns, frame_id, command.kind, [float(f) for f in force], list(load.torque))
 
     def load_began(self, _time_ns: int, load_id: int, load: ShownLoad) -> None:
         """The command applied last begins to act; an impulse has acted, and thrusters go by themselves."""
@@ -122,7 +122,7 @@ def _scene(scenario: Scenario, row: np.ndarray, changes: dict) -> Scenario:
     return make_scenario(values, scenario.body_mesh.mesh if scenario.body_mesh else None)
 
 
-def _load_entry(acting: _Acting, scenario: Scenario, now_ns: int) -> dict | None:
+def _load_entry(acting: _RecordedLoad, scenario: Scenario, now_ns: int) -> dict | None:
     """A load as a script's entry for what is left of it."""
     frame = parse_frame(acting.frame_id)
     end_ns: int | None

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
-from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_text
+from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_string
 from .recorded_session import RecordedSession, scene_sha256
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def session_runs(content: McapContent, path: Path, node: str = "") -> list[Recor
     Raises InputError for a bag without states, and for messages that can't be decoded.
     """
     prefix = _prefix(content, str(path), node)
-    events = [(log, read_text(data, f"{prefix}/events")) for log, data in _messages(content, prefix, "events")]
-    scenes = [(log, read_text(data, f"{prefix}/scene")) for log, data in _messages(content, prefix, "scene")]
+    events = [(log, read_string(data, f"{prefix}/events")) for log, data in _messages(content, prefix, "events")]
+    scenes = [(log, read_string(data, f"{prefix}/scene")) for log, data in _messages(content, prefix, "scene")]
     states = {name: _states(content, prefix, name) for name in PROJECTIONS}
     states = {name: found for name, found in states.items() if len(found[0])}
     # A topic without messages may be whole: nobody did anything. A latched one is never without.

@@ -43,7 +43,7 @@ def _sizes(rows: int) -> tuple[int, int, int]:
     return fl.TIMES * rows, fl.LOAD_ROW * rows, fl.EVENT * (4 * rows + 4)
 
 
-class Acting(NamedTuple):
+class ActingLoad(NamedTuple):
     """A load that acts from begin_ns until end_ns; held: it has a slot, from which it is replaced."""
 
     load: Load
@@ -249,11 +249,11 @@ class FlightArrays:
         """Whether any load acts."""
         return bool(self.integers[fl.ACTING])
 
-    def acting(self) -> Iterator[Acting]:
+    def acting(self) -> Iterator[ActingLoad]:
         """The loads that act, in the order in which they began."""
         for row in range(self.n[fl.ACTING]):
             begin_ns, _, _, slot, end_ns, load_id = self.times[row].tolist()
-            yield Acting(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, slot != fl.NO_SLOT)
+            yield ActingLoad(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, slot != fl.NO_SLOT)
 
     @property
     def sums(self) -> np.ndarray:

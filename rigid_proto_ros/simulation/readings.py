@@ -14,7 +14,7 @@ from ..motion.integrators.error_measure import FLOOR
 from ..motion.loads import LoadSum
 from ..motion.state import State
 from ..motion.string import Tied
-from .flight_arrays import Acting, FlightArrays
+from .flight_arrays import ActingLoad, FlightArrays
 from .segment import Segment
 from .setup import Setup
 from .string_control import StringControl
@@ -44,7 +44,7 @@ class Readings:
     _arrays: FlightArrays
 
     @property
-    def acting(self) -> list[Acting]:
+    def acting(self) -> list[ActingLoad]:
         """The loads that act now: in the order in which they began."""
         return list(self._arrays.acting())
 

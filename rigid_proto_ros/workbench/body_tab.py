@@ -18,7 +18,7 @@ from ..mass.from_mesh import mesh_body
 from ..mass.tensor import six_from_tensor
 from ..mesh.reading import Mesh
 from ..scene.scenario import Scenario
-from .controls import Controls, read_numbers
+from .controls import Controls, parse_numbers
 from .node_control import NodeControl
 from .scene_loader import SceneLoader
 from .status import Announcements
@@ -163,7 +163,7 @@ class BodyTab:
                 )
 
         def check() -> list[float] | None:
-            numbers = read_numbers(tensor.value, 6)
+            numbers = parse_numbers(tensor.value, 6)
             valid, verdict.content = tensor_verdict(numbers)
             apply.disabled = not valid
             return numbers if valid else None
@@ -203,7 +203,7 @@ class BodyTab:
 
         @put.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            numbers = read_numbers(f"{mass.value} {place.value}", 4)
+            numbers = parse_numbers(f"{mass.value} {place.value}", 4)
             chosen = name.value if weight.value == ANOTHER else weight.value
             if numbers is None or not re.fullmatch(r"[a-z][a-z0-9_]*", chosen):
                 received = f"got {chosen[:40]!r}, {mass.value[:40]!r}, {place.value[:80]!r}"

@@ -128,7 +128,7 @@ class Controls:
         """
 
         def typed(text: object) -> Changes | None:
-            numbers = read_numbers(text, 1)
+            numbers = parse_numbers(text, 1)
             return changes(numbers[0]) if numbers is not None and numbers[0] > 0.0 else None
 
         box = self._text(label, hint, lambda values: f"{shown(values):.4g}", typed, "a number > 0")
@@ -216,7 +216,7 @@ def _written(numbers: Iterable[float]) -> str:
     return " ".join(f"{x:.9g}" for x in numbers)
 
 
-def read_numbers(text: object, length: int) -> list[float] | None:
+def parse_numbers(text: object, length: int) -> list[float] | None:
     """As many finite numbers as asked for, separated by blanks or commas; None where the text holds others."""
     words = str(text).replace(",", " ").strip(" []").split()
     try:
@@ -227,7 +227,7 @@ def read_numbers(text: object, length: int) -> list[float] | None:
 
 
 def _numbers(name: str, text: object, length: int) -> Changes | None:
-    numbers = read_numbers(text, length)
+    numbers = parse_numbers(text, length)
     if numbers is None:
         return None
     return {name: numbers[0] if parameter_named(name).type == "double" else numbers}

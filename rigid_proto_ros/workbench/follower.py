@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from ..motion.state import State
 from ..scene.command_codec import command_of_event, frame_names
 from ..scene.scenario import Scenario
-from .acting import Acting
+from .followed_loads import FollowedLoads
 from .history import SCENE_GRACE_S, History
 from .page_ghost import PageGhost
 from .rewind import core_row
@@ -22,7 +22,7 @@ from .scene_loader import SceneLoader
 from .status import Announcements
 
 
-class Follower:
+class NodeFollower:
     """Follows one node. state: the last one heard.
 
     on_event(kind, content) is told of each event before what it means for the loads, of a reset after the new
@@ -39,7 +39,7 @@ class Follower:
         on_begin: Callable[[], None],
     ) -> None:
         self.state: State | None = None
-        self.acting = Acting()
+        self.acting = FollowedLoads()
         self.ghost = PageGhost(announcements.say_once)
         self._target = target
         self._scenes = scenes

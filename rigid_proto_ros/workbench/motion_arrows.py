@@ -31,7 +31,7 @@ LEAST_RATE = 1e-9
 """[rad/s] A body slower than this is at rest, and what is left of ω and L has no meaning."""
 
 
-class ArrowScale:
+class VectorScale:
     """Value per round length of one kind of arrow: one of STEPS times a power of ten, kept while arrows
     aren't too long or short.
     """
@@ -56,7 +56,7 @@ class MotionArrow:
 
     def __init__(self, scene: Any, name: str, symbol: str, unit: str, share: float, anchor: str, **style: Any) -> None:
         self._symbol, self._unit = symbol, unit
-        self._scale = ArrowScale(share)
+        self._scale = VectorScale(share)
         self._arrow = scene.add_arrows(f"/{name}", np.zeros((1, 2, 3)), visible=False, **style)
         self._label = scene.add_label(f"/{name}_label", UNWRITTEN, visible=False, anchor=anchor)
 

@@ -21,7 +21,7 @@ from ..scene.scenario import Scenario
 from .body_tab import BodyTab
 from .controls import Controls
 from .drawn_poses import DrawnPose, DrawnPoses
-from .follower import Follower
+from .follower import NodeFollower
 from .history import History
 from .keys import Keyboard, add_keys
 from .lesson_folder import LessonFolder
@@ -71,7 +71,7 @@ class Page:
         self.node = NodeControl(self.link, lambda text: self.announcements.say(text), self._refused)
         self.scenes = SceneLoader(self.loop, self._on_loaded, self._unshown)
         self.history = History(target.strip("/"), lambda: self._upload.attachments())
-        self.follower = Follower(
+        self.follower = NodeFollower(
             self.link.target, self.scenes, self.history, self.announcements, self._on_event, self._on_begin
         )
         # The picture, and the hand in it.

@@ -10,7 +10,7 @@ from typing import Any
 import viser
 
 from ..motion.integrators import INTEGRATORS
-from .controls import TYPING_S, Controls, log_slider, on_slider, read_numbers
+from .controls import TYPING_S, Controls, log_slider, on_slider, parse_numbers
 from .node_control import NodeControl
 from .past_view import PastView
 from .pointer import POKE, PUSH, Tools
@@ -80,7 +80,7 @@ class Panel:
         times = force / self._tools.usual_force
         for box, text in ((self._force, f"{force:.4g}"), (self._times, f"{times:.4g}")):
             # "2." means what is in force, so it may stay as it is typed.
-            if read_numbers(box.value, 1) != read_numbers(text, 1):
+            if parse_numbers(box.value, 1) != parse_numbers(text, 1):
                 box.value = text
         place = on_slider(abs(times), FORCE_DECADES)
         if self._slider.value != place:
@@ -156,7 +156,7 @@ class Panel:
             async def _(event: viser.GuiEvent[Any]) -> None:
                 if event.client is None:
                     return
-                numbers = read_numbers(box.value, 1)
+                numbers = parse_numbers(box.value, 1)
                 if numbers is not None and abs(numbers[0] * unit()) <= STRONGEST:
                     take(numbers[0] * unit())
                 else:

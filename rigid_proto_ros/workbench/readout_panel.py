@@ -51,7 +51,7 @@ FLAT_ANGLE = 1.0
 """[°] An angle's plot spans at least this much: rounding isn't blown up to fill it."""
 
 
-def table(rows: Iterable[tuple[str, str]]) -> str:
+def html_table(rows: Iterable[tuple[str, str]]) -> str:
     """Names and values as HTML, which a browser takes at once; Markdown it would compile anew at every change."""
     cells = "".join(
         f'<tr><td style="color: gray; padding: 0 1em 0 0">{escape(name)}</td><td>{escape(value)}</td></tr>'
@@ -60,7 +60,7 @@ def table(rows: Iterable[tuple[str, str]]) -> str:
     return f'<table style="margin: 0.6em 0.9em; font-size: 0.85em; line-height: 1.45">{cells}</table>'
 
 
-class Plot:
+class LivePlot:
     """One small plot of values over the simulated time. series: name and colour of each; least: as
     ``plot_range`` takes it.
     """
@@ -120,12 +120,12 @@ class ReadoutPanel:
         with panel.add_tab("Readouts"):
             self._numbers = gui.add_html("waiting for the node …")
             ghost_angle = (("angle", GHOST_COLOUR),)
-            self._ghost_plot = Plot(gui, GHOST_ANGLE_TITLE, ANGLE_UNIT, ghost_angle, least=FLAT_ANGLE)
+            self._ghost_plot = LivePlot(gui, GHOST_ANGLE_TITLE, ANGLE_UNIT, ghost_angle, least=FLAT_ANGLE)
             self._ghost_plot.switch(False)
             self._plots = (
-                Plot(gui, ENERGY_TITLE, ENERGY_UNIT, (*ENERGY_SERIES, *STRING_ENERGY_SERIES, *TOTAL_ENERGY_SERIES)),
-                Plot(gui, OMEGA_TITLE, OMEGA_UNIT, OMEGA_SERIES),
-                Plot(gui, MOMENTUM_ANGLE_TITLE, ANGLE_UNIT, MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE),
+                LivePlot(gui, ENERGY_TITLE, ENERGY_UNIT, (*ENERGY_SERIES, *STRING_ENERGY_SERIES, *TOTAL_ENERGY_SERIES)),
+                LivePlot(gui, OMEGA_TITLE, OMEGA_UNIT, OMEGA_SERIES),
+                LivePlot(gui, MOMENTUM_ANGLE_TITLE, ANGLE_UNIT, MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE),
             )
         # One column beside the picture, which keeps most of the window's width.
         panel.dock_below(gui.main_panel)
@@ -192,7 +192,7 @@ class ReadoutPanel:
                 ("COM", " ".join(f"{x:.4g}" for x in state.position) + " m"),
                 *scales.items(),
             )
-            self._numbers.content = table(rows)
+            self._numbers.content = html_table(rows)
         if now_s >= self._plots_due_s and len(self._samples) > 1:
             self._plots_due_s = now_s + PLOTS_S
             self._ghost_plot.switch(ghost_angle is not None and len(self._ghost_angles) > 1)

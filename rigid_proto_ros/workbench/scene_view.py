@@ -17,8 +17,8 @@ import viser
 from ..rerun_view.appearance import FORCE_COLOUR, HAND_COLOUR, STRING_COLOUR
 from ..rerun_view.plot_range import nice_step
 from ..scene.scenario import Scenario
-from .acting import Hit
 from .body_view import BodyView, Switches, body_corners, set_visible
+from .followed_loads import Hit
 from .motion_arrows import MotionArrows
 from .poke_mark import PokeMark
 from .soft_shadow import SoftShadow

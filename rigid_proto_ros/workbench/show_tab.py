@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from .controls import read_numbers
+from .controls import parse_numbers
 from .scene_view import SWITCHES, SceneView
 from .status import Announcements
 
@@ -47,7 +47,7 @@ class ShowTab:
 
         @point.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:
-            numbers = read_numbers(point.value, 3)
+            numbers = parse_numbers(point.value, 3)
             if point.value.strip() and numbers is None:
                 announcements.say(f"Point of the path: {point.value[:40]!r}; accepted: three numbers, or nothing")
             else:

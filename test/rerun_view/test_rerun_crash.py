@@ -16,7 +16,7 @@ import rerun_flight as flight
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, repair, whole_bytes
+from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, repair_rrd, whole_bytes
 from rigid_proto_ros.rerun_view.viewers import viewer_program
 
 
@@ -66,7 +66,7 @@ def test_repair_makes_a_file_that_is_complete_again(recording, tmp_path):
     cut, repaired = tmp_path / "cut.rrd", tmp_path / "repaired.rrd"
     cut.write_bytes(data[: starts[-1] - 7])
     before = read_session(cut)
-    repair(cut, repaired)
+    repair_rrd(cut, repaired)
     after = read_session(repaired)
     assert after.complete
     assert after.rows.tobytes() == before.rows.tobytes()

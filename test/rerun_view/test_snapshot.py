@@ -17,7 +17,7 @@ from rigid_proto_ros.cli import snapshot as command
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view.layout import BACKGROUND
-from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_blank
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_the_whole_layout_is_drawn_also_from_a_cut_file(recording, tmp_path):
     cut.write_bytes(recording.read_bytes()[:-2000])
     picture = tmp_path / "all.png"
     take(str(cut), "--at", "0.3", "-o", str(picture), "--size", "1200x700")
-    assert not is_blank(picture.read_bytes())
+    assert not is_one_colour(picture.read_bytes())
     with Image.open(picture) as image:
         assert image.width == 1200 and 600 < image.height <= 700
 
@@ -78,7 +78,7 @@ def test_tabs_and_views_behind_the_front_one_can_be_drawn_by_name(recording, tmp
     for name in ("debugging", "State", "Plain"):
         picture = tmp_path / f"{name}.png"
         take(str(recording), "--at", "0.3", "-o", str(picture), "--view", name, "--size", "1000x600")
-        assert not is_blank(picture.read_bytes())
+        assert not is_one_colour(picture.read_bytes())
     with Image.open(tmp_path / "State.png") as part, Image.open(tmp_path / "debugging.png") as whole:
         assert part.width < whole.width == 1000
     args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"), "--view", "nothing")
@@ -144,4 +144,4 @@ def test_a_machine_without_drivers_is_told_what_to_install(recording, tmp_path, 
 def test_a_picture_of_one_colour_counts_as_blank():
     data = io.BytesIO()
     Image.new("RGB", (300, 200), BACKGROUND).save(data, format="png")
-    assert is_blank(data.getvalue())
+    assert is_one_colour(data.getvalue())

@@ -26,7 +26,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.messages import cdr
-from rigid_proto_ros.messages.session_messages import read_text
+from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.session.check import verify
 
@@ -147,7 +147,7 @@ def _command(capsys, *arguments) -> tuple[int, str, str]:
 
 def test_a_bag_that_begins_later_is_shown_and_not_verified(flown, mesh_beside, tmp_path, capsys):
     events = [m for m in flown if m.topic.endswith("events")]
-    first_run = events[: next(k for k, m in enumerate(events) if "reset" in read_text(m.data, ""))]
+    first_run = events[: next(k for k, m in enumerate(events) if "reset" in read_string(m.data, ""))]
     begin, end = first_run[3].log_time, first_run[-1].log_time
     late = [m for m in flown if begin < m.log_time < end or (m.topic.endswith("scene") and m.log_time < begin)]
     LAYOUTS["bare"](tmp_path / "bag", late)
@@ -214,13 +214,13 @@ def test_a_changed_event_in_a_bag_is_named(flown, mesh_beside, tmp_path, seed, c
     rng = random.Random(seed)
     at = [k for k, m in enumerate(flown) if m.topic.endswith("events")]
     number = rng.randrange(len(at))
-    event = json.loads(read_text(flown[at[number]].data, ""))
+    event = json.loads(read_string(flown[at[number]].data, ""))
     event["time_ns"] += rng.choice((-1, 1)) if event["time_ns"] else 1
     changed = list(flown)
     changed[at[number]] = replace(flown[at[number]], data=cdr.string(json.dumps(event)))
     LAYOUTS["bare"](tmp_path / "bag", changed)
     status, _, err = _command(capsys, tmp_path / "bag.mcap", "--verify")
-    resets = [k for k, i in enumerate(at) if '"kind": "reset"' in read_text(flown[i].data, "")]
+    resets = [k for k, i in enumerate(at) if '"kind": "reset"' in read_string(flown[i].data, "")]
     within = number - max((k for k in resets if k <= number), default=0)
     assert status == 1, err
     assert f"command {within + 1} " in err and len(err.splitlines()) == 1

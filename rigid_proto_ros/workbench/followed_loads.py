@@ -47,7 +47,7 @@ class Hit:
 
 
 @dataclass(frozen=True)
-class _Acting:
+class _FollowedLoad:
     held: bool
     slot: int
     load: Load
@@ -56,12 +56,12 @@ class _Acting:
     until_ns: int
 
 
-class Acting:
+class FollowedLoads:
     """Follows one run. Stiffness and arrows come from the state that the page knew then, near to the node's own."""
 
     def __init__(self) -> None:
         self._control: StringControl | None = None
-        self._acting: list[_Acting] = []
+        self._acting: list[_FollowedLoad] = []
 
     def begin(self, setup: Setup, state: State) -> None:
         """A reset, or the first look at a node: the string as its parameters say, no loads."""
@@ -104,7 +104,7 @@ class Acting:
             if force:
                 text = _strength_text((force,), False)
                 load = thruster.load(thruster.within(force))
-                self._acting.append(_Acting(True, -1 - number, load, text, time_ns, until_ns))
+                self._acting.append(_FollowedLoad(True, -1 - number, load, text, time_ns, until_ns))
 
     def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:
         setup, frame, held = scenario.setup, command.frame, command.held
@@ -124,7 +124,7 @@ class Acting:
             seen_ns = round(SHOWN_AT_LEAST_NS * (scenario.parameters.real_time_factor or 1.0))
             until_ns = time_ns + (lasting_ns if held else max(lasting_ns, seen_ns))
             text = _strength_text(command.force, frame.impulse)
-            self._acting.append(_Acting(held, command.slot, load, text, time_ns, until_ns))
+            self._acting.append(_FollowedLoad(held, command.slot, load, text, time_ns, until_ns))
 
     def string_ends(self, setup: Setup, state: State) -> tuple[np.ndarray, np.ndarray] | None:
         """Knot and free end (3,) in the world, or None."""
