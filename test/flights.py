@@ -11,11 +11,26 @@ from rigid_proto_ros.motion.body import Body, make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import integrator_named
 from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
 AT_REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class EventLines(Observer):
+    """Keeps the lines of the event log with their times [ns]."""
+
+    def __init__(self) -> None:
+        self.timed: list[tuple[int, str]] = []
+
+    @property
+    def lines(self) -> list[str]:
+        return [line for _, line in self.timed]
+
+    def event(self, time_ns: int, line: str) -> None:
+        self.timed.append((time_ns, line))
 
 
 def bundled_body(name: str) -> Body:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from flights import EventLines
 from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
@@ -26,21 +27,12 @@ from rigid_proto_ros.scene.script import (
 )
 from rigid_proto_ros.scene.yaml_text import load_plain_yaml
 from rigid_proto_ros.simulation.commands import Change, WrenchCommand
-from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench.drawn_poses import DrawnPose
 from rigid_proto_ros.workbench.ros_link import Received
 
 PATIENCE_S = 60.0
 PERIOD_NS = 10_000_000
-
-
-class _Lines(Observer):
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def event(self, time_ns: int, line: str) -> None:
-        self.lines.append(line)
 
 
 class FlownLink:
@@ -52,7 +44,7 @@ class FlownLink:
     def __init__(self, target, deliver, on_scene, on_diagnostics) -> None:
         self.target = target
         self._deliver, self._on_scene, self._on_diagnostics = deliver, on_scene, on_diagnostics
-        self._log = _Lines()
+        self._log = EventLines()
         self.scenario: Scenario = make_scenario({})
         self.simulation = Simulation(self.scenario.setup, self._log)
         self.rows: list[tuple[int, np.ndarray]] = []
@@ -104,7 +96,7 @@ class FlownLink:
 
     def call(self, service, data=None, done=None) -> None:
         if service == "reset":
-            self._log.lines.clear()
+            self._log.timed.clear()
             self._told = 0
             self.simulation.reset(self.scenario.setup)
             self.rows.clear()
@@ -150,8 +142,8 @@ class FlownLink:
         state = self.simulation.state
         row = np.array([*state.row[:10], *rotate(*state.row[3:7], *state.row[10:13])])
         self.rows.append((self.simulation.time_ns, row))
-        self._heard.events.extend(self._log.lines[self._told :])
-        self._told = len(self._log.lines)
+        self._heard.events.extend(line for _, line in self._log.timed[self._told :])
+        self._told = len(self._log.timed)
         self._heard.states.append(self.rows[-1])
 
     def _submit(self, command, at_ns=None, listed=None) -> None:

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
+from flights import EventLines
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.messages import cdr
@@ -15,19 +14,12 @@ from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, Rank, ReleaseString, WrenchCommand
-from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
 
-@dataclass
-class _Lines(Observer):
-    lines: list[tuple[int, str]] = field(default_factory=list)
-
-    def event(self, time_ns: int, line: str) -> None:
-        self.lines.append((time_ns, line))
-
+class _LinesSinceReset(EventLines):
     def reset(self) -> None:
-        self.lines.clear()
+        self.timed.clear()
 
 
 class HandSession:
@@ -37,7 +29,7 @@ class HandSession:
         self.scenario = make_scenario(values)
         self.first = self.scenario
         self.heard = heard
-        self.log = _Lines()
+        self.log = _LinesSinceReset()
         self.simulation = Simulation(self.scenario.setup, self.log)
         self.now_ns = 0
         self._told = 0
@@ -50,9 +42,9 @@ class HandSession:
             self.now_ns = min(until_ns, (self.now_ns // every_ns + 1) * every_ns)
             row = self.simulation.advance(self.now_ns).row.tolist()
             assert not self.simulation.failure
-            for _, line in self.log.lines[self._told :]:
+            for _, line in self.log.timed[self._told :]:
                 self.heard("event", line)
-            self._told = len(self.log.lines)
+            self._told = len(self.log.timed)
             if self.now_ns % every_ns == 0:
                 self.heard("state", self.now_ns, PROJECTIONS["pose"](row), PROJECTIONS["twist"](row))
 
@@ -60,7 +52,7 @@ class HandSession:
         """As the service does."""
         self.simulation.reset(self.scenario.setup)
         self.first, self.now_ns, self._told = self.scenario, 0, 1
-        self.heard("event", self.log.lines[0][1])
+        self.heard("event", self.log.lines[0])
 
     def load(self, held: bool, frame_id: str, force, torque=(0.0, 0.0, 0.0), stamp_ns: int = 0) -> None:
         """A message of the wrench or the poke topic."""
@@ -116,7 +108,7 @@ class HandSession:
         """As a client has heard it."""
         return RecordedSession(
             scene=self.first.text,
-            events=list(self.log.lines),
+            events=list(self.log.timed),
             times=np.array([self.now_ns]),
             rows=self.simulation.state.row[None].copy(),
             mesh_sha256=scene_sha256(self.first.text),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 from numba import njit
+from random_scenes import log_uniform
 from reference_double_double import attitude_angle, free_step
 from reference_motion import angle_between, free_motion
 
@@ -21,10 +22,6 @@ STEPS_PER_CLASS = 300
 STRESS_STEPS_PER_CLASS = 100_000
 LONGEST = 3.0
 """rad. Beyond it a rounding of the start grows with the motion itself, and the closed form below judges."""
-
-
-def log_uniform(rng, low, high):
-    return 10.0 ** rng.uniform(math.log10(low), math.log10(high))
 
 
 def direction(rng):

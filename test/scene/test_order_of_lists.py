@@ -8,7 +8,7 @@ import random
 from pathlib import Path
 
 import pytest
-from flights import SECOND
+from flights import SECOND, EventLines
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
@@ -39,15 +39,8 @@ DONE = [
 ]
 
 
-class Lines(Observer):
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def event(self, time_ns: int, line: str) -> None:
-        self.lines.append(line)
-
-    def kinds(self) -> list[str]:
-        return [decode_event(line, 1)[1] for line in self.lines]
+def kinds(told: EventLines) -> list[str]:
+    return [decode_event(line, 1)[1] for line in told.lines]
 
 
 def commands(entries: list[dict], simulation: Simulation) -> list[Command]:
@@ -65,17 +58,17 @@ def commands(entries: list[dict], simulation: Simulation) -> list[Command]:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_script_acts_in_its_own_order_and_not_by_kind_or_bytes(seed: int) -> None:
     entries = random.Random(seed).sample(DONE, len(DONE))
-    lines = Lines()
+    lines = EventLines()
     OfflineRun(make_scenario(SCENE), expand_script([{"t": 1.0, **entry} for entry in entries]), lines).advance(
         2 * SECOND
     )
-    assert lines.kinds() == [command.kind for command in expand_script([{"t": 0.0, **entry} for entry in entries])]
+    assert kinds(lines) == [command.kind for command in expand_script([{"t": 0.0, **entry} for entry in entries])]
 
 
 def test_lists_act_first_by_their_bytes_then_single_messages_by_kind_whatever_arrives_first() -> None:
     found = set()
     for order in itertools.permutations(range(3)):
-        lines = Lines()
+        lines = EventLines()
         simulation = Simulation(make_scenario(SCENE).setup, lines)
         own = commands(DONE, simulation)
         parts = [
@@ -87,7 +80,7 @@ def test_lists_act_first_by_their_bytes_then_single_messages_by_kind_whatever_ar
             for command, listed in parts[k]:
                 simulation.submit(command, SECOND, listed)
         found.add(simulation.advance(2 * SECOND).sha256())
-        assert lines.kinds() == [
+        assert kinds(lines) == [
             "poke",
             "clear_wrench",
             "string_target",
@@ -141,7 +134,7 @@ def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_re
     pytest.importorskip("rclpy")
     from rigid_proto_ros.ros.replay_publisher import session_commands
 
-    lines = Lines()
+    lines = EventLines()
     run = Simulation(make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).setup, lines)
     poke = {"at": "tip", "axes": "body", "impulse": [1e-4, 0.0, 0.0]}
     (command,) = expand_script([{"t": 0.5, **poke}])

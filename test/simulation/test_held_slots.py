@@ -4,7 +4,7 @@
 import json
 
 import pytest
-from flights import SECOND
+from flights import SECOND, EventLines
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.motion.frames import parse_frame
@@ -14,7 +14,6 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.replay import Resimulation
 from rigid_proto_ros.simulation.commands import slot_name, slot_number
-from rigid_proto_ros.simulation.observer import Observer
 
 SCENE = {"mesh": "t_handle", "mass": 1.0, "publish_rate": 10.0}
 SCRIPT = """
@@ -26,16 +25,8 @@ SCRIPT = """
 """
 
 
-class Lines(Observer):
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def event(self, _time_ns: int, line: str) -> None:
-        self.lines.append(line)
-
-
-def flown(script: str = SCRIPT, until_s: float = 4.0, **scene) -> tuple[OfflineRun, Lines]:
-    lines = Lines()
+def flown(script: str = SCRIPT, until_s: float = 4.0, **scene) -> tuple[OfflineRun, EventLines]:
+    lines = EventLines()
     run = OfflineRun(make_scenario({**SCENE, **scene}), parse_script(script), lines)
     run.advance(round(until_s * 1e9))
     return run, lines
@@ -64,7 +55,7 @@ def test_the_chain_of_events_is_the_same_whether_anybody_listens() -> None:
 def test_slots_replay_to_the_bit_also_from_recordings_without_timeouts(timeouts_recorded: bool) -> None:
     run, told = flown()
     recorded = [line for line in told.lines if timeouts_recorded or '"timeout"' not in line]
-    again_told = Lines()
+    again_told = EventLines()
     again = Resimulation(make_scenario(SCENE), recorded, again_told)
     row = again.advance(4 * SECOND)
     assert row.tobytes() == run.simulation.state.row.tobytes()

@@ -196,7 +196,7 @@ def test_states_and_events_of_a_reset_may_come_in_any_order(event_first: bool) -
     old = history.row(SECOND)
     hand.heard = lambda what, *content: None
     hand.reset()
-    reset = hand.log.lines[0][1]
+    reset = hand.log.lines[0]
     pose, twist = old[:7].tolist(), old[7:].tolist()
     if event_first:
         history.event(reset)
