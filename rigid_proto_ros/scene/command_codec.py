@@ -14,13 +14,12 @@ each command is one entry again, but for what no entry can say (``entry_of``).
 from __future__ import annotations
 
 import functools
-import json
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 
 from ..base.errors import CommandRefused, InputError
+from ..base.rotation import vector
 from ..messages import cdr
 from ..motion.frames import CONTACT_NAME, RESERVED_WORDS, parse_frame
 from ..simulation.commands import (
@@ -37,8 +36,7 @@ from ..simulation.commands import (
 )
 from ..simulation.setup import Setup
 from .parameters import ZERO, Parameters, Vector
-from .scenario import yaml_double, yaml_value
-from .scene_file import scalar
+from .yaml_text import flow
 
 Changing = Callable[[Mapping], Setup]
 """Gives the setup that a change of parameters, or of the inertia, leads to, from the content of its event."""
@@ -69,9 +67,6 @@ MAX_SCHEDULED = 5000
 
 _WORDS = ("world", "body")
 """Names of the world's and the body's frame that every node reads."""
-
-_WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
-"""Text that stands in YAML without quotes, unless it reads as true or false."""
 
 
 @dataclass(frozen=True)
@@ -126,10 +121,10 @@ def of_message(topic: str, data: bytes) -> ScriptCommand:
     seconds, nanoseconds, frame_id, numbers = cdr.read_stamped_doubles(data, count)
     t_ns = whole_stamp(seconds, nanoseconds)
     if count == 6:
-        return ScriptCommand(t_ns, kind, frame_id, _vector(numbers[:3]), _vector(numbers[3:]))
+        return ScriptCommand(t_ns, kind, frame_id, vector(numbers[:3]), vector(numbers[3:]))
     if kind == "inertia":
         return ScriptCommand(t_ns, kind, frame_id, inertia=numbers)
-    return ScriptCommand(t_ns, kind, frame_id, point=_vector(numbers))
+    return ScriptCommand(t_ns, kind, frame_id, point=vector(numbers))
 
 
 def whole_stamp(seconds: int, nanoseconds: int) -> int:
@@ -148,10 +143,10 @@ def of_event(time_ns: int, kind: str, content: Mapping) -> ScriptCommand:
     """
     try:
         if kind in ("wrench", "poke"):
-            force, torque = _vector(content["force"]), _vector(content["torque"])
+            force, torque = vector(content["force"]), vector(content["torque"])
             return ScriptCommand(time_ns, kind, _text(content["frame_id"]), force, torque)
         if kind in ("string_target", "string_attach"):
-            return ScriptCommand(time_ns, kind, _text(content["frame_id"]), point=_vector(content["point"]))
+            return ScriptCommand(time_ns, kind, _text(content["frame_id"]), point=vector(content["point"]))
         if kind == "inertia":
             numbers = _numbers((content["mass"], *_numbers(content["com"], 3), *_numbers(content["tensor"], 6)), 10)
             return ScriptCommand(time_ns, kind, _text(content["frame_id"]), inertia=numbers)
@@ -174,11 +169,6 @@ def _numbers(values: Iterable, count: int) -> tuple[float, ...]:
     if len(numbers) != count:
         raise ValueError
     return numbers
-
-
-def _vector(values: Iterable) -> Vector:
-    x, y, z = values
-    return float(x), float(y), float(z)
 
 
 def _text(value: object) -> str:
@@ -397,20 +387,6 @@ def _at(point: tuple) -> object:
 
 def _timed(time_ns: int, entry: dict) -> dict:
     return {"t": time_ns / 1e9, **entry}
-
-
-def flow(value: object, quoted: bool = False) -> str:
-    """Plain data as YAML on one line; doubles keep all their digits. quoted: as JSON, which is YAML too
-    and is read faster.
-    """
-    if isinstance(value, Mapping):
-        pairs = ((json.dumps(key) if quoted else key, flow(item, quoted)) for key, item in value.items())
-        return "{" + ", ".join(f"{key}: {item}" for key, item in pairs) + "}"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(flow(item, quoted) for item in value) + "]"
-    if isinstance(value, str) and not quoted and _WORD.match(value) and isinstance(scalar(value), str):
-        return value
-    return yaml_double(value) if isinstance(value, float) else yaml_value(value)
 
 
 # Data -> messages to a node

@@ -15,8 +15,9 @@ from .command_codec import ScriptCommand, core_command
 from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
 from .scenario_run import ScenarioRun
-from .scene_file import read_scene_file, scalar, scene_file
+from .scene_file import read_scene_file, scene_file
 from .script import with_contacts
+from .yaml_text import scalar
 
 
 def read_scene(

@@ -6,7 +6,6 @@ The node, the offline run and replay all come through here, so that one scene me
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -28,6 +27,7 @@ from ..simulation.setup import Setup
 from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
 from .parameters import Parameters, convert_all, parameter_named
+from .yaml_text import yaml_value
 
 
 @dataclass(frozen=True)
@@ -251,21 +251,3 @@ def publication_ns(k: int, publish_rate: float) -> int:
     """Simulated time of publication k: round(k·1e9/publish_rate), in integer arithmetic on the rate's exact value."""
     numerator, denominator = publish_rate.as_integer_ratio()
     return (2 * k * 1_000_000_000 * denominator + numerator) // (2 * numerator)
-
-
-def yaml_value(value: object) -> str:
-    """A parameter's value as it stands in a YAML file, with all its digits."""
-    # JSON is YAML; repr keeps all digits, and a double keeps its point so that it is read back as one.
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return yaml_double(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(yaml_double(v) for v in value) + "]"
-    return json.dumps(value)
-
-
-def yaml_double(value: float) -> str:
-    """A double as YAML 1.1 and rcl read it back as one."""
-    text = repr(value)
-    return text if any(c in text for c in ".n") else text.replace("e", ".0e")

@@ -8,7 +8,6 @@ it.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -18,14 +17,7 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
-from .yaml_text import compose_yaml, read_text
-
-_TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
-_FALSE = {"N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
-_INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
-_DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
-_SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
-_HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\Z")
+from .yaml_text import compose_yaml, read_text, scalar
 
 
 def scene_file(name: str) -> Path:
@@ -59,33 +51,6 @@ class SceneFile:
             return ""
         names = ", ".join(self.unused[:5])
         return f"{path}: no section is for /{node_name.lstrip('/')} (it has {names}); /** is for every node"
-
-
-def scalar(text: str) -> bool | int | float | str:
-    """A plain YAML scalar as rcl types it."""
-    if text in _TRUE:
-        return True
-    if text in _FALSE:
-        return False
-    if _INTEGER.match(text):
-        digits = text.lstrip("+-")
-        base = 16 if digits[:2] in ("0x", "0X") else 8 if digits[0] == "0" and len(digits) > 1 else 10
-        try:
-            value = int(digits, base) * (-1 if text[0] == "-" else 1)
-        except ValueError:  # 09 is no octal number; strtod then reads it as 9.0
-            return float(text)
-        return value if -(1 << 63) <= value < 1 << 63 else float(value)
-    if _DOUBLE.match(text):
-        value = float(text)
-        return text if math.isinf(value) else value  # out of a double's range: rcl keeps the text
-    if _SPECIAL.match(text):
-        return float(text.replace(".", ""))
-    if _HEX_DOUBLE.match(text):
-        try:
-            return float.fromhex(text)
-        except ValueError:
-            return text
-    return text
 
 
 def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:

@@ -18,12 +18,11 @@ from typing import Any
 
 from ..base.bundled import body_names
 from ..base.errors import InputError
-from ..scene.command_codec import flow
 from ..scene.parameters import PARAMETERS, convert_all
 from ..scene.scenario import scene_text
 from ..scene.scene_file import read_scene_text
 from ..scene.script import expand_script
-from ..scene.yaml_text import load_plain_yaml
+from ..scene.yaml_text import flow, load_plain_yaml
 from .save_as_script import NOT_OF_THE_MOTION
 
 VERSION = "1"

@@ -21,12 +21,12 @@ from ..scene.command_codec import (
     MESH_FRAME,
     ScriptCommand,
     entry_of,
-    flow,
     frame_names,
     of_event,
 )
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds, scene_text
+from ..scene.yaml_text import flow
 from ..session.recorded_session import RecordedSession
 from ..session.replay import Resimulation, mesh_finder, session_scenario
 from ..session.runs import decode_event

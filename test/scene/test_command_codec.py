@@ -19,13 +19,13 @@ from rigid_proto_ros.scene.command_codec import (
     command_of_event,
     core_command,
     entry_of,
-    flow,
     in_words,
     of_event,
     of_message,
     outgoing,
 )
 from rigid_proto_ros.scene.script import expand_schedule, expand_script, read_schedule
+from rigid_proto_ros.scene.yaml_text import flow
 from rigid_proto_ros.simulation.commands import TieString, WrenchCommand
 
 CONTACTS = frozenset({"tip", "left_end"})

@@ -10,7 +10,8 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.ros.arguments import given_arguments
 from rigid_proto_ros.scene.offline import scene_values
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scalar
+from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
+from rigid_proto_ros.scene.yaml_text import scalar
 
 SCALARS = (
     *(

@@ -11,8 +11,9 @@ from flights import SECOND
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.scene.command_codec import entry_of, of_event
 from rigid_proto_ros.scene.offline import OfflineRun
-from rigid_proto_ros.scene.scenario import make_scenario, yaml_value
+from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.session.replay import Resimulation
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.thrusters import _decay

@@ -18,8 +18,9 @@ from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.scene.yaml_text import flow
 from rigid_proto_ros.workbench import link
-from rigid_proto_ros.workbench.save_as_script import flow, save_as_script
+from rigid_proto_ros.workbench.save_as_script import save_as_script
 
 
 def packed(content) -> str:

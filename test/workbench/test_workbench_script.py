@@ -10,11 +10,12 @@ from hand_session import SCENE, HandSession, random_hand_session
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.scene.command_codec import ScriptCommand, flow, outgoing
+from rigid_proto_ros.scene.command_codec import ScriptCommand, outgoing
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule
+from rigid_proto_ros.scene.yaml_text import flow
 from rigid_proto_ros.workbench.save_as_script import SavedScript, save_as_script
 
 SECOND = 10**9
