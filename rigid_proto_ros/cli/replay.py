@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         repair(args.session, args.repair)
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
     for number, session in enumerate(runs, 1):
-        _tell(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
+        _print_session(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.repair:
         print(f"  repaired: {args.repair}")
     if args.record and not args.until_differs:
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     if asked(args):
         _export(runs, args)
     if not args.until_differs:
-        _say_how_to_see_it(args)
+        _print_how_to_view(args)
     if args.as_scene:
         _branch(runs[-1], args)
     status = _verify(runs, args) if args.verify else 0
@@ -104,7 +104,7 @@ def _check(args: argparse.Namespace) -> None:
     check_exports(args)
 
 
-def _tell(name: str, session: RecordedSession) -> None:
+def _print_session(name: str, session: RecordedSession) -> None:
     times = session.times
     span = f"{times.min() / 1e9:.9g} s to {times.max() / 1e9:.9g} s" if len(times) else "no time"
     print(f"{name}: {len(times)} states, {span}; {len(session.events)} commands and services")
@@ -118,7 +118,7 @@ def _tell(name: str, session: RecordedSession) -> None:
         print(f"  {more} more were refused, the last at {session.refusals[-1][0] / 1e9:.9g} s")
 
 
-def _say_how_to_see_it(args: argparse.Namespace) -> None:
+def _print_how_to_view(args: argparse.Namespace) -> None:
     newest = args.record or args.repair or args.session
     if newest.endswith(".rrd"):
         print(f"  show it with: rerun {newest}")
@@ -144,7 +144,7 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
         if difference is not None:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
             if not difference.tampered:
-                _tell_difference(difference, session)
+                _print_difference(difference, session)
             if args.until_differs:
                 _record_both(session, difference, args)
             return 1
@@ -168,7 +168,7 @@ def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
     write_exports(args, record, looks_of_session(session, given), lambda text: print(f"  {text}"))
 
 
-def _tell_difference(difference: Difference, session: RecordedSession) -> None:
+def _print_difference(difference: Difference, session: RecordedSession) -> None:
     """What led to a difference, as far as the recording says."""
     from ..base.provenance import versions
     from ..session.check import made_with_table

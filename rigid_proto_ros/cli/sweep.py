@@ -75,14 +75,14 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
     file = Path(args.output or Path(study.name).stem + ".parquet")
     plot = read_plot(args.plot, file) if args.plot else None
     try:
-        with notify_when_compiling(lambda: _tell("kernels are being compiled, which takes a while the first time")):
+        with notify_when_compiling(lambda: _print("kernels are being compiled, which takes a while the first time")):
             if plot:
                 check_plot(plot, run_chunk(study, 0, 0).columns)
             metadata = run_study(study, file, workers=args.threads, dask=args.dask, resume=args.resume)
     except Interrupted as stopped:
         done = stopped.metadata["rows_done"]
         if done:
-            _tell(f"{done} of {study.rows} rows are in {file}; continue with --resume")
+            _print(f"{done} of {study.rows} rows are in {file}; continue with --resume")
         raise
     if plot:
         plot_table(plot, file)
@@ -119,7 +119,7 @@ def _one_row(study: Study, args: argparse.Namespace) -> int:
     if args.as_scene:
         summary.update(write_scene(study, variation(study, row), Path(args.as_scene), summary["time"]))
     if args.record:
-        record_row(study, variation(study, row), args.record, _tell)
+        record_row(study, variation(study, row), args.record, _print)
         summary["recorded"] = args.record
     if args.json:
         print(json.dumps(summary))
@@ -140,5 +140,5 @@ def _ghosts(study: Study, args: argparse.Namespace) -> int:
     return 0
 
 
-def _tell(message: str) -> None:
+def _print(message: str) -> None:
     print(f"rigid_proto sweep: {message}", file=sys.stderr)

@@ -107,7 +107,7 @@ class SceneWriter:
         self._state_timeline = StateTimeline()
         self._disturbances = Disturbances()
         self._pictured: list[tuple[np.ndarray, ...]] = []
-        self._tell_body()
+        self._send_body()
 
     def attach(self, stream: Stream) -> None:
         """Send a stream what holds at all times, and the body as it is now; then it gets whatever follows."""
@@ -242,7 +242,7 @@ class SceneWriter:
         for stream in self._listening():
             stream.mesh_number = None
             self._send_scene(stream, 0, self._began_wall_ns)
-        self._tell_body()
+        self._send_body()
 
     def _mesh_changed(self, mark: Mark) -> None:
         self._scene = (self._scene or Scene("", None, None, "")).with_mesh(*mark.content)
@@ -265,7 +265,7 @@ class SceneWriter:
     def _body_changed(self, mark: Mark) -> None:
         before = self._size if self._body is not None else None
         (self._body,) = mark.content
-        self._tell_body()
+        self._send_body()
         for stream in self._listening():
             if self._size != before:
                 self._send_styles(stream)
@@ -279,7 +279,7 @@ class SceneWriter:
             mark, "integrator", self._body.integrator + ("" if self._body.gyroscopic else ", not gyroscopic")
         )
 
-    def _tell_body(self) -> None:
+    def _send_body(self) -> None:
         if self._body is None:
             return
         self._size = self._scene.size(self._body) if self._scene is not None else 1.0

@@ -53,7 +53,7 @@ class Bodies:
             rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rclpy's own error types differ between versions
             raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
-        with notify_when_compiling(_say_that_it_compiles):
+        with notify_when_compiling(_print_that_it_compiles):
             # What the command line gives is for all of them, and comes after the files.
             for name, values in (bodies or {NODE_NAME: {}}).items():
                 self._nodes.append(RigidBodyNode(self._physics, {**values, **given}, _make_viewer, name))
@@ -138,7 +138,7 @@ def _asked_for(name: str, port: int) -> int | None:
     return None if port == PARAMETERS[name].default else port
 
 
-def _say_that_it_compiles() -> None:
+def _print_that_it_compiles() -> None:
     print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
 
 

@@ -154,7 +154,7 @@ class Page:
             raise
 
     def close(self) -> None:
-        """Leave ROS, the node as it was before somebody looked back, and nothing on the disk."""
+        """Leave ROS, the node as it was before the past was shown, and nothing on the disk."""
         self.past_view.close()
         self.link.close()
         self._upload.close()

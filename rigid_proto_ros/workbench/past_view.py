@@ -11,7 +11,7 @@ from .scene_loader import SceneLoader
 
 
 class PastView:
-    """moment_ns: on the history's time, what is looked at; None while the present is shown. on_change()
+    """moment_ns: on the history's time, which is shown; None while the present is shown. on_change()
     is called at each change.
     """
 
@@ -26,16 +26,16 @@ class PastView:
 
     @property
     def back_s(self) -> float:
-        """[s] How far back from where it began."""
+        """[s] How far back from the moment at which it began."""
         return 0.0 if self.moment_ns is None else (self._from_ns - self.moment_ns) * 1e-9
 
     @property
     def paused_before(self) -> bool:
-        """Whether simulated time stood still before somebody looked back; now, where nobody does."""
+        """Whether simulated time stood still before the past was shown; now, while the present is."""
         return self._node.paused if self.moment_ns is None else self._paused_before
 
     def show(self, back_s: float) -> None:
-        """Show the body as it was so many seconds before the present, or before where looking back began."""
+        """Show the body as it was so many seconds before the present, or before the moment at which this began."""
         if back_s <= 0.0:
             self.resume()
             return
@@ -49,18 +49,18 @@ class PastView:
         self.on_change()
 
     def move_by(self, seconds: float) -> None:
-        """Look further back than now, or less far with a negative number."""
+        """Go further back than now, or less far with a negative number."""
         self.show(max(0.0, self.back_s + seconds))
 
     def step(self, count: int) -> None:
-        """Look back by so many publication periods, which is what ``~/step`` goes on by; less far with a
+        """Go back by so many publication periods, which is what ``~/step`` goes on by; less far with a
         negative number.
         """
         scenario = self._scenes.scenario
         self.move_by(count * (0.01 if scenario is None else 1.0 / float(scenario.parameters.publish_rate)))
 
     def run_afterwards(self) -> None:
-        """Simulated time goes on after this look back, though it stood still before."""
+        """Simulated time goes on after this, though it stood still before."""
         self._paused_before = False
 
     def resume(self) -> None:
@@ -80,6 +80,6 @@ class PastView:
         self._node.call("reset")
 
     def close(self) -> None:
-        """Leave the node as it was before somebody looked back."""
+        """Leave the node as it was before the past was shown."""
         if self.moment_ns is not None:
             self._node.link.call("pause", self._paused_before)

@@ -24,7 +24,7 @@ def test_after_a_repair_it_says_how_to_see_the_new_file(ending, tmp_path, capsys
 
 def test_however_many_commands_were_refused_few_are_listed(capsys):
     refusals = [(k * 1_000_000, f"command {k}") for k in range(5000)]
-    replay._tell("s.rrd", RecordedSession(refusals=refusals))
+    replay._print_session("s.rrd", RecordedSession(refusals=refusals))
     lines = capsys.readouterr().out.splitlines()
     assert sum("refused at" in line for line in lines) == replay.REFUSALS_SHOWN
     assert f"{5000 - replay.REFUSALS_SHOWN} more were refused, the last at 4.999 s" in lines[-1]
