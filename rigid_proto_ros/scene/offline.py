@@ -99,7 +99,7 @@ class OfflineRun(ScenarioRun):
                 ) from None
 
     def advance(self, until_ns: int) -> bool:
-        """Advance the body to ``until_ns``, telling the observer every publication; False when the motion failed."""
+        """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""
         if self._is_observed:
             rate = self.scenario.parameters.publish_rate
             while (next_ns := publication_ns(self._next_publication, rate)) <= until_ns:

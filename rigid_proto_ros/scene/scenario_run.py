@@ -41,7 +41,7 @@ class ScenarioRun:
         return self.replace(check_inertia(self.scenario, content))
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force; the ghost follows, and the observer is told."""
+        """Put another scenario in force; the ghost follows, and the observer is notified."""
         self.check_change(scenario)
         self.scenario = scenario
         # One that isn't there would have missed what was commanded so far: it begins at the next reset.
