@@ -35,7 +35,6 @@ CHANGES = """
 - {t: 0.7, set: {scale: [-1.0, 1.0, 1.0]}}
 - {t: 0.8, set: {mesh: hammer}}
 """
-DURATION_NS = 1_000_000_000
 TIMES = np.sort(np.random.default_rng(4).uniform(0.0, 1.0, 200))
 
 

@@ -18,7 +18,6 @@ from rigid_proto_ros.simulation.simulation import Simulation
 SECOND = 10**9
 HUGE = (1e15, 0.0, 0.0)
 NAN, INF = math.nan, math.inf
-DAY = 24 * 3600 * SECOND
 
 FRAMES = (
     *(
@@ -341,10 +340,6 @@ def random_number(numbers: random.Random) -> float:
             10.0 ** numbers.uniform(-300, 300),
         )
     )
-
-
-def random_vector(numbers: random.Random) -> list[float]:
-    return [random_number(numbers) for _ in range(3)]
 
 
 def random_frame(numbers: random.Random) -> str:
