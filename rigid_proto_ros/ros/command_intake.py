@@ -111,7 +111,7 @@ class CommandIntake:
         return sum(queue.sequence_gaps for _, queue, _ in self._sources)
 
     def take(self, wall_ns: int, all_topics: bool = False) -> bool:
-        """Submit everything that has arrived; what is refused is counted and the observer notified, and the rest goes on.
+        """Submit everything that has arrived; what is refused is counted and notified of, and the rest goes on.
         Returns whether something has arrived within the last ACTIVE_NS.
 
         The loop catches up before the first message, so that now is the tick's own time. Topics that carried something
