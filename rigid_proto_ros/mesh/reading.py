@@ -18,6 +18,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import MeshError, is_missing
+from ..base.files import read_bounded
 from . import cache as mesh_cache
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
@@ -240,7 +241,7 @@ def _read_with_trimesh(data: bytes, suffix: str, path: Path, max_bytes: int) -> 
         units = {geometry.units for geometry in scene.geometry.values()}
     except ImportError as error:
         raise MeshError(path.name, is_missing(str(error.name), "meshes")) from None
-    except Exception as error:  # noqa: BLE001 - a foreign reader fails in as many ways as files are broken
+    except Exception as error:
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise MeshError(path.name, f"trimesh {trimesh.__version__} can't read the file ({reason})") from None
     unit = 1.0
