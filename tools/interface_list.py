@@ -116,9 +116,9 @@ class _SceneOnly:
         self._deliver(self._on_scene, read_scene("t_handle").text)
 
     def take(self) -> object:
-        from rigid_proto_ros.workbench.ros_link import Heard
+        from rigid_proto_ros.workbench.ros_link import Received
 
-        return Heard()
+        return Received()
 
     def close(self) -> None:
         pass
