@@ -59,9 +59,10 @@ said["step"] = call(srv.StepSimulation, "step_simulation", steps=2).result.resul
 state = call(srv.GetEntityState, "get_entity_state", entity="rigid_body").state
 said["state"] = [state.header.stamp.nanosec, state.pose.position.x]
 
+client = ActionClient(node, action.SimulateSteps, "/rigid_body/simulate_steps")
+assert client.wait_for_server(100.0)
+
 def steps(count, cancel_at=None):
-    client = ActionClient(node, action.SimulateSteps, "/rigid_body/simulate_steps")
-    assert client.wait_for_server(100.0)
     told = []
     sent = client.send_goal_async(action.SimulateSteps.Goal(steps=count), lambda f: told.append(f.feedback))
     rclpy.spin_until_future_complete(node, sent, timeout_sec=100.0)
@@ -74,6 +75,11 @@ def steps(count, cancel_at=None):
     rclpy.spin_until_future_complete(node, ended, timeout_sec=100.0)
     return ended.result(), told
 
+# Until the node knows that somebody listens to its feedback.
+heard = []
+while not heard:
+    _, heard = steps(1)
+    rclpy.spin_once(node, timeout_sec=0.5)
 ended, told = steps(5)
 while len(told) < 5:
     rclpy.spin_once(node, timeout_sec=0.1)
