@@ -10,6 +10,7 @@ import importlib
 import os
 import signal
 import sys
+from typing import Any
 
 from .. import __version__
 from ..base.command_line import Parser, complete, completing
@@ -37,6 +38,7 @@ EXAMPLES = (
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
+    own_process = argv is None
     argv = sys.argv[1:] if argv is None else argv
     parser = Parser(
         prog="rigid_proto",
@@ -55,6 +57,8 @@ def main(argv: list[str] | None = None) -> int:
             command.set_defaults(run=module.run)
     complete(parser)
     args = parser.parse_args(argv)
+    if own_process and "numba" in sys.modules:
+        _without_linear_algebra()
     # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in
     # the background had it ignored.
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -75,6 +79,21 @@ def main(argv: list[str] | None = None) -> int:
     except OSError as error:
         print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
         return 2
+
+
+def _without_linear_algebra() -> None:
+    """Let numba find no SciPy when it looks for BLAS, as where it isn't installed: no kernel of this package has a use
+    for it, and importing scipy.linalg takes a fifth of a command's start. For processes that run nobody else's kernels.
+    """
+    looks = "numba.np.arraymath"  # the module that does, when the first kernel is called (tried with numba 0.68)
+    modules: dict[str, Any] = sys.modules
+    if looks in modules or "scipy.linalg" in modules:
+        return
+    modules["scipy.linalg"] = None
+    try:
+        importlib.import_module(looks)
+    finally:
+        del modules["scipy.linalg"]
 
 
 def _one_line(error: Exception) -> str:

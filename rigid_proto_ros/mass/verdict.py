@@ -30,6 +30,8 @@ NO_VOLUME = 1e-14
 """V/(area·diagonal) below which the surface encloses nothing: both sides coincide to rounding."""
 NONPLANAR = 1e-9
 """Largest distance of a corner from its polygon's plane, over the mesh's diagonal, that counts as planar."""
+SIZE_RANGE = 1e-60, 1e60
+"""Longest sides of surfaces that are judged: moments grow with the fifth power, and doubles end at 1e308."""
 LARGE_M, SMALL_M = 5.0, 1e-3
 """Longest sides [m] outside which another unit is suspected: few bodies that one pokes are longer, and every part of
 5 mm to 5 m drawn in millimetres is."""
@@ -273,7 +275,6 @@ def check_surface(
     lower, upper = extent.lower, extent.upper
     half = 0.5 * upper - 0.5 * lower
     middle = 0.5 * lower + 0.5 * upper
-    diagonal = 2.0 * float(np.linalg.norm(half))
     if extent.unused:
         spare = "1 vertex belongs" if extent.unused == 1 else f"{extent.unused} vertices belong"
         message = f"{spare} to no face; that carries no mass"
@@ -281,10 +282,16 @@ def check_surface(
         if lost:
             message += f"; {lost} of them are not finite and taken to lie at the first face's first corner"
         verdict.add(UNREFERENCED, INFO, message)
-    if diagonal == 0.0:
+    side = 2.0 * float(half.max())
+    if not SIZE_RANGE[0] <= side <= SIZE_RANGE[1]:
         verdict.usable = False
-        verdict.add("zero_volume", ERROR, "all vertices lie in one point")
+        if side == 0.0:
+            verdict.add("zero_volume", ERROR, "all vertices lie in one point")
+        else:
+            sizes = "from {:g} to {:g}".format(*SIZE_RANGE)
+            verdict.add("size", ERROR, f"the mesh is {side:.3g} across; moments are finite for sizes {sizes}")
         return verdict, topology
+    diagonal = 2.0 * float(np.linalg.norm(half))
     sums = component_sums(vertices, triangles, topology, middle)
     _check_edges(verdict, topology, sums, vertices, half)
     if topology.unbalanced == 0:

@@ -55,3 +55,20 @@ def test_a_command_without_its_package_names_it_in_one_line_and_does_nothing(
     assert main(command) == 2
     told = capsys.readouterr()
     assert told.out == "" and len(told.err.splitlines()) == 1 and named in told.err
+
+
+COMMAND = """
+import sys
+from rigid_proto_ros.cli import main
+sys.argv = ["rigid_proto", "inspect", "t_handle", "--urdf"]
+status = main.main()
+print(status, "numba.np.arraymath" in sys.modules, [m for m in ("scipy.linalg", "scipy.spatial") if m in sys.modules])
+import scipy.linalg
+"""
+
+
+def test_a_command_starts_without_scipys_linear_algebra():
+    ran = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, text=True, check=True)
+    expected = "0 True []"
+    moved = "numba no longer looks for BLAS where cli/main.py lets it find none"
+    assert ran.stdout.splitlines()[-1] == expected, moved

@@ -115,6 +115,8 @@ REFUSED = [
     ("flat.obj", obj(V * [1.0, 1.0, 0.0]), "zero_volume", "no volume"),
     ("line.obj", obj(V * [1.0, 0.0, 0.0]), "zero_volume", "no volume"),
     ("point.obj", obj(V * 0.0), "zero_volume", "one point"),
+    ("huge.obj", obj(V * 1e110), "size", "1e+110 across"),
+    ("tiny.obj", obj(V * 1e-110), "size", "1e-110 across"),
     ("fin.obj", obj(np.vstack([V, [[2.0, 2.0, 2.0]]]), [*T, (6, 7, 8)]), "open", "boundary edge"),
 ]
 
