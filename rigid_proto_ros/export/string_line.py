@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, multiply
+from ..rerun_view.string_curve import POINTS, string_curves
 from ..simulation.observer import ShownString
 from .interpolation import Keys, fewest_keys, rounded, slerp
 
@@ -31,6 +32,24 @@ def string_ends(strings: Strings, times_ns: np.ndarray, poses: np.ndarray) -> tu
         free[begin:end] = string.free_end(times)
         knots[begin:end] = own[:, :3] + matrix_from_quaternion(own[:, 3:]) @ string.attach
     return free, knots
+
+
+def slack_lengths(strings: Strings, times_ns: np.ndarray) -> np.ndarray:
+    """Lengths (n,) [m] that the string has at times (n,) where its ends are nearer than that; 0 of one that also pushes,
+    and of none.
+    """
+    lengths = [0.0, *(0.0 if string is None or string.bilateral else string.rest_length for _, string in strings)]
+    begins = [t if t > 0 else -1 for t, _ in strings]
+    return np.array(lengths)[np.searchsorted(begins, times_ns, side="left")]
+
+
+def string_points(strings: Strings, times_ns: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """The string's points (n, POINTS, 3) [m, world], from the free end to the knot, as ``string_ends`` has them."""
+    free, knots = string_ends(strings, times_ns, poses)
+    curves = np.full((len(times_ns), POINTS, 3), np.nan)
+    tied = ~np.isnan(free[:, 0])
+    curves[tied] = string_curves(free[tied], knots[tied], slack_lengths(strings, times_ns)[tied])
+    return curves
 
 
 def string_breaks(strings: Strings) -> list[int]:

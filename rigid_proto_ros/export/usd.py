@@ -17,10 +17,11 @@ from ..base.rotation import quaternion_from_matrix, rotate
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from ..rerun_view.inertia_shapes import PrincipalFrame
 from ..simulation.observer import BodySnapshot
-from .animation import Animation, ends_of
+from .animation import Animation
 from .flight_record import DrawnMesh, FlightRecord
 from .keys import PoseKeys
 from .sampling import Motion, Track, body_size, single
+from .string_line import slack_lengths, string_points
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
@@ -191,9 +192,12 @@ def _add_mass(mass: Any, body: BodySnapshot) -> None:
 def _draw_string(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: float, width: float) -> None:
     from pxr import Vt
 
-    free, knots = ends_of(record, motion)
-    tied = ~np.isnan(free[:, 0])
-    curve = _line(stage, "/flight/string", 2, STRING_COLOUR, width)
+    shown = string_points(record.strings, motion.times_ns, motion.body.poses)
+    tied = ~np.isnan(shown[:, 0, 0])
+    # Every sample needs as many points.
+    if not slack_lengths(record.strings, motion.times_ns).any():
+        shown = shown[:, [0, -1]]
+    curve = _line(stage, "/flight/string", shown.shape[1], STRING_COLOUR, width)
     points, extent = curve.CreatePointsAttr(), curve.CreateExtentAttr()
     was_tied: bool | None = None
     # Of looks at equal times, on both sides of a change, the last counts.
@@ -203,9 +207,9 @@ def _draw_string(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: f
             was_tied = bool(tied[k])
             _show(curve, was_tied, code)
         if tied[k]:
-            ends = np.array([free[k], knots[k]], dtype=np.float32)
-            points.Set(Vt.Vec3fArray.FromNumpy(ends), code)
-            extent.Set(Vt.Vec3fArray.FromNumpy(_extent(ends, width)), code)
+            now = shown[k].astype(np.float32)
+            points.Set(Vt.Vec3fArray.FromNumpy(now), code)
+            extent.Set(Vt.Vec3fArray.FromNumpy(_extent(now, width)), code)
 
 
 def _draw_trail(stage: Usd.Stage, places: np.ndarray, width: float) -> None:

@@ -244,6 +244,16 @@ def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | N
     verdict.add(OVERLAPPING, WARNING, f"{overlap}; {counts}", "--repair union makes one solid of them")
 
 
+def _check_size(verdict: Verdict, side: float) -> None:
+    """Nothing can be computed of a surface whose longest side is zero, or so large or small that moments overflow."""
+    verdict.usable = SIZE_RANGE[0] <= side <= SIZE_RANGE[1]
+    if side == 0.0:
+        verdict.add("zero_volume", ERROR, "all vertices lie in one point")
+    elif not verdict.usable:
+        sizes = "from {:g} to {:g}".format(*SIZE_RANGE)
+        verdict.add("size", ERROR, f"the mesh is {side:.3g} across; moments are finite for sizes {sizes}")
+
+
 def _check_polygons(verdict: Verdict, planarity: tuple[float, float], diagonal: float) -> None:
     deviation, spread = planarity
     if deviation > NONPLANAR * diagonal:
@@ -282,14 +292,8 @@ def check_surface(
         if lost:
             message += f"; {lost} of them are not finite and taken to lie at the first face's first corner"
         verdict.add(UNREFERENCED, INFO, message)
-    side = 2.0 * float(half.max())
-    if not SIZE_RANGE[0] <= side <= SIZE_RANGE[1]:
-        verdict.usable = False
-        if side == 0.0:
-            verdict.add("zero_volume", ERROR, "all vertices lie in one point")
-        else:
-            sizes = "from {:g} to {:g}".format(*SIZE_RANGE)
-            verdict.add("size", ERROR, f"the mesh is {side:.3g} across; moments are finite for sizes {sizes}")
+    _check_size(verdict, 2.0 * float(half.max()))
+    if not verdict.usable:
         return verdict, topology
     diagonal = 2.0 * float(np.linalg.norm(half))
     sums = component_sums(vertices, triangles, topology, middle)

@@ -14,6 +14,7 @@ from . import entities as e
 from .columns import Send, Ticks, scalar_columns, time_columns
 from .derived import to_world
 from .plots import Ranges
+from .string_curve import string_curves
 
 RATE = 100
 """[1/s, simulated] of the picture; tension is plotted at it too."""
@@ -21,27 +22,8 @@ RATE = 100
 LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
 
-SLACK_POINTS = 25
-BISECTIONS = 40
-"""Enough for the sag to 12 digits."""
-
 NO_DIRECTION = 1e-12
 """In rest lengths: a string shorter than this has no direction to pull in."""
-
-
-def sag(distance: np.ndarray, length: float) -> np.ndarray:
-    """How deep (n,) a parabola hangs through whose ends are ``distance`` (n,) apart and which is ``length`` long.
-
-    With half span h and slope a = 2 s/h at the end, the arc is h √(1 + a²) + (h/a) asinh a.
-    """
-    half = np.maximum(0.5 * distance, 1e-9 * length)
-    low, high = np.zeros_like(half), np.full_like(half, 0.5 * length)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        a = 2.0 * middle / half
-        arc = half * np.sqrt(1.0 + a * a) + half * np.divide(np.arcsinh(a), a, out=np.ones_like(a), where=a > 0.0)
-        low, high = np.where(arc < length, middle, low), np.where(arc < length, high, middle)
-    return 0.5 * (low + high)
 
 
 class StringPicture:
@@ -113,7 +95,7 @@ class StringPicture:
         self._lines.append(np.stack([knots, knots + LINE_SIZES * self.size * along], axis=1)[tension > 0.0])
         away = rows[:, 0:3] - free_end
         self._distances.append(np.linalg.norm(np.cross(along, away), axis=1))
-        self._strips.extend(_drawn(string, free_end, span, distance))
+        self._strips.extend(_drawn(string, free_end, knots))
         self._shown = True
 
     def send(self, send: Send) -> None:
@@ -163,26 +145,9 @@ def _tension(string: ShownString, span: np.ndarray, distance: np.ndarray, veloci
     return np.where(distance < NO_DIRECTION * string.rest_length, 0.0, tension)
 
 
-def _drawn(string: ShownString, free_end: np.ndarray, span: np.ndarray, distance: np.ndarray) -> list[np.ndarray]:
+def _drawn(string: ShownString, free_end: np.ndarray, knots: np.ndarray) -> list[np.ndarray]:
     """Per state the string as points: its two ends, or as long a curve as it is, hanging down."""
-    slack = (distance < string.rest_length) & (not string.bilateral)
-    depth = sag(distance, string.rest_length) if slack.any() else np.zeros(len(span))
-    along = np.linspace(0.0, 1.0, SLACK_POINTS)[:, np.newaxis]
-    strips = []
-    for k in range(len(span)):
-        if slack[k]:
-            down = 4.0 * depth[k] * along * (1.0 - along) * _down(span[k], distance[k])
-            strips.append(free_end[k] + along * span[k] + down)
-        else:
-            strips.append(np.array([free_end[k], free_end[k] + span[k]]))
-    return strips
-
-
-def _down(span: np.ndarray, distance: float) -> np.ndarray:
-    """The unit vector (3,) square to the span that points down most, sideways for a string that hangs straight."""
-    axis = span / distance if distance > 0.0 else np.array([1.0, 0.0, 0.0])
-    down = np.array([0.0, 0.0, -1.0])
-    square = down - axis * (axis @ down)
-    if np.linalg.norm(square) < 1e-6:
-        square = np.array([1.0, 0.0, 0.0]) - axis * axis[0]
-    return square / np.linalg.norm(square)
+    length = 0.0 if string.bilateral else string.rest_length
+    slack = np.linalg.norm(knots - free_end, axis=1) < length
+    curves = iter(string_curves(free_end[slack], knots[slack], length))
+    return [next(curves) if slack[k] else np.array([free_end[k], knots[k]]) for k in range(len(slack))]

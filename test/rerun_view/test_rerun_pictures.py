@@ -18,7 +18,6 @@ from rigid_proto_ros.rerun_view.motion_picture import Trail
 from rigid_proto_ros.rerun_view.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 from rigid_proto_ros.rerun_view.run_log import readable
-from rigid_proto_ros.rerun_view.string_picture import sag
 from rigid_proto_ros.rerun_view.surface_normals import shaded_surface
 from rigid_proto_ros.simulation.observer import BodySnapshot, ShownString
 from rigid_proto_ros.simulation.quantities import attitude_angle
@@ -242,15 +241,6 @@ def test_an_impulse_is_shown_from_its_instant_for_a_moment(tmp_path):
     shown = [time_ns for time_ns, vector in zip(times, vectors, strict=True) if vector]
     assert shown[0] == 100_000_000 and shown[-1] == 240_000_000
     assert (times[-1], vectors[-1]) == (250_000_000, [])
-
-
-@settings(deadline=None)
-@given(st.floats(0.01, 0.999), st.floats(1e-3, 1e3))
-def test_a_slack_string_is_drawn_as_long_as_it_is(taut, length):
-    (depth,) = sag(np.array([taut * length]), length)
-    along = np.linspace(0.0, 1.0, 4001)
-    curve = np.column_stack([taut * length * along, 4.0 * depth * along * (1.0 - along)])
-    assert np.isclose(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum(), length, rtol=1e-5)
 
 
 def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let_go(tmp_path):
