@@ -32,8 +32,8 @@ SKY, GROUND = "#f7f9fc", "#cfd8e4"
 GHOST_OPACITY = 0.45
 PICTURES_MAX = 200_000
 OVERSAMPLING = 2
-"""Pixels drawn for each one shown, along each edge: finer edges than a filter makes of one. A linear filter takes just the
-mean of two, in three quarters of the time of a wider one."""
+"""Pixels drawn for each one shown, along each edge: finer edges than a filter makes of one. A linear filter takes
+just the mean of two, in three quarters of the time of a wider one."""
 GIF_FILTER = "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
 
 

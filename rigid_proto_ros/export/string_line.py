@@ -35,8 +35,8 @@ def string_ends(strings: Strings, times_ns: np.ndarray, poses: np.ndarray) -> tu
 
 
 def slack_lengths(strings: Strings, times_ns: np.ndarray) -> np.ndarray:
-    """Lengths (n,) [m] that the string has at times (n,) where its ends are nearer than that; 0 of one that also pushes,
-    and of none.
+    """Lengths (n,) [m] that the string has at times (n,) where its ends are nearer than that; 0 of one that pushes,
+    too, and of none.
     """
     lengths = [0.0, *(0.0 if string is None or string.bilateral else string.rest_length for _, string in strings)]
     begins = [t if t > 0 else -1 for t, _ in strings]

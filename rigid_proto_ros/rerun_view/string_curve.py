@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The string as it is drawn everywhere: straight while it pulls; while it is slack, as long as it is, hanging through."""
+"""The string as it is drawn everywhere: straight while it pulls, hanging through while it is slack."""
 
 from __future__ import annotations
 
