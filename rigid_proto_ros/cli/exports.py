@@ -179,12 +179,13 @@ def _write_animations(
     for name in ("gltf", "usd"):
         if name not in files:
             continue
+        report = list(made.report)
         with Progress(f"writing {files[name]}"):
             if name == "gltf":
                 write_gltf(files[name], record, made, "trail" in parts)
             else:
-                write_usd(files[name], record, made, args.fps, "trail" in parts)
-        for line in made.report:
+                report += write_usd(files[name], record, made, args.fps, "trail" in parts)
+        for line in report:
             say(f"{files[name]}: {line}")
 
 

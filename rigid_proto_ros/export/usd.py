@@ -42,9 +42,11 @@ def check_usd() -> None:
         raise InputError("--usd", is_missing("usd-core", "export")) from None
 
 
-def write_usd(file: str, record: FlightRecord, made: Animation, fps: float | None = None, trail: bool = False) -> None:
+def write_usd(
+    file: str, record: FlightRecord, made: Animation, fps: float | None = None, trail: bool = False
+) -> list[str]:
     """Write an animation: the body, the ghost and the string where it has them, and the centre of mass's path on
-    request.
+    request. Returns what to say of it, a line each.
     """
     motion, keys, size = made.motion, made.keys, body_size(record)
     check_usd()
@@ -67,7 +69,7 @@ def write_usd(file: str, record: FlightRecord, made: Animation, fps: float | Non
         _animate(prim, pose, rate)
         _hide_while_away(prim, motion, track, rate)
         _draw_meshes(stage, prim, (colour, opacity), record, motion, track, rate)
-    _add_physics(stage, record)
+    changes = _add_physics(stage, record, motion, rate)
     if made.string is not None:
         _draw_string(stage, record, motion, rate, STRING_WIDTH * size)
     if trail and len(keys[0].places.times) > 1:
@@ -77,6 +79,12 @@ def write_usd(file: str, record: FlightRecord, made: Animation, fps: float | Non
         path.unlink()
         if not stage.GetRootLayer().Export(str(path)):
             raise InputError("--usd", file, "a file that can be written")
+    if not changes:
+        return []
+    times = "once" if changes == 1 else f"{changes} times"
+    return [
+        f"mass or tensor change {times} in flight: they are time samples, of which a physics engine takes the first"
+    ]
 
 
 def _animate(prim: UsdGeom.Xform, pose: PoseKeys, rate: float) -> None:
@@ -160,8 +168,10 @@ def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int],
         prim.CreateDisplayOpacityAttr([opacity])
 
 
-def _add_physics(stage: Usd.Stage, record: FlightRecord) -> None:
-    """The rigid body as it is at the start, with its velocities, and gravity: what a physics engine begins with."""
+def _add_physics(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: float) -> int:
+    """The rigid body as it is at the start, with its velocities, and gravity: what a physics engine begins with. How
+    often mass or tensor change in flight.
+    """
     from pxr import Gf, UsdPhysics
 
     body, row = record.bodies[0].body, record.rows[0]
@@ -170,23 +180,49 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> None:
     rigid.CreateVelocityAttr(Gf.Vec3f(*row[7:10].tolist()))
     spin = np.degrees(rotate(*row[3:7].tolist(), *row[10:13].tolist()))
     rigid.CreateAngularVelocityAttr(Gf.Vec3f(*spin.tolist()))
-    _add_mass(UsdPhysics.MassAPI.Apply(prim), body)
+    steps = _mass_steps(record, motion)
+    _add_mass(UsdPhysics.MassAPI.Apply(prim), steps, rate)
     scene = UsdPhysics.Scene.Define(stage, "/flight/physics_scene")
     pull = float(np.linalg.norm(body.gravity))
     scene.CreateGravityMagnitudeAttr(pull)
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(body.gravity / pull if pull else [0.0, 0.0, -1.0])))
+    return len(steps) - 1
 
 
-def _add_mass(mass: Any, body: BodySnapshot) -> None:
-    """Mass, centre of mass in the prim's space, principal moments [kg m²] and the attitude of their axes in it."""
+def _mass_steps(record: FlightRecord, motion: Motion) -> list[tuple[float, BodySnapshot]]:
+    """The bodies whose mass or tensor is other than the one's before, and the times [s] from which they are."""
+    steps: list[tuple[float, BodySnapshot]] = []
+    for drawn in record.bodies:
+        seconds = max(0.0, float(single(np.array([drawn.time_ns - motion.times_ns[0]]))[0]))
+        if steps and steps[-1][0] == seconds:
+            steps.pop()
+        before = steps[-1][1] if steps else None
+        if before is None or before.mass != drawn.body.mass or not np.array_equal(before.inertia, drawn.body.inertia):
+            steps.append((seconds, drawn.body))
+    return steps
+
+
+def _add_mass(mass: Any, steps: list[tuple[float, BodySnapshot]], rate: float) -> None:
+    """Mass, centre of mass in the prim's space, principal moments [kg m²] and the attitude of their axes in it: by
+    default those of the start, and time samples where they change, from one instant to the next.
+    """
     from pxr import Gf
 
-    frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
-    x, y, z, w = quaternion_from_matrix(frame.axes).tolist()
-    mass.CreateMassAttr(body.mass)
     mass.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
-    mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*frame.moments.tolist()))
-    mass.CreatePrincipalAxesAttr(Gf.Quatf(w, x, y, z))
+    attributes = mass.CreateMassAttr(), mass.CreateDiagonalInertiaAttr(), mass.CreatePrincipalAxesAttr()
+    before: tuple[Any, ...] | None = None
+    for seconds, body in steps:
+        frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
+        x, y, z, w = quaternion_from_matrix(frame.axes).tolist()
+        values = body.mass, Gf.Vec3f(*frame.moments.tolist()), Gf.Quatf(w, x, y, z)
+        for n, attribute in enumerate(attributes):
+            if before is None:
+                attribute.Set(values[n])
+            else:
+                attribute.Set(before[n], float(np.nextafter(np.float32(seconds), np.float32(-1.0))) * rate)
+            if len(steps) > 1:
+                attribute.Set(values[n], seconds * rate)
+        before = values
 
 
 def _draw_string(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: float, width: float) -> None:

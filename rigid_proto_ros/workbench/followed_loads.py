@@ -138,6 +138,12 @@ class FollowedLoads:
         hand = tied.free_end(state.time_ns)
         return hand + tied.span(setup.body, state), hand
 
+    @property
+    def slack_length(self) -> float:
+        """How long [m] the string is where its ends are nearer than that; 0 of one that pushes, too."""
+        tied = self.string
+        return 0.0 if tied is None or tied.bilateral else tied.rest_length
+
     def string_energy(self, setup: Setup, state: State) -> float:
         """What the string holds [J]."""
         tied = self.string

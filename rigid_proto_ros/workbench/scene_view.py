@@ -16,6 +16,7 @@ import viser
 
 from ..rerun_view.appearance import FORCE_COLOUR, HAND_COLOUR, STRING_COLOUR
 from ..rerun_view.plot_range import nice_step
+from ..rerun_view.string_curve import string_curves
 from ..scene.scenario import Scenario
 from .body_view import BodyView, Switches, body_corners, set_visible
 from .followed_loads import Hit
@@ -162,13 +163,16 @@ class SceneView:
         setup = scenario.setup
         self.trails.draw(now_s, until_ns, setup.body, setup.surface, self.origin, self.unit)
 
-    def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None) -> None:
-        """From the knot to the hand, both in the world; None for no string."""
+    def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None, slack_length: float) -> None:
+        """From the knot to the hand, both in the world; None for no string. slack_length [m]: as ``string_curves`` has
+        it.
+        """
         shown = ends is not None and self.switches.shown("String")
         if ends is not None and shown:
-            points = np.array([[self._drawn(ends[0]), self._drawn(ends[1])]])
-            self._string.points = points
-            self.hand.position = points[0, 1]
+            knot, hand = ends
+            curve = self._drawn(string_curves(hand[np.newaxis], knot[np.newaxis], slack_length)[0])
+            self._string.points = np.stack([curve[:-1], curve[1:]], axis=1)
+            self.hand.position = curve[0]
         set_visible(self._string, shown)
         set_visible(self.hand, shown)
 

@@ -44,6 +44,12 @@ def test_a_drag_draws_the_string_from_the_grabbed_point_and_shows_the_energy_tha
     stretched = flown.do(lambda: page.follower.acting.string_energy(page.scenes.scenario.setup, page.follower.state))
     assert stretched == pytest.approx(tied.potential_energy(own.setup.body, own.state), rel=1e-3)
     assert not flown.said
+    apart = float(np.linalg.norm(hand - knot))
+    for length in (0.0, 3.0 * apart):
+        flown.do(lambda length=length: page.view.show_string((knot, hand), length))
+        pieces = np.asarray(page.view._string.points) * page.view.unit
+        drawn = float(np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum())
+        assert drawn == pytest.approx(length or apart, rel=5e-3)
     flown.let_go()
     flown.fly(0.1)
     assert (
