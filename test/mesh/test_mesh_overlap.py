@@ -143,3 +143,34 @@ def test_a_scene_takes_the_union(tmp_path):
     for wrong in ("onion", "", 1):
         with pytest.raises(InputError, match="true, false, union"):
             make_scenario({"mesh": str(path), "mesh_repair": wrong})
+
+
+def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
+    from rigid_proto_ros.base.rotation import matrix_from_quaternion
+    from rigid_proto_ros.export.flight_record import FlightRecord
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+    from rigid_proto_ros.scene.script import read_script
+
+    mesh, script, recording = tmp_path / "two.obj", tmp_path / "repair.yaml", tmp_path / "flight.rrd"
+    mesh.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (1.0, 0.3, 0.2)))))
+    script.write_text("- {t: 0.1, set: {mesh_repair: union}}\n")
+    settings = {"mesh": str(mesh), "initial.angular_velocity": [1.0, 2.0, 3.0], "density": 1000.0}
+    arguments = [f"--set={name}={value}" for name, value in settings.items()]
+    arguments += ["--script", str(script), "--duration", "0.2", "--record", str(recording)]
+    assert main(["simulate", "hammer", *arguments]) == 0
+    (run,) = read_runs(str(recording))
+    assert run.mesh_chunks == 2
+    assert main(["replay", str(recording), "--verify"]) == 0
+
+    record, places = FlightRecord(), []
+    flight = OfflineRun(read_scene("hammer", settings), read_script(str(script)), record)
+    for time_ns in (100_000_000, 100_000_001):
+        flight.advance(time_ns)
+        row, body = flight.simulation.state.row, flight.simulation.setup.body
+        places.append(row[:3] - matrix_from_quaternion(row[3:7]) @ body.center_of_mass)
+    assert [len(drawn.triangles) for drawn in record.meshes] == [24, len(flight.simulation.setup.surface.triangles)]
+    assert [drawn.mesh for drawn in record.bodies[-2:]] == [0, 1]
+    assert record.bodies[-1].body.mass == pytest.approx(8500.0)
+    assert np.abs(places[1] - places[0]).max() < 1e-8
+    assert np.linalg.norm(record.bodies[-1].body.center_of_mass - record.bodies[-2].body.center_of_mass) > 0.01
