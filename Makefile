@@ -72,8 +72,9 @@ interfaces: setup ## typed messages beside the standard ones, into .venv; needs 
 soak: setup ## an hour of random commands, guests and changes; MINUTES=5 for the short form
 	$(ROS) $(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
 
-stress: setup ## long and hostile tests, and those of random examples with new ones
+stress: setup ## long and hostile tests, those of random examples with new ones, and the same bits elsewhere
 	$(ROS) RIGID_PROTO_EXAMPLES=new $(PY) -m pytest -m "stress or hypothesis" $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen
+	$(if $(ARGS),,$(PY) tools/bits_elsewhere.py)
 
 clean: ## everything that was made here, the environments included
 	rm -rf .venv .venv-bench build install log out *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage

@@ -219,10 +219,6 @@ def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
     scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")
     print(f"  scene at {args.at:g} s: {scene}")
-    if branch.pokes:
-        pokes = scene.with_name(f"{scene.stem}_pokes.yaml")
-        pokes.write_text(branch.pokes_text, encoding="utf-8")
-        print(f"  a scene can't hold the wrenches that acted then; add --script {pokes}")
     for note in branch.notes:
         print(f"  {note}")
 

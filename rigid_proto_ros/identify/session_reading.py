@@ -38,6 +38,8 @@ def session_flight(
         raise InputError(
             "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are taken"
         )
+    if setup.in_flight is not None and setup.in_flight.acts:
+        raise InputError("session", f"{name} goes on from a flight whose loads still act; identify that one")
     if not setup.gyroscopic:
         raise InputError("session", f"{name} was flown with gyroscopic: false, which no body does")
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)

@@ -159,6 +159,7 @@ def equimomental_shapes(mass: float, moments: np.ndarray) -> tuple[np.ndarray, n
 
     side_i² = 6 (I_j + I_k − I_i)/m and semi-axis_i² = 5 (I_j + I_k − I_i)/(2 m).
     """
-    total = float(np.sum(moments))
+    a, b, c = (float(moment) for moment in moments)
+    total = a + b + c
     spread = np.maximum(total - 2.0 * np.asarray(moments), 0.0) / mass
     return np.sqrt(6.0 * spread), np.sqrt(2.5 * spread)

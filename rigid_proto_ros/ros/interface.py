@@ -154,7 +154,11 @@ INTERFACES = (
         "tf2_msgs/TFMessage",
         "frames of mesh and contacts at the body, where tf2_msgs is installed; those of others are read from it, too",
     ),
-    _service("~/reset", "Trigger", "time 0 and the initial state; wrench, pulses and schedule are dropped"),
+    _service(
+        "~/reset",
+        "Trigger",
+        "time 0 and the initial state; wrench, pulses and schedule are dropped; `initial.flight` acts again",
+    ),
     _service(
         "~/pause",
         "SetBool",

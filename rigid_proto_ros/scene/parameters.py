@@ -72,6 +72,12 @@ class InitialState:
         upper=HUGE,
         changes=AT_RESET,
     )
+    flight: str = text(
+        "",
+        "What of an earlier flight goes on at time 0, to the very bits: its segment's start, loads, string, thrusters; "
+        "written by replay --as-scene and by the page's rewind, empty for none.",
+        changes=AT_RESET,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,14 +18,17 @@ from ..mass.properties import MassProperties, MeshMoments, explicit_mass_propert
 from ..mass.tensor import check_tensor
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
-from ..motion.integrators import check_supported, integrator_named
+from ..motion.integrators import integrator_named
 from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
-from ..simulation.checks import needs_of
+from ..simulation.checks import check_in_flight
+from ..simulation.in_flight import InFlight
 from ..simulation.setup import Setup
 from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
+from .in_flight_text import NAME as IN_FLIGHT
+from .in_flight_text import read_in_flight
 from .parameters import Parameters, convert_all, parameter_named
 from .yaml_text import yaml_value
 
@@ -154,11 +157,12 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
         integrator=ghost.integrator or parameters.integrator,
     )
     setup, _ = _setup(own, body_mesh)
-    if ghost.integrator:
+    if ghost.integrator or setup.in_flight:
         try:
-            check_supported(setup.integrator, needs_of(setup, (), setup.string.attached))
+            check_in_flight(setup)
         except CommandRefused as refusal:
-            raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
+            name = "ghost.integrator" if ghost.integrator else "ghost.inertia_model"
+            raise InputError(name, refusal.received, refusal.accepted) from None
     return setup
 
 
@@ -210,8 +214,19 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
         initial=row,
         initial_string_mass=initial.string_mass,
         thrusters={name: make_thruster(name, numbers) for name, numbers in sorted(parameters.thrusters.items())},
+        in_flight=_in_flight(parameters),
     )
     return setup, tuple(properties.warnings)
+
+
+def _in_flight(parameters: Parameters) -> InFlight | None:
+    flight = read_in_flight(parameters.initial.flight)
+    if flight is not None:
+        named = {*flight.thrusters, *(going.thruster for going in flight.loads if going.load is None)}
+        if unknown := named - parameters.thrusters.keys():
+            known = ", ".join(sorted(parameters.thrusters)) or "the body has none"
+            raise InputError(f"{IN_FLIGHT}, thrusters", min(unknown), f"a thruster of the body ({known})")
+    return flight
 
 
 def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: np.ndarray) -> MassProperties:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy import uint64
 
 from ..base.compilation import njit
+from ..base.elementary import cosine, logarithm, sine
 from ..base.rotation import Vector, rotate, rotate_inverse
 from .parameters import Parameters
 
@@ -47,7 +48,7 @@ def _normal(seed: int, channel: int, level: int, index: int) -> float:
     key = _scrambled(key ^ uint64(index))
     first = (float(key >> uint64(11)) + 1.0) * 2.0**-53
     second = float(_scrambled(key) >> uint64(11)) * 2.0**-53
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+    return math.sqrt(-2.0 * logarithm(first)) * cosine(2.0 * math.pi * second)
 
 
 @njit(cache=True)
@@ -115,8 +116,8 @@ class SensorNoise:
 
     def variance(self, sensor: int, time_ns: int) -> float:
         """Expected square of an axis's error, but for the constant bias and what lies beyond the range."""
-        walked = float(self.walk[sensor]) ** 2 * time_ns * 1e-9
-        return float(self.sigma[sensor]) ** 2 + walked + self.resolution[sensor] ** 2 / 12.0
+        walk, sigma, step = float(self.walk[sensor]), float(self.sigma[sensor]), self.resolution[sensor]
+        return sigma * sigma + walk * walk * time_ns * 1e-9 + step * step / 12.0
 
     def _read(self, sensor: int, values: Sequence[float], errors: list[list[float]]) -> list[float]:
         limit, resolution = self.range[sensor], self.resolution[sensor]
@@ -128,10 +129,11 @@ class SensorNoise:
 
 def _turned(q: Sequence[float], turn: Sequence[float]) -> list[float]:
     """The attitude xyzw turned by a small rotation vector (3,) in body axes."""
-    angle = math.sqrt(sum(x * x for x in turn))
+    # Not by sum(), which adds otherwise from Python 3.12 on.
+    angle = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     if angle == 0.0:
         return list(q)
-    s, w = math.sin(0.5 * angle) / angle, math.cos(0.5 * angle)
+    s, w = sine(0.5 * angle) / angle, cosine(0.5 * angle)
     x, y, z = (s * component for component in turn)
     a, b, c, d = q
     return [

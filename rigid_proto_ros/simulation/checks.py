@@ -60,6 +60,18 @@ def check_load_supported(command: WrenchCommand, load: Load, setup: Setup) -> No
         check_supported(setup.integrator, needs_of_load(load))
 
 
+def check_in_flight(setup: Setup) -> None:
+    """Raises CommandRefused where body or integrator can't take what acts at time 0."""
+    in_flight = setup.in_flight
+    tied = setup.string.attached or (in_flight is not None and in_flight.is_tied)
+    loads = [going.load for going in in_flight.loads if going.load is not None] if in_flight else []
+    for load in loads:
+        load.check_magnitude(setup.body)
+    if in_flight is not None and in_flight.thrusters:
+        loads += [thruster.load(1.0) for thruster in setup.thrusters.values()]
+    check_supported(setup.integrator, needs_of(setup, loads, tied))
+
+
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
     """What the scene asks of its integrator."""
     needs: set[str] = set()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,13 +44,24 @@ def _sizes(rows: int) -> tuple[int, int, int]:
 
 
 class ActingLoad(NamedTuple):
-    """A load that acts from begin_ns until end_ns; held: it has a slot, from which it is replaced."""
+    """A load that acts from begin_ns until end_ns. kind and slot: as flights number them."""
 
     load: Load
     begin_ns: int
     end_ns: int
     load_id: int
-    held: bool
+    kind: int
+    slot: int
+
+    @property
+    def thruster(self) -> int:
+        """The number of the thruster whose load it is, or −1."""
+        return -1 - self.slot if self.slot < fl.NO_SLOT else -1
+
+    @property
+    def shown_kind(self) -> str:
+        """As observers are told: wrench, poke or thruster."""
+        return "thruster" if self.thruster >= 0 else "wrench" if self.kind == fl.HELD_WRENCH else "poke"
 
 
 @njit(cache=True, error_model="numpy")
@@ -158,6 +169,33 @@ class FlightArrays:
             self.tie(tied)
         self._begin(self._at)
 
+    def go_on(self, setup: Setup, tied: Tied | None, loads: Sequence[ActingLoad], segment: State | None) -> bool:
+        """Time 0 with loads that act already, from the initial state; or from the state at the start of a segment
+        before that, flown up to time 0: then whether the motion didn't fail. What that takes isn't counted.
+        """
+        self.start_over(setup, tied)
+        f, n = self.f, self.n
+        if len(loads) > self.integers[TABLE_ROWS]:
+            self._make_tables(2 * len(loads))
+        n[fl.ACTING] = len(loads)
+        for row, acting in enumerate(loads):
+            n[fl.LOAD_IDS] += 1
+            load_id, share = n[fl.LOAD_IDS], self.loads[row, fl.SHARE :]
+            self.times[row] = acting.begin_ns, -1, acting.kind, acting.slot, acting.end_ns, load_id
+            self.loads[row, :LOAD] = acting.load.row
+            share_of(self.loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], share)
+        if segment is not None:
+            f[fl.ROW : fl.ROW + 13] = f[fl.START : fl.START + 13] = segment.row
+            n[fl.NOW_NS] = n[fl.START_NS] = segment.time_ns
+        n[fl.SEGMENTS] = 0
+        self._begin(self._at)
+        if segment is None:
+            return True
+        reached = self.fly(0)
+        n[fl.STEPS_BEFORE], n[fl.EVALUATIONS_BEFORE] = -self.steps, -self.evaluations
+        f[fl.WORK_BEFORE], f[fl.LOST_BEFORE] = -f[fl.WORK], -f[fl.LOST]
+        return reached
+
     def tie(self, tied: Tied | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""
         self.n[fl.TIED] = tied is not None
@@ -252,8 +290,8 @@ class FlightArrays:
     def acting(self) -> Iterator[ActingLoad]:
         """The loads that act, in the order in which they began."""
         for row in range(self.n[fl.ACTING]):
-            begin_ns, _, _, slot, end_ns, load_id = self.times[row].tolist()
-            yield ActingLoad(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, slot != fl.NO_SLOT)
+            begin_ns, _, kind, slot, end_ns, load_id = self.times[row].tolist()
+            yield ActingLoad(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, kind, slot)
 
     @property
     def sums(self) -> np.ndarray:
@@ -296,7 +334,7 @@ class FlightArrays:
         self._at = at + 8 * first
         own = whole[first : first + INTEGERS].view(np.int64)
         self.integers = own.data
-        self.integers[DOUBLES], self.integers[fl.ACTING] = doubles, 0
+        self.integers[DOUBLES], self.integers[fl.ACTING], self.integers[fl.LOAD_IDS] = doubles, 0, 0
         self.n = own[: fl.INTEGERS]
         self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
         self.row = self.f[fl.ROW : fl.ROW + 13]

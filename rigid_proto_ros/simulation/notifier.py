@@ -42,10 +42,14 @@ class EventNotifier:
     def introduce(self, readings: Readings) -> None:
         """Tell an observer that comes in flight about the body, what acts on it and the string."""
         self.body(readings)
+        self.loads(readings)
+        self.string(readings)
+
+    def loads(self, readings: Readings) -> None:
+        """What acts already."""
         if self.shows_loads:
             for acting in readings.acting:
-                self.load_began(readings, acting.load_id, "wrench" if acting.held else "poke", acting.load)
-        self.string(readings)
+                self.load_began(readings, acting.load_id, acting.shown_kind, acting.load)
 
     def body(self, readings: Readings) -> None:
         """The body as it is now."""

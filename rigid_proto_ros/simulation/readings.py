@@ -14,10 +14,13 @@ from ..motion.integrators.error_measure import FLOOR
 from ..motion.loads import LoadSum
 from ..motion.state import State
 from ..motion.string import Tied
+from .flight import HELD_WRENCH, NEVER
 from .flight_arrays import ActingLoad, FlightArrays
+from .in_flight import GoingLoad, InFlight
 from .segment import Segment
 from .setup import Setup
 from .string_control import StringControl
+from .thrusters import ThrusterControl
 
 FEWEST_EVALUATIONS = 20_000
 """In a segment, from which on they are checked: the first tiny steps of a transient say nothing about later ones."""
@@ -42,11 +45,26 @@ class Readings:
     _pending: list
     _string: StringControl
     _arrays: FlightArrays
+    thrusters: ThrusterControl
 
     @property
     def acting(self) -> list[ActingLoad]:
         """The loads that act now: in the order in which they began."""
         return list(self._arrays.acting())
+
+    @property
+    def in_flight(self) -> InFlight:
+        """What a flight brings along that goes on from here; what is yet to act is no part of it."""
+        now_ns, setup, start = self.time_ns, self.setup, self._segment.start
+        names = list(setup.thrusters)
+        return InFlight(
+            start.time_ns - now_ns,
+            tuple(start.row.tolist()),
+            tuple(_going_load(acting, now_ns, names) for acting in self.acting),
+            self._string.going_on(setup, now_ns),
+            self.thrusters.pushes(now_ns),
+            self.thrusters.last_ns - now_ns,
+        )
 
     @property
     def _segment(self) -> Segment:
@@ -186,6 +204,15 @@ class Readings:
 
     def _load_sum(self) -> LoadSum:
         return LoadSum(self._arrays.sums)
+
+
+def _going_load(acting: ActingLoad, now_ns: int, thrusters: list[str]) -> GoingLoad:
+    begin_ns = acting.begin_ns - now_ns
+    if acting.thruster >= 0:
+        return GoingLoad(begin_ns, thruster=thrusters[acting.thruster])
+    held = acting.kind == HELD_WRENCH
+    end_ns = NEVER if held else acting.end_ns - now_ns
+    return GoingLoad(begin_ns, acting.load, held, acting.slot, end_ns)
 
 
 def why_rounding_binds(setup: Setup, state: State, step_floor: bool, exact_step: bool, elapsed: float) -> str:

@@ -72,9 +72,21 @@ def check_forces(thrusters: Mapping[str, Thruster], forces: Sequence[float], bod
         thruster.load(thruster.within(force)).check_magnitude(body)
 
 
+class Push(NamedTuple):
+    """What a thruster is at. target: what it was told to push with, within its limit [N]; value: u at since_ns;
+    until_ns: when its stair ends, NEVER where the target is reached; stairs: since the last command.
+    """
+
+    target: float
+    value: float
+    since_ns: int
+    until_ns: int
+    stairs: int
+
+
 @dataclass
-class _Working:
-    """One thruster at work. value: u at since_ns [N]; until_ns: when its stair ends. stairs: since the last command."""
+class Working:
+    """One thruster at work; the numbers as ``Push`` has them."""
 
     thruster: Thruster
     target: float = 0.0
@@ -103,6 +115,22 @@ class _Working:
         mean = _mean_of_decay((self.until_ns - now_ns) / lag_ns)
         return self.target + (self.value - self.target) * mean
 
+    @property
+    def load(self) -> Load:
+        """What it pushes with now: the mean of its stair."""
+        force = self.target
+        if self.until_ns != NEVER:
+            lag_ns = round(self.thruster.lag_s * 1e9)
+            mean = _mean_of_decay((self.until_ns - self.since_ns) / lag_ns) if lag_ns else 0.0
+            force = self.target + (self.value - self.target) * mean
+        return self.thruster.load(force)
+
+    def push(self, now_ns: int) -> Push:
+        """What it is at, times from ``now_ns`` on."""
+        if self.until_ns == NEVER:
+            return Push(self.target, self.target, 0, NEVER, 0)
+        return Push(self.target, self.value, self.since_ns - now_ns, self.until_ns - now_ns, self.stairs)
+
     def _pass(self, now_ns: int) -> None:
         decay = _decay((now_ns - self.since_ns) / (self.thruster.lag_s * 1e9))
         self.value, self.since_ns = self.target + (self.value - self.target) * decay, now_ns
@@ -130,10 +158,10 @@ class ThrusterControl:
     due_ns: int = NEVER
     last_ns: int = 0
     times_out: bool = False
-    _working: list[_Working] = field(default_factory=list)
+    _working: list[Working] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._working = [_Working(thruster) for thruster in self.thrusters.values()]
+        self._working = [Working(thruster) for thruster in self.thrusters.values()]
 
     @property
     def targets(self) -> list[float]:
@@ -144,6 +172,25 @@ class ThrusterControl:
     def lags(self) -> bool:
         """Whether some force is still on its way."""
         return any(working.until_ns != NEVER for working in self._working)
+
+    def pushes(self, now_ns: int) -> dict[str, Push]:
+        """What those at work are at, by name, times from ``now_ns`` on."""
+        named = zip(self.thrusters, self._working, strict=True)
+        return {name: working.push(now_ns) for name, working in named if working.target or working.until_ns != NEVER}
+
+    def go_on(self, pushes: Mapping[str, Push], last_ns: int, timeout_ns: int) -> None:
+        """Be at these at time 0, the others at rest."""
+        self._working = [
+            Working(thruster, *pushes[name]) if name in pushes else Working(thruster)
+            for name, thruster in self.thrusters.items()
+        ]
+        self.last_ns = last_ns
+        self.change(timeout_ns, 0)
+
+    def load(self, name: str) -> tuple[int, Load]:
+        """The number of the thruster of this name, and what it pushes with now."""
+        number = list(self.thrusters).index(name)
+        return number, self._working[number].load
 
     def command(self, forces: Iterable[float], now_ns: int, timeout_ns: int) -> list[tuple[int, Load]]:
         """Go for these forces; returns what each pushes with from now on, by its number."""
@@ -172,7 +219,7 @@ class ThrusterControl:
 
     def clear(self) -> None:
         """Nothing pushes any more, without a lag."""
-        self._working = [_Working(working.thruster) for working in self._working]
+        self._working = [Working(working.thruster) for working in self._working]
         self.due_ns, self.times_out = NEVER, False
 
     def change(self, timeout_ns: int, now_ns: int) -> None:

@@ -117,7 +117,7 @@ def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarr
 
 def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
     """The integrator, if it supports these loads; raises NotBatchable."""
-    if parameters.string.attached:
+    if parameters.string.attached or parameters.initial.flight:
         raise NotBatchable
     integrator = integrator_named(parameters.integrator)
     needs = set().union(*map(needs_of_load, loads))

@@ -64,9 +64,22 @@ class FollowedLoads:
         self._acting: list[_FollowedLoad] = []
 
     def begin(self, setup: Setup, state: State) -> None:
-        """A reset, or the first look at a node: the string as its parameters say, no loads."""
+        """A reset, or the first look at a node: string and loads as its parameters say."""
         self._control = StringControl(setup, state)
         self._acting = []
+        if setup.in_flight is None:
+            return
+        for going in setup.in_flight.loads:
+            if going.load is not None:
+                until_ns = going.ends_ns(setup.wrench_timeout_ns)
+                text = _strength_text(going.load.force, False)
+                self._acting.append(_FollowedLoad(going.held, going.slot, going.load, text, going.began_ns, until_ns))
+        timeout_ns = setup.in_flight.thrusters_last_ns + (setup.wrench_timeout_ns or 1 << 62)
+        for number, (name, thruster) in enumerate(setup.thrusters.items()):
+            push = setup.in_flight.thrusters.get(name)
+            if push is not None and push.target:
+                text = _strength_text((push.target,), False)
+                self._acting.append(_FollowedLoad(True, -1 - number, thruster.load(push.target), text, 0, timeout_ns))
 
     @property
     def string(self) -> Tied | None:

@@ -11,12 +11,11 @@ import numpy as np
 
 from ..base.errors import InputError, MeshError
 from ..base.rotation import rotate_inverse
-from ..scene.command_codec import ScriptCommand
 from ..scene.declaration import READ_ONLY
+from ..scene.in_flight_text import NAME as IN_FLIGHT
 from ..scene.parameters import parameter_named
 from ..scene.scenario import scene_text
 from ..scene.scene_file import read_scene_text
-from ..scene.script import expand_script
 from ..session.branch import Branch, branch_at
 from ..session.recorded_session import RecordedSession
 from ..session.runs import decode_event
@@ -44,12 +43,11 @@ KEPT_BY_REWIND = KEPT | {"ghost.inertia_model", "ghost.integrator"}
 class Rewind:
     """A moment to go on from, and all that the node must be told for it.
 
-    While paused: set ``changes`` atomically, call ``~/reset``, tell the history ``rewinding``, publish each of
-    ``commands`` on its topic with its ``t_ns`` as the stamp, wait until ``commands_received`` covers them, resume.
-    Where the node refuses the changes because of what acts now, reset once before.
+    While paused: set ``changes`` atomically, tell the history ``rewinding``, call ``~/reset``, resume. Where the node
+    refuses the changes because of what acts now, reset once before.
 
     moment_ns on the history's time, time_ns on the node's clock of that run. row (13,): the state there, as published.
-    scene, script: the same as texts, for files and links. notes: what differs from what was. exact: computed anew from
+    scene: the same as text, for files and links. notes: what differs from what was. exact: computed anew from
     the events to the bit; else taken from the recorded state.
     """
 
@@ -57,9 +55,7 @@ class Rewind:
     time_ns: int
     row: np.ndarray
     changes: dict[str, object]
-    commands: list[ScriptCommand]
     scene: str
-    script: str
     notes: list[str]
     exact: bool
 
@@ -94,16 +90,13 @@ def make_rewind(session: RecordedSession, moment_ns: int, row: np.ndarray, whole
     if branch is None or not exact:
         values = _recorded_values(session, row)
         note = f"the wrenches that acted then are left out; the state is the recorded one ({reason})"
-        branch = Branch(scene_text(values, session.mesh_sha256), [], [note])
-    script = branch.pokes_text if branch.pokes else ""
+        branch = Branch(scene_text(values, session.mesh_sha256), [note])
     return Rewind(
         moment_ns=moment_ns,
         time_ns=time_ns,
         row=row,
         changes=changes_to(values, read_scene_text(present).values, KEPT_BY_REWIND),
-        commands=expand_script(branch.pokes, wrench_timeout=float(values.get("wrench_timeout", 1.5))),
         scene=branch.scene,
-        script=script,
         notes=branch.notes,
         exact=exact,
     )
@@ -128,6 +121,7 @@ def _recorded_values(session: RecordedSession, row: np.ndarray) -> dict[str, Any
     numbers = row.tolist()
     cuts = ((0, 3), (3, 7), (7, 10), (10, 13))
     values["initial.string_mass"] = 0.0
+    values[IN_FLIGHT] = ""
     return {**values, **{name: numbers[i:j] for name, (i, j) in zip(_START, cuts, strict=True)}}
 
 

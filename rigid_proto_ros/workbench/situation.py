@@ -130,7 +130,7 @@ class SituationControl:
             return
         try:
             rewind = await asyncio.to_thread(self._history.rewind, moment_ns)
-            await self.take_to(Situation(rewind.changes, rewind.commands), rewind)
+            await self.take_to(Situation(rewind.changes), rewind)
             for note in rewind.notes:
                 self._announcements.say(note)
         finally:
