@@ -32,9 +32,11 @@ def complete(parser: argparse.ArgumentParser) -> None:
         argcomplete.autocomplete(parser)
 
 
-def completes(action: argparse.Action, names: Callable[[], Iterable[str]]) -> None:
-    """Complete an argument from these names; the shell completes files where none fits."""
-    action.completer = lambda **_: list(names())  # type: ignore[attr-defined]  # argcomplete's
+def completes(action: argparse.Action, names: Callable[[str], Iterable[str]]) -> None:
+    """Complete an argument from what ``names`` gives for the text typed so far; the shell completes files where none
+    fits.
+    """
+    action.completer = lambda prefix, **_: list(names(prefix))  # type: ignore[attr-defined]  # argcomplete's
 
 
 class Parser(argparse.ArgumentParser):

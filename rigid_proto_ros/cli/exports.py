@@ -60,7 +60,11 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
         help=f"{of['tolerance']}: keys err by at most T body sizes and 100 T degrees (default 1e-3)",
     )
     group.add_argument(
-        "--fps", type=float, metavar="N", help="N evenly spaced keys a second instead; of --video pictures (default 30)"
+        "--fps",
+        type=float,
+        metavar="N",
+        help="of --gltf and --usd: N evenly spaced keys a second, whatever their error; of --video: pictures a second"
+        " (default 30)",
     )
     group.add_argument("--with", metavar="PART,..", help=f"{of['with']}: draw {', '.join(PARTS)} too")
     group.add_argument("--size", metavar="WxH", help=f"{of['size']}: pixels (default 960x540)")

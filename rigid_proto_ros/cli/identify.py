@@ -33,7 +33,7 @@ SENSORS = ("pose", "twist", "odom", "imu", "wrench")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "sessions", nargs="+", metavar="SESSION", help="recordings of ours (.rrd, .mcap), or bags of anybody"
+        "sessions", nargs="+", metavar="SESSION", help="recordings made here (.rrd, .mcap), or any bags of rosbag2"
     )
     parser.add_argument("--mass", type=float, metavar="M", help="the mass [kg], where it is known")
     parser.add_argument(
@@ -55,9 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--offset", action="append", default=[], metavar="TOPIC=S", help="seconds to add to a topic's stamps"
     )
     parser.add_argument(
-        "--from", type=float, default=0.0, dest="first", metavar="S", help="use what was recorded from here on"
+        "--from", type=float, default=0.0, dest="first", metavar="S", help="use what was recorded from this time on [s]"
     )
-    parser.add_argument("--to", type=float, default=math.inf, dest="last", metavar="S", help="and up to here")
+    parser.add_argument(
+        "--to", type=float, default=math.inf, dest="last", metavar="S", help="use what was recorded up to this time [s]"
+    )
     parser.add_argument(
         "--fit",
         default="mass,com,inertia",
@@ -70,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record",
         metavar="FILE.rrd",
-        help="for Rerun: measured tracks, fitted flights, what is left, and the tensors",
+        help="for Rerun: measured tracks, fitted flights, residuals and tensors",
     )
 
 

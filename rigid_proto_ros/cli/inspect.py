@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     mesh = parser.add_argument(
         "mesh", nargs="*", metavar="MESH", help="a path, package:// URI or bundled name; several are inspected in turn"
     )
-    completes(mesh, body_names)
+    completes(mesh, lambda _: body_names())
     parser.add_argument(
         "--density", type=number_or_link, action="append", metavar="D",
         help=f"kg/m^3 (default {DENSITY:g}); with --compare LINK=D is one link's, and may be repeated",
@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=True,
         default=False,
         metavar="union",
-        help="weld edges, remove duplicate faces, orient faces, cap holes; union: and make overlapping parts one solid",
+        help="weld edges, remove duplicate faces, orient faces, cap holes; union: also join parts that overlap",
     )
     parser.add_argument(
         "--fallback", choices=FALLBACKS[1:], default="", help="fallback shape for a mesh that encloses no volume"

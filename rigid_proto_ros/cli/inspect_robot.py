@@ -81,7 +81,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--total-mass", type=float, metavar="M",
-        help="with --compare: links without --mass or --density are of one density, the robot weighs M kg",
+        help="with --compare: the robot weighs M kg, and links without --mass or --density share one density",
     )  # fmt: skip
     parser.add_argument("--lump", metavar="ROBOT", help="a URDF, SDF or MJCF with its joints held, as one rigid body")
     parser.add_argument(

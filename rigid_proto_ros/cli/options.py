@@ -13,7 +13,7 @@ from ..base.errors import InputError
 def add_scene(parser: argparse.ArgumentParser, help: str, nargs: str | None = None, default: str | None = None) -> None:
     """SCENE.yaml: a scene by path or bundled name, completed by the shell."""
     scene = parser.add_argument("scene", nargs=nargs, default=default, metavar="SCENE.yaml", help=help)
-    completes(scene, scene_names)
+    completes(scene, lambda _: scene_names())
 
 
 def add_mesh(parser: argparse.ArgumentParser, help: str = "simulate this mesh") -> None:

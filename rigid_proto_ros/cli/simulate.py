@@ -50,10 +50,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_exports(parser)
 
 
-def _settings() -> list[str]:
+def _settings(begun: str) -> list[str]:
+    """What --set may be given, as far as ``begun`` says: names, then the values of the one that is named."""
+    from ..base.bundled import body_names
     from ..scene.parameters import PARAMETERS
 
-    return [f"{name}=" for name in PARAMETERS]
+    name, equals, _ = begun.partition("=")
+    parameter = PARAMETERS.get(name)
+    if not equals or parameter is None:
+        return [f"{name}=" for name in PARAMETERS]
+    values = ("false", "true") if parameter.type.startswith("bool") else ()
+    if name == "mesh":
+        values = tuple(body_names())
+    return [f"{name}={value}" for value in (*values, *filter(None, parameter.choices))]
 
 
 def run(args: argparse.Namespace) -> int:

@@ -27,7 +27,7 @@ EXAMPLES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     study = parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
-    completes(study, study_names)
+    completes(study, lambda _: study_names())
     parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
     parser.add_argument(
         "--threads", type=int, default=0, metavar="N", help="threads on this machine (default: one per core)"

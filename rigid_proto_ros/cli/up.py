@@ -20,7 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_scene(parser, "scene file or bundled name", nargs="?", default="t_handle")
     add_mesh(parser)
-    parser.add_argument("--viewer", choices=("auto", "web", "native", "none"), default="auto")
+    parser.add_argument(
+        "--viewer",
+        choices=("auto", "web", "native", "none"),
+        default="auto",
+        help="where it is shown; auto: native where there is a display, else web",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

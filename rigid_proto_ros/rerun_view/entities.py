@@ -33,6 +33,11 @@ BODY_AXES = "world/body/axes"
 CENTRE = "world/centre"
 """The COM with world axes: the place from which views follow the body without turning with it."""
 
+VIEW = "world/centre/view"
+"""The same in units of about the body's size, so that cameras suit bodies of any size: a layout is never sent again,
+which would undo what somebody has arranged, because the body grows.
+"""
+
 LOADS = "world/loads"
 TRAIL = "world/trail"
 """The path of the vertex farthest from the COM, and that of the COM."""

@@ -57,7 +57,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Layout:
-    """A blueprint; those of its views whose camera stands as far away as the body is large; and its plots by entity."""
+    """A blueprint, its views of the body, and its plots by entity."""
 
     blueprint: Any
     body_views: tuple[Any, ...]
@@ -101,14 +101,14 @@ TITLES = {
 }
 
 
-def layout(size: float, initial_view: str, subject: Subject) -> Layout:
-    """For a body of this size [m]: three tabs, ``initial_view`` in front."""
+def layout(initial_view: str, subject: Subject) -> Layout:
+    """Three tabs, ``initial_view`` in front."""
     plots = PlotViews()
     lesson_hides = tuple(entity for entity in LESSON if not (subject.boxed and entity == e.BOUNDING_BOX))
     body_views = (
-        body_view(size, "Motion", lesson_hides, subject),
-        body_view(size, "All shapes", DEBUGGING, subject),
-        body_view(size, "Plain", PLAIN, subject),
+        body_view("Motion", lesson_hides, subject),
+        body_view("All shapes", DEBUGGING, subject),
+        body_view("Plain", PLAIN, subject),
     )
     tabs = {
         "lesson": lesson_layout(body_views[0], subject, plots),
@@ -125,13 +125,13 @@ def layout(size: float, initial_view: str, subject: Subject) -> Layout:
     return Layout(blueprint, body_views, plots.made)
 
 
-def camera(size: float, subject: Subject) -> Any:
-    """Looks at the body, of this size [m], from where it can be seen whole, or its path where that is what matters."""
+def camera(subject: Subject) -> Any:
+    """Looks at the body from where it can be seen whole, or its path where that is what matters; in body sizes."""
     if subject.falls:
         # Beside the plane of a throw along x, and above the body, where it has come from.
-        away, middle = PATH_SIZES * size, np.array([-0.1, 0.0, 0.2])
-        return _orbital(away * (middle + [0.3, -1.2, 0.2]), away * middle)
-    return _orbital(size * np.array([0.95, -0.75, 0.5]), np.zeros(3))
+        middle = np.array([-0.1, 0.0, 0.2])
+        return _orbital(PATH_SIZES * (middle + [0.3, -1.2, 0.2]), PATH_SIZES * middle)
+    return _orbital(np.array([0.95, -0.75, 0.5]), np.zeros(3))
 
 
 def _orbital(position: np.ndarray, target: np.ndarray) -> Any:
@@ -185,15 +185,15 @@ DEBUGGING: tuple[str, ...] = ()
 PLAIN = (*LESSON, e.BODY_AXES, e.ANGULAR_VELOCITY, e.MOMENTUM, e.TRAIL, e.COM_TRAIL, e.STRING_LINE)
 
 
-def body_view(size: float, name: str, hidden: tuple[str, ...], subject: Subject) -> Any:
+def body_view(name: str, hidden: tuple[str, ...], subject: Subject) -> Any:
     """The body in the world, followed by the camera, with its trail."""
     return rrb.Spatial3DView(
-        origin="/" + e.CENTRE,
+        origin="/" + e.VIEW,
         contents=[f"+ /{e.WORLD}/**", *(f"- /{entity}/**" for entity in hidden)],
         name=name,
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=camera(size, subject),
+        eye_controls=camera(subject),
         overrides={
             "/" + trail: [] if trail in hidden else [_last_seconds(seconds)]
             for trail, seconds in (

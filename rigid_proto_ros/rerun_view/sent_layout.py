@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The layout that viewers were sent, kept so that a body of another size costs three cameras and not a whole layout.
+"""The layout that viewers were sent: as seldom as can be, since another one undoes what somebody has arranged.
 
-A layout costs two threads of the SDK and a third of a megabyte that a live server never drops.
+It costs two threads of the SDK and a third of a megabyte that a live server never drops.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 
-from .layout import Layout, Subject, camera, layout, time_axis
+from .layout import Layout, Subject, layout, time_axis
 from .rerun_internals import BlueprintStream
 
 
@@ -18,29 +18,21 @@ class SentLayout:
 
     def __init__(self, application_id: str) -> None:
         self._application_id = application_id
-        self._size = 0.0
-        self._subject = Subject()
+        self._has_ghost = False
         self._sent: tuple[Layout, BlueprintStream] | None = None
 
-    def fit(self, recording: rr.RecordingStream, size: float, initial_view: str, subject: Subject) -> None:
-        """Send what is needed for a body of this size [m]; nothing while the size is similar.
+    def fit(self, recording: rr.RecordingStream, initial_view: str, subject: Subject) -> None:
+        """Send what is needed for what this flight is about.
 
         A ghost that comes or goes brings another layout; the rest of what a flight is about is that of its beginning,
         for a viewer's own arrangement isn't to be taken away in mid-flight.
         """
-        other_ghost = subject.ghost != self._subject.ghost
-        if self._sent is not None and not other_ghost and 0.5 <= size / self._size <= 2.0:
+        if self._sent is not None and subject.ghost == self._has_ghost:
             return
-        if self._sent is None or other_ghost:
-            self.close()
-            made = layout(size, initial_view, subject)
-            self._sent = made, BlueprintStream(self._application_id, made.blueprint)
-            self._subject = subject
-        else:
-            made, stream = self._sent
-            for view in made.body_views:
-                stream.log(f"{view.blueprint_path()}/EyeControls3D", camera(size, self._subject))
-        self._size = size
+        self.close()
+        made = layout(initial_view, subject)
+        self._sent = made, BlueprintStream(self._application_id, made.blueprint)
+        self._has_ghost = subject.ghost
         self._sent[1].send(recording)
 
     def fit_axes(self, recording: rr.RecordingStream, axes: dict[str, tuple[float, float]], duration_s: float) -> None:

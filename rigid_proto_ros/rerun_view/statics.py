@@ -31,6 +31,9 @@ LIVE_NUMBERS_MAX = 4_000_000
 the live server.
 """
 
+WIRE_RADIUS = 0.0025
+"""In the view's units: the viewer scales all that is drawn but the wires of boxes and ellipsoids."""
+
 VIEW_PER_REACH = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
 
@@ -76,7 +79,7 @@ class Scene:
         return at[np.argmax(np.einsum("ij,ij->i", at, at))]
 
     def view_size(self, body: BodySnapshot, boxed: bool = False) -> float:
-        """The length [m] that the camera must keep in sight: bodies are shown around their COM, wherever it lies.
+        """The length [m] that views must keep in sight: bodies are shown around their COM, wherever it lies.
         boxed: the bounding box too.
         """
         tip = self.farthest_point(body)
@@ -164,7 +167,7 @@ def send_styles(stream: Stream, size: float) -> None:
     stream.log_static(e.HAND, rr.Points3D.from_fields(colors=appearance.STRING_COLOUR, radii=0.02 * size))
     _arrow_style(stream, e.ANGULAR_VELOCITY, appearance.OMEGA_COLOUR, 0.009 * size, "ω")
     _arrow_style(stream, e.MOMENTUM, appearance.MOMENTUM_COLOUR, 0.009 * size, "L")
-    line = 0.0025 * size
+    line = WIRE_RADIUS
     wire = rr.components.FillMode.MajorWireframe
     style = rr.Boxes3D.from_fields(colors=appearance.GREY, radii=line, fill_mode=wire)
     stream.log_static(e.BOUNDING_BOX, style)
@@ -192,6 +195,11 @@ def _send_poinsot_styles(stream: Stream) -> None:
 
 def _arrow_style(stream: Stream, entity: str, colour: tuple[int, ...], radius: float, label: str) -> None:
     stream.log_static(entity, rr.Arrows3D.from_fields(colors=colour, radii=radius, labels=label, show_labels=True))
+
+
+def send_view(stream: Stream, time_ns: int, wall_ns: int, size: float) -> None:
+    """Views of the body keep this length [m] in sight from ``time_ns`` on."""
+    stream.send(e.VIEW, one_time(time_ns, wall_ns), rr.Transform3D.columns(scale=[[size] * 3]))
 
 
 def send_body(

@@ -78,9 +78,9 @@ class Stream(ABC):
         """Log values that hold at all times."""
         rr.log(entity, *values, static=True, recording=self.recording)
 
-    def send_layout(self, size: float, initial_view: str, subject: Subject) -> None:
-        """Make a viewer open with the layout for a body of this size [m] and what its flight is about."""
-        self.layout.fit(self.recording, size, initial_view, subject)
+    def send_layout(self, initial_view: str, subject: Subject) -> None:
+        """Make a viewer open with the layout for what the flight is about."""
+        self.layout.fit(self.recording, initial_view, subject)
 
     @abstractmethod
     def flush(self) -> None:

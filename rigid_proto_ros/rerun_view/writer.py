@@ -35,6 +35,7 @@ from .statics import (
     send_mesh,
     send_scene,
     send_styles,
+    send_view,
 )
 from .streams import Stream
 from .string_picture import StringPicture
@@ -107,6 +108,7 @@ class SceneWriter:
         self._state_timeline = StateTimeline()
         self._disturbances = Disturbances()
         self._pictured: list[tuple[np.ndarray, ...]] = []
+        self._view_size = 0.0
         self._send_body()
 
     def attach(self, stream: Stream) -> None:
@@ -129,6 +131,7 @@ class SceneWriter:
         """What is only said when it changes."""
         now, wall = self._last_time_ns, time.time_ns()
         if self._body is not None:
+            send_view(stream, now, wall, self._view_size)
             send_body(stream, now, wall, self._body, self._scene, self._mesh_number)
             self._poinsot.change_body(now, wall, self._body, stream.send)
         if self._ghost_body is not None:
@@ -263,12 +266,14 @@ class SceneWriter:
         send_mesh(stream, self._scene, self._mesh_number)
 
     def _body_changed(self, mark: Mark) -> None:
-        before = self._size if self._body is not None else None
+        before, seen_before = self._size if self._body is not None else None, self._view_size
         (self._body,) = mark.content
         self._send_body()
         for stream in self._listening():
             if self._size != before:
                 self._send_styles(stream)
+            if self._view_size != seen_before:
+                send_view(stream, mark.time_ns, mark.wall_ns, self._view_size)
             send_body(stream, mark.time_ns, mark.wall_ns, self._body, self._scene, self._mesh_number)
         self._poinsot.change_body(mark.time_ns, mark.wall_ns, self._body, self._send)
         self._plots.disturbed()
@@ -286,23 +291,32 @@ class SceneWriter:
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
         self._string.size = self._size
+        self._fit_view()
+
+    def _fit_view(self) -> None:
+        """Growing is seen as such, until the body no longer suits the views."""
+        size = self._size
+        if self._scene is not None and self._body is not None:
+            size = self._scene.view_size(self._body, self._subject().boxed)
+        if not self._view_size or not 0.5 <= size / self._view_size <= 2.0:
+            self._view_size = size
 
     def _ghost_began(self, mark: Mark) -> None:
         first = self._ghost_body is None
         (self._ghost_body,) = mark.content
+        if first and self._body is not None:
+            self._view_size = 0.0
+            self._fit_view()
         for stream in self._listening() if first else ():
             self._send_ghost_mesh(stream)
             if self._body is not None:
                 self._send_styles(stream)
+                send_view(stream, mark.time_ns, mark.wall_ns, self._view_size)
         self._ghost.change(mark.time_ns, mark.wall_ns, self._ghost_body, self._send)
 
     def _send_styles(self, stream: Stream) -> None:
         send_styles(stream, self._size)
-        subject = self._subject()
-        view_size = self._size
-        if self._scene is not None and self._body is not None:
-            view_size = self._scene.view_size(self._body, subject.boxed)
-        stream.send_layout(view_size, self._initial_view, subject)
+        stream.send_layout(self._initial_view, self._subject())
 
     def _subject(self) -> Subject:
         """What the flight is about."""

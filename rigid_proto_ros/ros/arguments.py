@@ -63,7 +63,7 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--until", type=_seconds, metavar="S", help="end, in order, when simulated time reaches this many seconds"
     )
-    completes(bodies, scene_names)
+    completes(bodies, lambda _: scene_names())
     own, ros = _split(argv[1:])
     for word in ros:
         _check_ros_option(word)

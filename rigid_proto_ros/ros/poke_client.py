@@ -67,7 +67,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     what = parser.add_argument(
         "what", metavar="SCRIPT.yaml | poke | wrench", help="a script file, or one command given by the options below"
     )
-    completes(what, lambda: _ONE_LINE_COMMANDS)
+    completes(what, lambda _: _ONE_LINE_COMMANDS)
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
     parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")

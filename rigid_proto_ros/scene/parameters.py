@@ -282,7 +282,9 @@ class Parameters:
     imu_contact: str = text("", "Contact at which ~/imu measures; empty means the centre of mass.")
     imu_noise: ImuNoise = ImuNoise()
     pose_noise: PoseNoise = PoseNoise()
-    noise_seed: int = whole(0, "Of the noise: the same seed errs alike at the same stamps.", lower=0, upper=2**62)
+    noise_seed: int = whole(
+        0, "Seed of the noise: the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
+    )
     ghost: GhostParameters = GhostParameters()
     frames: str = text(
         "own",

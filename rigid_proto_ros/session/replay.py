@@ -90,13 +90,20 @@ class Resimulation(ScenarioRun):
         self.simulation.logs_timeouts = False
         self._mesh_of = mesh_of
         self._changes_ns = -1
+        self._taken = 0
         self.node_name = node_name
-        waiting: list[tuple[int, str, dict, Command | None, int]] = []
+        self._waiting: deque[tuple[int, str, dict, Command | None, int]] = deque()
         for number, line in enumerate(event_lines, 1):
-            time_ns, kind, content = decode_event(line, number)
-            waiting.append((time_ns, kind, content, self._command(kind, content, number), number))
+            self.take(*decode_event(line, number))
         # Stable: what happened at one instant keeps its order.
-        self._waiting = deque(sorted(waiting, key=lambda event: event[0]))
+        self._waiting = deque(sorted(self._waiting, key=lambda event: event[0]))
+
+    def take(self, time_ns: int, kind: str, content: dict) -> None:
+        """Take the log's next event, which comes after all that were taken; raises InputError for one that can't be
+        decoded.
+        """
+        self._taken += 1
+        self._waiting.append((time_ns, kind, content, self._command(kind, content, self._taken), self._taken))
 
     def advance(self, until_ns: int) -> np.ndarray:
         """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.

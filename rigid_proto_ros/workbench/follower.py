@@ -40,7 +40,7 @@ class NodeFollower:
     ) -> None:
         self.state: State | None = None
         self.acting = FollowedLoads()
-        self.ghost = PageGhost(announcements.say_once)
+        self.ghost = PageGhost(target, announcements.say_once)
         self._target = target
         self._scenes = scenes
         self._history = history
@@ -49,7 +49,7 @@ class NodeFollower:
         self._on_begin = on_begin
         self._events: deque[dict[str, Any]] = deque()
         self._newest: tuple[int, np.ndarray] | None = None
-        self._reset_due_s: float | None = None
+        self._scene_due_s: float | None = None
         self._odd_line_said = False
 
     @property
@@ -61,7 +61,7 @@ class NodeFollower:
         """What happens from now on isn't heard."""
         self.state = None
         self._events.clear()
-        self._newest = self._reset_due_s = None
+        self._newest = self._scene_due_s = None
 
     def receive(self, states: Sequence[tuple[int, np.ndarray]], lines: Sequence[str]) -> None:
         """States (time_ns, row (13,) in world axes) and event lines, as they came."""
@@ -86,18 +86,24 @@ class NodeFollower:
             self._announcements.say(f"Lines of {self._target}/events are passed over, the first: {error}")
 
     def follow(self, scenario: Scenario, now_s: float) -> None:
-        """Take up events in their order, then the newest state; a reset once the scene that it begins with is known,
-        which comes on another topic.
+        """Take up events in their order, then the newest state; a reset, and another mesh, once the scene is known that
+        begins with it, which comes on another topic.
         """
         while self._events:
-            if self._events[0]["kind"] == "reset":
-                if self._reset_due_s is None:
-                    self._reset_due_s = now_s + SCENE_GRACE_S
-                if self._newest is not None and self.state is not None and self._newest[0] >= self.state.time_ns:
+            kind, content = self._events[0]["kind"], self._events[0]["content"]
+            if kind == "reset" or (kind == "set" and "mesh" in content):
+                if self._scene_due_s is None:
+                    self._scene_due_s = now_s + SCENE_GRACE_S
+                if (
+                    kind == "reset"
+                    and self._newest is not None
+                    and self.state is not None
+                    and self._newest[0] >= self.state.time_ns
+                ):
                     self._newest = None  # from before it
-                if now_s < self._reset_due_s or self._scenes.busy:
+                if now_s < self._scene_due_s or self._scenes.busy:
                     return
-                self._reset_due_s = None
+                self._scene_due_s = None
             self._take_up(self._events.popleft(), self._scenes.scenario or scenario)
         if self._newest is not None:
             time_ns, row = self._newest
@@ -140,11 +146,9 @@ class NodeFollower:
             command = command_of_event(kind, content, scenario.setup.contacts, frames)
             if command is not None:
                 self.acting.event(command, time_ns, scenario, state)
+            self.ghost.take(time_ns, kind, content)
         except InputError as error:
             self._announcements.say_once(f"The picture doesn't show this {kind.replace('_', ' ')}: {error}")
-            return
-        if command is not None:
-            self.ghost.event(command, time_ns)
 
     def ghost_row(self, scenario: Scenario, looking_at: int | None) -> tuple[np.ndarray | None, np.ndarray]:
         """The ghost's state (13,), and its COM (3,) in scaled mesh coordinates: the future that a rewind left, or the

@@ -100,8 +100,9 @@ KEYS = (
 
 
 def key_list() -> str:
-    """All keys in one line."""
-    return "; ".join(f"{key.shown}: {key.does}" for key in KEYS if key.hotkey != "H")
+    """All keys in one line, and the button that no other control stands for."""
+    keys = "; ".join(f"{key.shown}: {key.does}" for key in KEYS if key.hotkey != "H")
+    return f"{keys}; right button: move the view"
 
 
 def add_keys(gui: viser.GuiApi, page: Keyboard) -> None:

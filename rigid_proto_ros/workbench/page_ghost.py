@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The page's ghost: the very one that ``simulate`` and ``replay`` have, given what the page hears.
+"""The page's ghost: that of the run as ``replay`` computes it anew, from the events that the page hears.
 
-It is the body under another tensor or integrator. It begins at the state that the page knows, and takes every event
-since, in the order of the log.
+It is the body under another tensor or integrator. It begins at the state that the page knows, and gets every event
+since.
 """
 
 from __future__ import annotations
@@ -12,27 +12,51 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.errors import CommandRefused, InputError
+from ..mesh.reading import Mesh
 from ..motion.state import State
-from ..scene.ghost import Ghost, Refusals
+from ..scene.ghost import GHOST
 from ..scene.scenario import Scenario
-from ..simulation.commands import Command, Listed
+from ..session.replay import Resimulation
+from ..simulation.observer import BodySnapshot, Observer
 from ..simulation.setup import Setup
 
 PORTION_NS = 1_000_000_000
 """[ns] That it is advanced at most between two pictures: whoever draws waits for it."""
 
 
-class PageGhost:
-    """Follows one run. ``begin`` with each reset, or where the page comes in. on_refusal(reason) hears of what it can't
-    follow, once in a run.
-    """
+class _Told(Observer):
+    """What a run computed anew tells of its ghost; on_refusal(reason) hears of what the ghost goes without."""
 
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
-        self._observer = Refusals(on_refusal)
-        self._ghost: Ghost | None = None
-        self._setup: Setup | None = None
+        self._on_refusal = on_refusal
+        self.row: np.ndarray | None = None
+
+    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
+        """Listening to the ghost is what makes there be one."""
+
+    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:  # noqa: ARG002
+        """Where it is; not told while the scene asks for none."""
+        self.row = row.copy()
+
+    def refused(self, _time_ns: int, reason: str, message: str) -> None:
+        """A command was refused."""
+        if reason == GHOST:
+            self._on_refusal(message)
+
+
+class PageGhost:
+    """Follows one run of a node. ``begin`` with each reset, or where the page comes in; ``take`` each event. on_refusal
+    as above; it may be told the same more than once.
+    """
+
+    def __init__(self, node_name: str, on_refusal: Callable[[str], None]) -> None:
+        self._node_name = node_name
+        self._on_refusal = on_refusal
+        self._told = _Told(on_refusal)
+        self._run: Resimulation | None = None
+        self._scenario: Scenario | None = None
         self._offset_ns = 0
-        self._number = 0
 
     @property
     def began_ns(self) -> int:
@@ -42,48 +66,66 @@ class PageGhost:
     @property
     def center_of_mass(self) -> np.ndarray | None:
         """Of its own tensor (3,) [m, scaled mesh coordinates]; None while there is none."""
-        return None if self._ghost is None else self._ghost.simulation.setup.body.center_of_mass
+        ghost = None if self._run is None else self._run.ghost
+        return None if ghost is None else ghost.simulation.setup.body.center_of_mass
 
     def begin(self, scenario: Scenario, state: State) -> None:
         """Beside the body, at ``state``; nowhere, where the scene asks for no ghost."""
-        setup = self._setup = scenario.ghost
+        self._scenario = scenario
         self._offset_ns = state.time_ns
-        self._ghost = None
-        if setup is not None:
-            initial = setup.initial if state.time_ns == 0 else _beside(scenario, setup, state)
-            self._ghost = Ghost(replace(setup, initial=initial), self._observer)
+        self._run = None
+        ghost = scenario.ghost
+        if ghost is None:
+            return
+        if state.time_ns:
+            setup = replace(scenario.setup, initial=state.row)
+            ghost = replace(ghost, initial=_beside(scenario, ghost, state))
+            scenario = replace(scenario, setup=setup, ghost=ghost)
+        self._told = _Told(self._on_refusal)
+        self._run = Resimulation(scenario, [], self._told, self._mesh, self._node_name)
+        self._run.begin_ghost()
 
     def changed(self, scenario: Scenario, state: State) -> None:
-        """Parameters changed at ``state``."""
-        if self._ghost is None or scenario.ghost is None:
-            if scenario.ghost is not self._setup:
-                self.begin(scenario, state)
-            return
-        self._setup = scenario.ghost
-        self._ghost.change(state.time_ns - self._offset_ns, scenario, self._listed())
+        """Parameters changed, ``state`` being the last one heard: a ghost that is asked for from now on begins there. A
+        run that has one knows by its events.
+        """
+        had_none, self._scenario = self._run is None, scenario
+        if scenario.ghost is None:
+            self._run = None
+        elif had_none:
+            self.begin(scenario, state)
 
-    def event(self, command: Command, time_ns: int) -> None:
-        """A command acted."""
-        if self._ghost is not None:
-            when_ns = max(time_ns - self._offset_ns, self._ghost.simulation.time_ns)
-            self._ghost.submit(command, when_ns, self._listed())
-
-    def _listed(self) -> Listed:
-        """What acted at one instant acts in the order of the log, whatever rule made it."""
-        self._number += 1
-        return b"", self._number
+    def take(self, time_ns: int, kind: str, content: dict) -> None:
+        """An event of the node's log; raises InputError for one that can't be decoded."""
+        if self._run is not None and time_ns >= self._offset_ns:
+            self._run.take(time_ns - self._offset_ns, kind, content)
 
     def row(self, time_ns: int) -> np.ndarray | None:
         """Its state (13,) at the node's ``time_ns``; None while there is none, and where it is behind: it catches up by
         PORTION_NS a call."""
-        until_ns = time_ns - self._offset_ns
-        if self._ghost is None:
+        run, until_ns = self._run, time_ns - self._offset_ns
+        if run is None or run.ghost is None or until_ns < run.simulation.time_ns:
             return None
-        simulation = self._ghost.simulation
-        if simulation.failure or until_ns < simulation.time_ns:
+        next_ns = min(until_ns, run.simulation.time_ns + PORTION_NS)
+        try:
+            run.advance(next_ns)
+        except CommandRefused as refusal:
+            self._on_refusal(f"the ghost goes on without a command: {refusal}")
             return None
-        state = simulation.advance(min(until_ns, simulation.time_ns + PORTION_NS))
-        return state.row if simulation.time_ns == until_ns and not simulation.failure else None
+        except InputError as error:
+            self._on_refusal(f"the ghost ends here: {error}")
+            self._run = None
+            return None
+        self._told.row = None
+        run.ghost.advance(next_ns)
+        return self._told.row if next_ns == until_ns else None
+
+    def _mesh(self, name: str) -> Mesh | None:
+        """The mesh of a change: the one that the page shows, where that bears its name already."""
+        scenario = self._scenario
+        if scenario is None or scenario.body_mesh is None or scenario.parameters.mesh != name:
+            return None
+        return scenario.body_mesh.mesh
 
 
 def _beside(scenario: Scenario, ghost: Setup, state: State) -> np.ndarray:

@@ -31,9 +31,8 @@ STRONGEST = 1e12
 """[N] More comes from a slip of the finger."""
 
 HELP = """
-**Drag** the body: a string ties it to the pointer. **Click**: a poke along the view. **Shift-click**: a push inward.
-Drag beside it: turn the view; right button: move it; wheel or two fingers: closer.
-**Keys**: space, arrows, backspace, R; **?** lists them.
+**Drag** the body: a string ties it to the pointer. **Click**: poke along the view; **shift-click**: push inward.
+Beside it, drag to turn the view, wheel or two fingers to come closer. **?** lists the keys.
 """
 
 

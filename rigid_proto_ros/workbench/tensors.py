@@ -91,7 +91,8 @@ def comparison(scenario: Scenario) -> str:
     for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
         a, b = (_rounded(float(properties.inertia[i, j]), largest) for properties in (true, approximate))
         lines.append(f"| I{'xyz'[i]}{'xyz'[j]} [kg m²] | {a:.5g} | {b:.5g} | {_per_cent((b - a) / largest)} % |")
-    return "\n".join([*lines, "", "Errors of I₁ I₂ I₃ are each relative to its own, of the entries to the largest."])
+    relative = "Errors of I₁ I₂ I₃ are relative to each of them, those of the entries to the largest entry."
+    return "\n".join([*lines, "", relative])
 
 
 def _com_text(scenario: Scenario, off: np.ndarray, own: np.ndarray) -> str:

@@ -44,6 +44,9 @@ def test_examples_of_the_node_and_the_client_are_read_by_them():
     [
         ("cli.main", "rigid_proto si", {"simulate"}),
         ("cli.main", "rigid_proto simulate book --set string.freq", {"string.frequency="}),
+        ("cli.main", "rigid_proto simulate book --set inertia_model=b", {"inertia_model=bounding_box"}),
+        ("cli.main", "rigid_proto simulate book --set gyroscopic=", {"gyroscopic=true", "gyroscopic=false"}),
+        ("cli.main", "rigid_proto simulate --set mesh=spinning", {"mesh=spinning_top"}),
         ("ros.poke_client", "poke_client wr", {"wrench"}),
         ("ros.main", "rigid_body_node --bodies spin", {"spinning_top"}),
     ],

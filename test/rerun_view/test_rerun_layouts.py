@@ -21,6 +21,7 @@ from rigid_proto_ros.rerun_view.layout import Subject, layout
 from rigid_proto_ros.rerun_view.plot_range import with_two_ticks
 from rigid_proto_ros.rerun_view.plots import Ranges
 from rigid_proto_ros.rerun_view.reader import record_batches
+from rigid_proto_ros.rerun_view.rerun_internals import BlueprintStream
 from rigid_proto_ros.scene.offline import read_scene
 
 
@@ -36,7 +37,7 @@ from rigid_proto_ros.scene.offline import read_scene
 )
 def test_what_tells_most_of_a_flight_is_in_the_tab_in_front(subject: Subject, told_by: str) -> None:
     # Every plot is among those for debugging; one that is made twice is in the lesson too.
-    assert len(layout(1.0, "lesson", subject).plots[told_by]) == 2
+    assert len(layout("lesson", subject).plots[told_by]) == 2
 
 
 def test_the_box_is_shown_around_a_body_whose_principal_axes_are_not_those_of_its_drawing() -> None:
@@ -44,7 +45,7 @@ def test_the_box_is_shown_around_a_body_whose_principal_axes_are_not_those_of_it
     for straight in ("book", "t_handle", "hollow_box", "spinning_top"):
         assert not skewed(np.asarray(read_scene(straight, {}).setup.body.inertia)), straight
     hidden = f"- /{e.BOUNDING_BOX}/**"
-    shown = {k: str(layout(1.0, "lesson", Subject(skewed=k)).body_views[0].contents) for k in (False, True)}
+    shown = {k: str(layout("lesson", Subject(skewed=k)).body_views[0].contents) for k in (False, True)}
     assert hidden in shown[False] and hidden not in shown[True]
 
 
@@ -89,6 +90,25 @@ def test_the_recording_of_a_body_on_a_string_draws_the_strings_line_through_the_
     assert np.dot(along, com - line[0]) > 0.0  # on from the knot, not back to the hand
 
 
+def test_a_body_that_grows_is_kept_in_sight_without_another_layout(tmp_path, monkeypatch) -> None:
+    sent = []
+    send = BlueprintStream.send
+    monkeypatch.setattr(BlueprintStream, "send", lambda stream, recording: sent.append(1) or send(stream, recording))
+    script = tmp_path / "grow.yaml"
+    script.write_text(
+        "".join(
+            f"- {{t: {t}, set: {{scale: [{factor}, {factor}, {factor}]}}}}\n" for t, factor in ((0.1, 1.5), (0.2, 5.0))
+        )
+    )
+    path = tmp_path / "grow.rrd"
+    words = ["simulate", "hammer", "--script", str(script), "--duration", "0.3", "--record", str(path), "--json"]
+    assert main(words) == 0
+    # One at the start, which is what a viewer arranges anew; one for the axes of the plots when the file is complete.
+    assert len(sent) == 2
+    scales = [scale[0] for (scale,) in column(path, e.VIEW, "Transform3D:scale")]
+    assert len(scales) == 2 and scales[1] / scales[0] == pytest.approx(5.0, rel=1e-6)
+
+
 def test_a_finished_recording_says_how_far_its_plots_reach(tmp_path) -> None:
     path = tmp_path / "thrown.rrd"
     assert main(["simulate", "thrown_hammer", "--duration", "1", "--record", str(path), "--json"]) == 0
@@ -124,7 +144,7 @@ def test_an_axis_has_two_ticks_whose_numbers_can_be_read(ends: tuple[float, floa
 
 
 def test_a_legend_lies_beside_the_curves_and_never_over_them() -> None:
-    made = layout(1.0, "lesson", Subject()).plots[e.ENERGY]
+    made = layout("lesson", Subject()).plots[e.ENERGY]
     for view in made:
         (axis,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
         (ranges,) = [view.properties["VisibleTimeRanges"]]

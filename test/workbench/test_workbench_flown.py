@@ -13,6 +13,8 @@ pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 
 from flown_page import FlownLink, FlownPage
 
+from rigid_proto_ros.session.replay import resimulation
+from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
 
@@ -89,6 +91,36 @@ def test_the_ghost_of_a_lesson_is_there_from_its_start_and_gone_in_the_next_one(
     flown.pick("One book, three throws")
     flown.fly(0.5)
     assert flown.link.scenario.ghost is None and page.follower.ghost_row(page.scenes.scenario, None)[0] is None
+
+
+class GhostWatcher(Observer):
+    def ghost_began(self, time_ns: int, ghost) -> None:
+        pass
+
+    def ghost_state(self, time_ns: int, row) -> None:
+        self.row = row.copy()
+
+
+def test_the_pages_ghost_is_to_the_bit_the_one_that_replay_computes(flown: FlownPage) -> None:
+    page, link = flown.page, flown.link
+    flown.pick("The true tensor against the box's")
+    flown.fly(0.5)
+    # Between two states that the page hears.
+    flown.do(lambda: link.schedule("{t: 0.513, set: {mass: 3.0}}"))
+    flown.do(
+        lambda: link.schedule("{t: 0.527, at: {point: [0.1, 0.02, 0.003]}, force: [0.0, 0.5, 0.0], duration: 0.1}")
+    )
+    flown.fly(1.0)
+    time_ns = page.follower.state.time_ns
+    shown = flown.until(
+        lambda: (row := page.follower.ghost_row(page.scenes.scenario, None)[0]) is not None and [row], "a ghost"
+    )[0]
+    watcher = GhostWatcher()
+    again = resimulation(page.history.session(), watcher)
+    again.begin_ghost()
+    again.advance(time_ns)
+    again.ghost.advance(time_ns)
+    assert shown.tobytes() == watcher.row.tobytes()
 
 
 def test_a_command_that_the_ghosts_integrator_cannot_carry_is_said(flown: FlownPage) -> None:
