@@ -35,7 +35,7 @@ class _Told(Observer):
     def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
         """Listening to the ghost is what makes there be one."""
 
-    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:  # noqa: ARG002
+    def ghost_state(self, _time_ns: int, row: np.ndarray) -> None:
         """Where it is; not told while the scene asks for none."""
         self.row = row.copy()
 
