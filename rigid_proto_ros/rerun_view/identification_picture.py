@@ -24,6 +24,9 @@ from .surface_normals import shaded_surface
 
 ELLIPSOIDS = "ellipsoids"
 REPORT = "report"
+FOUND_COLOUR, OTHERS_COLOUR = appearance.GHOST_COLOUR, appearance.ORANGE
+APART = 2.6
+"""Of ellipsoids side by side, in the largest semi-axis of all."""
 TRACK_SAMPLES_MAX = 20_000
 """Points of a drawn path."""
 
@@ -79,9 +82,9 @@ def record_identification(
     """
     stream = FileStream(Path(path), str(uuid.uuid4()), "identified from motion")
     try:
-        stream.recording.send_blueprint(_blueprint(flights))
+        stream.recording.send_blueprint(_blueprint(flights, tensors))
         stream.log_static(e.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        stream.log_static(REPORT, rr.TextDocument(report, media_type="text/plain"))
+        stream.log_static(REPORT, rr.TextDocument(f"```\n{report}\n```", media_type="text/markdown"))
         size = _size(tensors, mesh)
         for number, flight in enumerate(flights, 1):
             _send_flight(stream, number, flight, mesh, size)
@@ -143,41 +146,98 @@ def _send_body(
 
 
 def _send_ellipsoids(stream: Stream, tensors: Sequence[DrawnTensor]) -> None:
+    """The found one over each of the others, these side by side: so each pair can be compared and its label read."""
     stream.log_static(ELLIPSOIDS, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    colours = (appearance.GHOST_COLOUR, appearance.ORANGE, appearance.VIOLET, appearance.GREY)
-    for number, tensor in enumerate(tensors):
-        frame = PrincipalFrame.of(tensor.inertia)
-        entity = f"{ELLIPSOIDS}/{number}"
-        stream.log_static(entity, rr.Transform3D(translation=tensor.center_of_mass, mat3x3=frame.axes))
-        shape = rr.Ellipsoids3D(
-            half_sizes=[frame.ellipsoid_semi_axes(tensor.mass)],
-            colors=[colours[min(number, len(colours) - 1)]],
-            fill_mode="majorwireframe",
+    if not tensors:
+        return
+    found, *given = tensors
+    if not given:
+        _send_ellipsoid(stream, f"{ELLIPSOIDS}/0", found, np.zeros(3), FOUND_COLOUR)
+    apart = APART * max(_reach(tensor) for tensor in tensors)
+    for number, tensor in enumerate(given, 1):
+        place = np.array([0.0, apart * (number - 1), 0.0])
+        _send_ellipsoid(stream, f"{ELLIPSOIDS}/{number}", tensor, place, OTHERS_COLOUR)
+        _send_ellipsoid(stream, f"{ELLIPSOIDS}/found_over_{number}", found, place, FOUND_COLOUR, is_named=number == 1)
+        label = rr.Points3D(
+            # By turns lower, as names are wider than ellipsoids.
+            [place + tensor.center_of_mass - np.array([0.0, 0.0, (0.5, 0.75)[number % 2] * apart])],
             labels=[tensor.label],
             show_labels=True,
+            colors=[OTHERS_COLOUR],
+            radii=[0.001 * apart],
         )
-        stream.log_static(entity, shape)
+        stream.log_static(f"{ELLIPSOIDS}/label_{number}", label)
+
+
+def _reach(tensor: DrawnTensor) -> float:
+    """The ellipsoid's largest semi-axis [m]."""
+    return float(PrincipalFrame.of(tensor.inertia).ellipsoid_semi_axes(tensor.mass).max())
+
+
+def _send_ellipsoid(
+    stream: Stream,
+    entity: str,
+    tensor: DrawnTensor,
+    place: np.ndarray,
+    colour: tuple[int, ...],
+    is_named: bool = True,
+) -> None:
+    frame = PrincipalFrame.of(tensor.inertia)
+    stream.log_static(entity, rr.Transform3D(translation=tensor.center_of_mass + place, mat3x3=frame.axes))
+    is_found = colour == FOUND_COLOUR
+    shape = rr.Ellipsoids3D(
+        half_sizes=[frame.ellipsoid_semi_axes(tensor.mass)],
+        colors=[colour],
+        fill_mode="majorwireframe",
+        labels=[tensor.label] if is_found else None,
+        show_labels=is_found and is_named,
+    )
+    stream.log_static(entity, shape)
 
 
 def _plot(flight: int, series: int) -> str:
     return f"residuals/{flight}_{series + 1}"
 
 
-def _blueprint(flights: Sequence[TrackedFlight]) -> rrb.Blueprint:
+def _before_the_row(tensors: Sequence[DrawnTensor]) -> rrb.EyeControls3D | None:
+    """Where all ellipsoids are seen side by side."""
+    if not tensors:
+        return None
+    reach = max(_reach(tensor) for tensor in tensors)
+    others = max(len(tensors) - 1, 1)
+    middle = tensors[0].center_of_mass + np.array([0.0, 0.5 * APART * reach * (others - 1), 0.0])
+    return rrb.EyeControls3D(
+        position=middle + APART * reach * np.array([0.7 + 0.32 * others, 0.0, 0.1]), look_target=middle
+    )
+
+
+def _blueprint(flights: Sequence[TrackedFlight], tensors: Sequence[DrawnTensor]) -> rrb.Blueprint:
     plots = [
-        rrb.TimeSeriesView(origin="/" + _plot(number, k), name=left.title)
+        rrb.Horizontal(
+            *(
+                rrb.TimeSeriesView(origin="/" + _plot(number, k), name=one.title)
+                for k, one in enumerate(flight.residuals)
+            ),
+            name=f"left over of {flight.name}, in standard deviations",
+        )
         for number, flight in enumerate(flights, 1)
-        for k, left in enumerate(flight.residuals)
     ]
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Spatial3DView(origin="/" + e.WORLD, name="measured, and the fitted flight as a ghost"),
-            rrb.Vertical(
-                rrb.Spatial3DView(origin="/" + ELLIPSOIDS, name="ellipsoids of inertia, tracked frame"),
-                rrb.Tabs(*plots, name="left over, in standard deviations"),
-                rrb.TextDocumentView(origin="/" + REPORT, name="what the motion tells"),
+        rrb.Vertical(
+            rrb.Horizontal(
+                rrb.Spatial3DView(origin="/" + e.WORLD, name="measured, and the fitted flight as a ghost"),
+                rrb.Vertical(
+                    rrb.Spatial3DView(
+                        origin="/" + ELLIPSOIDS,
+                        name="ellipsoids of inertia, tracked frame",
+                        eye_controls=_before_the_row(tensors),
+                    ),
+                    rrb.TextDocumentView(origin="/" + REPORT, name="what the motion tells"),
+                ),
+                column_shares=[1, 1],
             ),
-            column_shares=[3, 2],
+            plots[0] if len(plots) == 1 else rrb.Tabs(*plots),
+            row_shares=[2, 1],
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
