@@ -118,7 +118,13 @@ def test_a_recording_shows_measured_and_fitted_flight_what_is_left_and_both_tens
     rows: dict[str, int] = {}
     for chunk in RrdReader(str(file)).stream():
         rows[chunk.entity_path] = max(rows.get(chunk.entity_path, 0), chunk.num_rows)
-    assert {"/world/measured_1/mesh", "/world/fitted_1/mesh", "/ellipsoids/1", "/ellipsoids/found_over_1", "/report"} <= set(rows)
+    assert {
+        "/world/measured_1/mesh",
+        "/world/fitted_1/mesh",
+        "/ellipsoids/1",
+        "/ellipsoids/found_over_1",
+        "/report",
+    } <= set(rows)
     shown = [rows[entity] for entity in ("/world/measured_1", "/world/fitted_1", "/residuals/1_1", "/residuals/1_2")]
     assert shown == [151] * 4  # 1.5 s at 100 Hz
 
