@@ -218,7 +218,7 @@ def noise() -> str:
     sensors = sensor_noise(parameters)
     row = [0.1, -0.2, 0.3, 0.1, -0.2, 0.3, 0.9273618495495704, 1.0, 2.0, 3.0, -1.0, 0.5, 2.5]
     times = [k * 37_000_001 for k in range(40)]
-    told = [sensors.told(topic, t, row) for t in times for topic in ("pose", "twist", "odom")]
+    told = [sensors.measured(topic, t, row) for t in times for topic in ("pose", "twist", "odom")]
     felt = [[*rate, *force] for rate, force in (sensors.imu(t, row[10:], row[7:10]) for t in times)]
     return digest(np.array(told), np.array(felt))
 
