@@ -34,6 +34,8 @@ _LOAD_BYTES = 8 * fl.LOAD_ROW
 DOUBLES, TABLES_AT, TABLE_ROWS, METHODS_AT, METHODS = range(fl.INTEGERS, fl.INTEGERS + 5)
 INTEGERS = fl.INTEGERS + 5
 
+_REACHED = fl.REACHED  # looked up at every advance
+
 _LINE = 8
 """Doubles of a line of the processor's cache."""
 
@@ -228,9 +230,11 @@ class FlightArrays:
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
-        while (came := self._fly(self._at, until_ns)) == fl.NO_KERNEL:
+        while (came := self._fly(self._at, until_ns)) != _REACHED:
+            if came == fl.FAILED:
+                return False
             provide_kernel(self.integrator, self.methods, self.integers[fl.METHOD])
-        return came == fl.REACHED
+        return True
 
     def apply(self) -> None:
         """Apply the commands put last, at the time of the flight."""

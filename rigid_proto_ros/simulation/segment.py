@@ -15,6 +15,7 @@ from ..motion.integrators import control as ctl
 from ..motion.integrators.auto import fastest_swing
 from ..motion.integrators.equations import stretch
 from ..motion.integrators.integrator import FIXED_STEPS, NOTHING, ONE_STEP
+from ..motion.integrators.stiffness import implicit_effort
 from ..motion.problem import SIZE
 from ..motion.state import State
 from ..motion.variables import STORED
@@ -85,6 +86,8 @@ class Segment:
         if method.way == FIXED_STEPS:
             steps = 1e9 / int(self._arrays.n[fl.STEP_NS])
             return steps, steps * method.evaluations
+        if method.implicit:
+            return implicit_effort(self.problem, self.sampled, True)
         if method.radians == 0.0:
             return 0.0, 0.0
         fastest = length(now.angular_velocity_body)

@@ -8,6 +8,7 @@ commands are constant and an integrator advances the body. ``advance`` is the wh
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 from typing import Protocol
@@ -48,6 +49,7 @@ from .string_control import StringControl
 from .thrusters import ThrusterControl
 
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
+_TIMEOUTS = fl.TIMEOUTS  # looked up at every advance
 
 
 class Follower(Protocol):
@@ -192,17 +194,16 @@ class Simulation(Readings):
             # 3. That event is applied; with what acts now a new segment begins.
             self._act()
 
-    def _hand_over(self, until_ns: int) -> tuple[int, list[Pending]]:
+    def _hand_over(self, until_ns: int) -> tuple[int, Sequence[Pending]]:
         """Until when the compiled flight needs nobody, and the commands that it applies on the way."""
         tied, pending = self._string.tied, self._pending
         if tied is not None and tied.release_ns is not None:
             until_ns = min(until_ns, tied.release_ns)
         if self.thrusters.due_ns < until_ns:
             until_ns = self.thrusters.due_ns
-        due: list[Pending] = []
         if not pending or pending[0][0] >= until_ns:
-            return until_ns, due
-        setup = self.setup
+            return until_ns, ()
+        setup, due = self.setup, []
         while pending and pending[0][0] < until_ns:
             first = pending[0][-1]
             if first.resolved_for is not setup and not self._is_ready(first):
@@ -226,26 +227,26 @@ class Simulation(Readings):
         except CommandRefused:
             return False  # refused when it acts, and not before
 
-    def _fly(self, until_ns: int, due: list[Pending]) -> bool:
+    def _fly(self, until_ns: int, due: Sequence[Pending]) -> bool:
         """The compiled flight to ``until_ns``, and word of what began and ended; False when the motion failed."""
         arrays = self._arrays
         reached = arrays.fly(until_ns)
         if not reached:
-            waiting = len(due) - arrays.waiting
-            for pending in due[waiting:]:
+            acted = len(due) - arrays.waiting
+            for pending in due[acted:]:
                 self._push(pending)
-            del due[waiting:]
-        if due or self._notifier.wants_loads or arrays.integers[fl.TIMEOUTS]:
+            due = due[:acted]
+        if due or self._notifier.wants_loads or arrays.integers[_TIMEOUTS]:
             self._notify(due)
         self.time_ns = until_ns if reached else arrays.time_ns
         self.state = State(self.time_ns, arrays.row.copy())
         return reached
 
-    def _notify(self, due: list[Pending]) -> None:
+    def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier = self.observer, self._notifier
         observed = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
-        if not (observed or self._arrays.integers[fl.TIMEOUTS]):
+        if not (observed or self._arrays.integers[_TIMEOUTS]):
             self.events.note([(pending.time_ns, pending.command) for pending in due])
             return
         first = self._arrays.first_due

@@ -364,8 +364,25 @@ def test_a_motion_that_takes_more_steps_than_the_clock_leaves_time_for_says_so()
     spun.advance(1)
     assert "1.3e+06 steps" in spun.too_slow
     calm = flight(BODY, integrator="auto", initial=START, angular_damping=2e6)
+    assert calm.too_slow == ""
     calm.advance(SECOND)
     assert calm.too_slow == ""
+
+
+def test_implicit_steps_that_will_take_too_long_are_told_of_before_the_flight():
+    """A force that turns with a body of 1e4 rad/s, its flight damped 1e9 times a second: measured 5e4 steps a second."""
+    fast = flown(BODY, np.array([*START[:10], 0.0, 0.0, 1e4]), {"linear": 2e9, "load": TURNING}, 1e-9)
+    fast.advance(1)
+    assert "radau" in fast.choice
+    assert "5e+04 steps for a second of the motion, slower than real time" in fast.too_slow
+    fast.advance(SECOND // 100)
+    assert "radau" in fast.choice
+    assert "slower than real time" in fast.too_slow
+    # A spin that is damped away at once asks for nothing.
+    stopped = flown(BODY, np.array([*START[:10], 0.0, 0.0, 1e4]), {"angular": 2e8, "load": TURNING}, 1e-9)
+    stopped.advance(1)
+    assert "radau" in stopped.choice
+    assert stopped.too_slow == ""
 
 
 def test_portions_have_no_bearing_on_stiff_steps():

@@ -216,6 +216,7 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
             stiff_steps.steps,
             _constant("auto: radau of order 9, stiff damping"),
             workspace=stiff_steps.workspace,
+            implicit=True,
         ),
         ON_STIFF_STRING: Method(
             *(FIXED_STEPS, gradient.string_kernel or gradient.kernel, _stiff, gradient.evaluations),

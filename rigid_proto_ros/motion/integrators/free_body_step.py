@@ -245,13 +245,7 @@ def _long(
     v3 = (w3 * d - (B - A) / C * w1 * w2 * S * c) / bottom
 
     k1 = math.sqrt(m1)
-    kappa = m / ((1.0 + k1) * (1.0 + k1))
-    W = math.sqrt(P / (C * gca))
-    most = L + C * W
-    nu = kappa * A * Q / (gca * most * most)
-    f_a = (E2 + L * W) / most
-    f_b = 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
-    modulus1 = 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
+    kappa, W, nu, f_a, f_b, modulus1 = precession_terms(A, B, C, P, Q, L, E2, m, k1)
     sign = math.copysign(1.0, C - B)
     x0, _ = _gauss_phase(w1 * math.sqrt(A * gca / Q), sign * w2 * math.sqrt(B * gcb / Q), w3 / W, k1)
     x1, y1 = _gauss_phase(v1 * math.sqrt(A * gca / Q), sign * v2 * math.sqrt(B * gcb / Q), v3 / W, k1)
@@ -265,6 +259,21 @@ def _long(
     integral += _third_kind(x, y, modulus1, nu)
     psi = f_a * (u / rate) + f_b * (1.0 + kappa) / rate * integral
     return v1, v2, v3, psi + E2 / L * (beyond / rate)
+
+
+@njit(cache=True, error_model="numpy")
+def precession_terms(  # noqa: PLR0913
+    A: float, B: float, C: float, P: float, Q: float, L: float, E2: float, m: float, k1: float
+) -> tuple[float, float, float, float, float, float]:
+    """κ, W (the largest w₃), ν, f_a, f_b and κ's complement m₁ of ψ' = f_a + f_b s²/(1 + νs²); k1 is √m₁, E2 is 2E."""
+    gca = abs(C - A)
+    kappa = m / ((1.0 + k1) * (1.0 + k1))
+    W = math.sqrt(P / (C * gca))
+    most = L + C * W
+    nu = kappa * A * Q / (gca * most * most)
+    f_a = (E2 + L * W) / most
+    f_b = 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
+    return kappa, W, nu, f_a, f_b, 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
 
 
 @njit(cache=True, error_model="numpy")

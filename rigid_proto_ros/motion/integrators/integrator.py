@@ -49,6 +49,7 @@ class Method:
     of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
     sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
     with a string alone. radians: of the fastest turn or swing that a step covers, about; 0 where steps don't follow it.
+    implicit: steps follow what moves beside the damping.
     """
 
     way: int
@@ -60,6 +61,7 @@ class Method:
     floor_binds: bool = False
     on_string: bool = False
     radians: float = 0.0
+    implicit: bool = False
 
 
 @dataclass(frozen=True)
