@@ -29,7 +29,7 @@ def test_a_fast_spin_under_a_weak_torque_takes_few_steps(frame):
     simulation = weakly_loaded(frame)
     simulation.advance(SECOND // 10)
     assert "free_body_strang" in simulation.choice
-    # 1e4 rad; the Taylor series takes some 14 000 steps, bounds for any phase 949 and 1603. Measured 110 and 41.
+    # 1e4 rad; the Taylor series takes some 8000 steps, bounds for any phase 949 and 1603. Measured 110 and 41.
     assert simulation.steps < 200
 
 

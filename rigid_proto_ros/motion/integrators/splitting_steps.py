@@ -64,9 +64,9 @@ SECOND_ORDER = 0.1
 RESOLVED = 2.0
 """|ω|h [rad] up to which a step resolves the turn."""
 
-TURN_THAT_PAYS, TURN_THAT_PAYS_IN_WORLD = 2.0, 0.5
+TURN_THAT_PAYS, TURN_THAT_PAYS_IN_WORLD = 4.0, 1.5
 """|ω|h [rad] from which on steps are cheaper than a Taylor series, of the spin alone or of the whole motion: measured,
-the series cost 0.4 to 2 and 4 to 8 µs a radian, a step 0.5 to 2 µs.
+the series cost 0.28 and 0.56 µs a radian, a step 0.6 to 1.2 µs.
 """
 
 ROUNDING = 64.0 * 2.0**-52
