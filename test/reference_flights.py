@@ -334,12 +334,26 @@ def _disturb(Y, P, size, ways):
 
 
 @njit(cache=True)
-def _fly(P, load, move, end, disturbance, ways, a, b, c):
-    Y, low, hand = P[:13].copy(), np.zeros(13), np.zeros(6)
-    size = math.sqrt(Y[3] * Y[3] + Y[4] * Y[4] + Y[5] * Y[5] + Y[6] * Y[6])
-    Y[3:7] /= size
+def _begun(P):
+    """x, q, v and the angular momentum in world axes of the row in P."""
+    Y = P[:13].copy()
+    Y[3:7] /= math.sqrt(Y[3] * Y[3] + Y[4] * Y[4] + Y[5] * Y[5] + Y[6] * Y[6])
     q, w, i = (Y[3], Y[4], Y[5], Y[6]), (Y[10], Y[11], Y[12]), _INERTIA
     Y[10:13] = np.array(_turned(q, (_dot(_three(P, i), w), _dot(_three(P, i + 3), w), _dot(_three(P, i + 6), w)), 1.0))
+    return Y
+
+
+@njit(cache=True)
+def _row(P, Y):
+    """x, q, v and ω in body axes."""
+    row, q = Y.copy(), (Y[3], Y[4], Y[5], Y[6])
+    row[10:13] = np.array(_solved(P, _turned(q, (Y[10], Y[11], Y[12]), -1.0)))
+    return row
+
+
+@njit(cache=True)
+def _fly(P, load, move, end, disturbance, ways, a, b, c):
+    Y, low, hand = _begun(P), np.zeros(13), np.zeros(6)
     cuts = np.sort(np.array([0.0, load[0], load[1], move[0], move[1], end]))
     for n in range(5):
         begin, span = cuts[n], cuts[n + 1] - cuts[n]
@@ -353,9 +367,36 @@ def _fly(P, load, move, end, disturbance, ways, a, b, c):
             if moving:
                 hand[j], hand[3 + j] = P[_TARGET + j] + (begin - move[0]) * rate, rate
         _fly_span(Y, low, P, hand, begin, span, load[0] <= begin < load[1], disturbance, ways, a, b, c)
-    q = (Y[3], Y[4], Y[5], Y[6])
-    Y[10:13] = np.array(_solved(P, _turned(q, (Y[10], Y[11], Y[12]), -1.0)))
-    return Y
+    return _row(P, Y)
+
+
+class StillFlight:
+    """The equations of a flight with numbers P, its wrench always at work and its free end at rest, for a method of somebody else's.
+
+    start (13,): x, q, v, angular momentum in world axes.
+    """
+
+    def __init__(self, P: np.ndarray) -> None:
+        self._P, self.start = P, _begun(P)
+        self._hand = np.concatenate([P[_TARGET : _TARGET + 3], np.zeros(3)])
+
+    def rates(self, Y: np.ndarray, pulls: bool) -> np.ndarray:
+        """Y' (13,) with a string that pulls or doesn't."""
+        dY = np.empty(13)
+        _rates(Y, self._P, self._hand, 0.0, True, pulls, dY, np.empty(8))
+        return dY
+
+    def law(self, Y: np.ndarray, pulls: bool) -> np.ndarray:
+        """l² − rest² and its rate, k x + c l' and its rate."""
+        law = np.zeros(8)
+        _rates(Y, self._P, self._hand, 0.0, True, pulls, np.empty(13), law)
+        return law[:4]
+
+    def row(self, Y: np.ndarray) -> np.ndarray:
+        """The state row (13,)."""
+        row = _row(self._P, Y)
+        row[3:7] /= np.linalg.norm(row[3:7])
+        return row
 
 
 NO_WAYS = np.zeros((DIRECTIONS, 4, 3))

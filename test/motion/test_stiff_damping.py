@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Damping a million and more times faster than the motion beside it: no step is wasted on it, and the accuracy is kept."""
 
-import math
-
 import numpy as np
 import pytest
 from flights import SECOND, flight, spinning, wrench
 from mpmath import mp, mpc, mpf
 from random_scenes import log_uniform, random_body
+from reference_flights import StillFlight, numbers
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -101,109 +100,80 @@ def test_a_body_creeps_down_on_a_string_that_is_all_damper(ratio):
     assert simulation.force_evaluations <= MOST_EVALUATIONS
 
 
-def cross(a, b):
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def turned(q):
-    x, y, z, w = q / math.sqrt(q @ q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def stiff_reference(
     body, row, until, *, angular=0.0, linear=0.0, load=None, gravity=0.0, string=None, tied=None, tolerance=1e-10
 ):
-    """The state row by SciPy's Radau (order 5) from the equations of docs/physics.md, begun anew where a pull-only string's law changes.
+    """The state row by SciPy's Radau (order 5) from the equations of test/reference_flights.py, begun anew where a pull-only string's
+    law changes.
 
     load: (axes, point, force, torque). string: settings, and as tied (stiffness, damping).
     """
-    inverse = np.linalg.inv(body.inertia)
     axes, point, force, torque = load or ("body", np.zeros(3), np.zeros(3), np.zeros(3))
-    point, force, torque = np.array(point), np.array(force), np.array(torque)
-    attach, target, rest = np.zeros(3), np.zeros(3), 0.0
+    none = (
+        "point_world",
+        "force_world",
+        "torque_world",
+        "point_body",
+        "force_body",
+        "torque_body",
+        "arm",
+        "target",
+        "moved",
+    )
+    scene = dict.fromkeys(none, np.zeros(3)) | dict.fromkeys(("stiffness", "damping", "rest_length"), 0.0)
+    scene |= {f"point_{axes}": point, f"force_{axes}": force, f"torque_{axes}": torque, "tied": tied is not None}
+    scene |= {"row": row, "mass": body.mass, "inertia": body.inertia, "length": 1.0, "gravity": (0.0, 0.0, gravity)}
+    scene |= {"linear_damping": linear, "angular_damping": angular, "one_sided": False}
     if tied is not None:
-        attach, target, rest = np.array(string.attach), np.array(string.target), string.rest_length
-    one_sided = tied is not None and not string.bilateral and rest > 0.0
+        scene |= {"arm": string.attach, "target": string.target, "moved": string.target}
+        scene |= {"stiffness": tied.stiffness, "damping": tied.damping, "rest_length": string.rest_length}
+    one_sided = tied is not None and not string.bilateral and string.rest_length > 0.0
+    flight = StillFlight(numbers(scene))
 
-    def span(s, R):
-        return s[:3] + R @ attach - target, s[7:10] + R @ cross(s[10:], attach)
+    def rates(_, Y, pulls):
+        return flight.rates(Y, pulls)
 
-    def stretch(_, s):
-        a, _ = span(s, turned(s[3:7]))
-        return math.sqrt(a @ a) - rest
+    def stretch(_, Y, pulls):
+        return flight.law(Y, pulls)[0]
 
-    def tension(_, s):
-        a, rate = span(s, turned(s[3:7]))
-        length = math.sqrt(a @ a)
-        return tied.stiffness * (length - rest) + tied.damping * (a @ rate) / length
-
-    def rates(_, s, pulls):
-        R, q, v, w = turned(s[3:7]), s[3:7], s[7:10], s[10:]
-        f = R.T @ force if axes == "world" else force
-        t = (R.T @ torque if axes == "world" else torque) + cross(point, f)
-        pull = R @ f - linear * v + np.array([0, 0, gravity * body.mass])
-        if pulls:
-            a, rate = span(s, R)
-            free = rest == 0.0
-            F = -tied.stiffness * a - tied.damping * rate if free else -tension(0.0, s) * a / math.sqrt(a @ a)
-            pull = pull + F
-            t = t + cross(attach, R.T @ F)
-        dw = inverse @ (t - angular * w - cross(w, body.inertia @ w))
-        dq = 0.5 * np.array([*(q[3] * w + cross(q[:3], w)), -(q[:3] @ w)])
-        return np.concatenate([v, dq, pull / body.mass, dw])
-
-    def flown(s, begin, end, pulls, ends):
-        found = solve_ivp(
-            rates, (begin, end), s, "Radau", rtol=tolerance, atol=0.01 * tolerance, args=(pulls,), events=ends
-        )
-        assert found.success
-        return found
+    def tension(_, Y, pulls):
+        return flight.law(Y, pulls)[2]
 
     def event(of, direction):
-        def value(t, s, pulls):
-            return of(t, s)
+        def value(t, Y, pulls):
+            return of(t, Y, pulls)
 
         value.terminal, value.direction = True, direction
         return value
 
-    state, now = np.array(row), 0.0
-    while now < until:
-        x = stretch(0.0, state) if one_sided else 1.0
-        pulls = tied is not None and (not one_sided or (x > 0.0 and tension(0.0, state) > 0.0))
-        ends = None
-        if one_sided:
-            ends = (
-                [event(tension, -1)]
-                if pulls
-                else [event(stretch, 1)]
-                if x <= 0.0
-                else [event(tension, 1), event(stretch, -1)]
-            )
-        found = flown(state, now, until, pulls, ends)
-        if found.t[-1] == until:
-            return found.y[:, -1]
-        # Up to the event once more: what is interpolated there is less exact than steps are.
-        of, at = next(
-            (e, t[0])
-            for e, t in zip((stretch, stretch) if x <= 0.0 else (tension, stretch), found.t_events, strict=False)
-            if len(t)
+    def flown(Y, begin, end, pulls, ends):
+        found = solve_ivp(
+            rates, (begin, end), Y, "Radau", rtol=tolerance, atol=0.01 * tolerance, args=(pulls,), events=ends
         )
+        assert found.success
+        return found
+
+    Y, now = flight.start, 0.0
+    while now < until:
+        x, _, pull, _ = flight.law(Y, True)
+        pulls = tied is not None and (not one_sided or (x > 0.0 and pull > 0.0))
+        ends, values = None, ()
+        if one_sided:
+            # Of the law: which number ends it, and its way.
+            values = ((2, -1),) if pulls else ((0, 1),) if x <= 0.0 else ((2, 1), (0, -1))
+            ends = [event(tension if which == 2 else stretch, way) for which, way in values]
+        found = flown(Y, now, until, pulls, ends)
+        if found.t[-1] == until:
+            return flight.row(found.y[:, -1])
+        # Up to the event once more: what is interpolated there is less exact than steps are.
+        which, at = next((w, t[0]) for (w, _), t in zip(values, found.t_events, strict=True) if len(t))
         for _ in range(3):
-            reached = flown(state, now, at, pulls, None).y[:, -1]
-            slope = rates(at, reached, pulls)
-            small = 1e-6 / max(1.0, float(abs(slope).max()))
-            at -= of(at, reached) / (
-                (of(at, reached + small * slope) - of(at, reached - small * slope)) / (2.0 * small)
-            )
+            reached = flown(Y, now, at, pulls, None).y[:, -1]
+            law = flight.law(reached, pulls)
+            at -= law[which] / law[which + 1]
         # Begun a hair on, where the law is beyond doubt.
-        state, now = reached + 1e-12 * slope, at + 1e-12
-    return state
+        Y, now = reached + 1e-12 * flight.rates(reached, pulls), at + 1e-12
+    return flight.row(Y)
 
 
 START = np.array([0.2, -0.1, 0.9, 0.1, 0.3, -0.2, 0.9, 0.3, -0.5, 0.2, 3.0, 4.0, 5.0])
