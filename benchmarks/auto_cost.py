@@ -31,6 +31,7 @@ from result_table import ResultTable
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.error_measure import FLOOR, scales, size
+from rigid_proto_ros.motion.variables import SPIN
 from rigid_proto_ros.simulation.simulation import Simulation
 from work_precision_ours import simulation_of
 
@@ -40,7 +41,8 @@ GRID = [2.0 ** (-k / 2) for k in range(44)]
 STARTS = 40
 MOST_EVALUATIONS = 2e7
 """Beyond it a fixed step takes seconds and is never the cheapest."""
-SUBSTEPS = 16
+SUBSTEPS, RADIANS = 16, 0.2
+"""Of the judge in a step: so many at least, and none that turns the body by more."""
 COLUMNS = (
     "scene",
     "accuracy",
@@ -88,7 +90,8 @@ def keeps_rate(integrator, starts, h: float, accuracy: float) -> bool:
         mine, fine = y.copy(), y.copy()
         if integrator.kernel_for(p)(mine, p, h, 1) != 1:
             return False
-        if exact.kernel_for(p)(fine, p, h / SUBSTEPS, SUBSTEPS) != SUBSTEPS:
+        substeps = max(SUBSTEPS, math.ceil(h * float(np.linalg.norm(y[SPIN : SPIN + 3])) / RADIANS))
+        if exact.kernel_for(p)(fine, p, h / substeps, substeps) != substeps:
             return False
         # Rounding of the judge's own substeps is not the judged one's.
         if not _difference(mine, fine, p, elapsed + h) <= accuracy * h + 2.0 * FLOOR:
@@ -238,6 +241,7 @@ def main() -> None:
                     accuracy,
                 )
             )
+    table.write()
     for seed in range(options.scenes):
         sys.stderr.write(f"\rscene {seed + 1}/{options.scenes}")
         duration_s = scene(seed, "auto", 1e-9, 1e-3)[1]
@@ -250,8 +254,9 @@ def main() -> None:
                     accuracy,
                 )
             )
+        # Each scene is kept, however far the run comes.
+        table.write()
     sys.stderr.write("\n")
-    table.write()
     for line in summary(table.rows):
         print(line)
 
