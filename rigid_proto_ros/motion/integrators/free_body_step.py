@@ -262,7 +262,7 @@ def _long(
 
 
 @njit(cache=True, error_model="numpy")
-def precession_terms(  # noqa: PLR0913
+def precession_terms(
     A: float, B: float, C: float, P: float, Q: float, L: float, E2: float, m: float, k1: float
 ) -> tuple[float, float, float, float, float, float]:
     """κ, W (the largest w₃), ν, f_a, f_b and κ's complement m₁ of ψ' = f_a + f_b s²/(1 + νs²); k1 is √m₁, E2 is 2E."""
