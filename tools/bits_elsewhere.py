@@ -106,7 +106,7 @@ def in_root(age: str) -> tuple[bool, str]:
             shutil.copy(file, root / file[1:])
     pip = {name: value for name, value in os.environ.items() if name in ("PIP_INDEX_URL", "PIP_CERT")}
     own = {
-        "PATH": "/usr/bin:/bin",
+        "PATH": "/usr/sbin:/usr/bin:/sbin:/bin",
         "HOME": "/root",
         "PYTHONPATH": "/opt/bits:/opt/bits/test",
         "RIGID_PROTO_CACHE": "off",
