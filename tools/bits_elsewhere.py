@@ -100,6 +100,7 @@ def in_root(age: str) -> tuple[bool, str]:
     place.mkdir(parents=True)
     for part in ("rigid_proto_ros", "test", "config"):
         shutil.copytree(HERE / part, place / part, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(HERE / "package.xml", place)
     for file in ("/etc/resolv.conf", "/etc/hosts", "/etc/pip.conf", "/etc/ssl/certs/ca-certificates.crt"):
         if Path(file).exists():
             (root / file[1:]).parent.mkdir(parents=True, exist_ok=True)
