@@ -19,6 +19,7 @@ from packaging.requirements import Requirement
 import rigid_proto_ros
 from rigid_proto_ros.base import bundled
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.mesh.locate import resolve_mesh
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 EXECUTABLES = {"rigid_proto", "rigid_body_node", "poke_client"}
@@ -56,8 +57,8 @@ def run(*command: object, cwd: Path, **environment: str) -> subprocess.Completed
 def installed_bundle(site: Path, cwd: Path, **environment: str) -> list[str]:
     """What an installed copy finds: the paths of a scene and a body, then the names of all scenes."""
     code = (
-        "from rigid_proto_ros.base import bundled as b; "
-        "print(b.scene_path('t_handle')); print(b.resolve_mesh('t_handle')); print(*b.scene_names())"
+        "from rigid_proto_ros.base import bundled as b; from rigid_proto_ros.mesh.locate import resolve_mesh; "
+        "print(b.scene_path('t_handle')); print(resolve_mesh('t_handle')); print(*b.scene_names())"
     )
     return run(sys.executable, "-c", code, cwd=cwd, PYTHONPATH=str(site), **environment).stdout.split("\n")[:3]
 
@@ -224,7 +225,7 @@ def test_every_body_has_a_scene_and_every_scene_a_body() -> None:
 def test_contacts_of_the_scenes_lie_on_the_surface() -> None:
     for name in bundled.scene_names():
         parameters = scene_parameters(name)
-        rows = [line.split() for line in bundled.resolve_mesh(parameters["mesh"]).read_text("utf-8").splitlines()]
+        rows = [line.split() for line in resolve_mesh(parameters["mesh"]).read_text("utf-8").splitlines()]
         vertices = np.array([row[1:] for row in rows if row[0] == "v"], dtype=float)
         corners = vertices[np.array([row[1:] for row in rows if row[0] == "f"], dtype=int) - 1]
         for contact, point in parameters["contacts"].items():
