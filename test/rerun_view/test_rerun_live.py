@@ -12,7 +12,6 @@ import urllib.request
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import rerun_flight as flight
 
@@ -192,23 +191,21 @@ def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(v
     wait_for(lambda: 39 * flight.PERIOD_NS in shown())
     viewer.take_screenshot()
     assert complaints(viewer) == []
-    # A body ten times as large is looked at from ten times as far.
-    near = camera_distances(viewer)
-    observer.body_changed(400_000_000, replace(flight.BODY, scale=10.0 * flight.SCALE))
-    wait_for(lambda: max(camera_distances(viewer)) > 5.0 * max(near))
+    # A body ten times as large comes into the same views, whose cameras stay where they are.
+    eyes = cameras(viewer)
+    observer.body_changed(40 * flight.PERIOD_NS, replace(flight.BODY, scale=10.0 * flight.SCALE))
+    observer.state(40 * flight.PERIOD_NS, row)
+    wait_for(lambda: 40 * flight.PERIOD_NS in shown())
+    assert eyes and cameras(viewer) == eyes
     assert complaints(viewer) == []
     observer.close()
 
 
-def camera_distances(viewer) -> list[float]:
-    """Of the views whose camera goes with the body's size."""
+def cameras(viewer) -> list[list[float]]:
+    """Where the views are looked at from."""
     blueprint = viewer.get_blueprint(of="recording").blueprint
-    eyes = [
-        node["EyeControls3D"]["position"] for node in blueprint.values() if "position" in node.get("EyeControls3D", {})
-    ]
-    distances = sorted(float(np.linalg.norm(eye)) for eye in eyes)
-    # One is Poinsot's picture, which has the same size for every body.
-    return [distance for distance in distances if abs(distance - np.linalg.norm([2.5, -2.0, 1.0])) > 1e-3]
+    controls = (node.get("EyeControls3D", {}) for node in blueprint.values())
+    return sorted(list(control["position"]) for control in controls if "position" in control)
 
 
 def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, monkeypatch):

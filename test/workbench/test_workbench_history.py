@@ -113,7 +113,7 @@ def test_after_a_rewind_the_string_is_what_it_was_and_not_what_the_body_would_ma
 def test_after_a_rewind_the_body_does_again_what_it_did_to_the_bit_until_a_hand_acts(seed: int) -> None:
     history = History()
     hand = random_hand_session(seed, 3.0, hearing(history))
-    acted = [time_ns for time_ns, _ in hand.log.lines]
+    acted = [time_ns for time_ns, _ in hand.log.timed]
     # Among the longest times without a hand, a string's free end often moves at the beginning of one.
     lasting_ns, began_ns = sorted(zip(np.diff(acted).tolist(), acted, strict=False))[-1 - seed % 5]
     moment_ns = (began_ns // 10_000_000 + 1) * 10_000_000

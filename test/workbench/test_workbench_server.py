@@ -115,15 +115,15 @@ def test_a_page_opened_with_a_link_hands_it_on_and_an_image_does_not(server) -> 
     assert OPENED == ["1.abc-_"]
 
 
-@pytest.mark.parametrize("package", ["viser", "rclpy"])
-def test_without_what_it_needs_the_command_says_so_in_one_line(package, monkeypatch, capsys) -> None:
+@pytest.mark.parametrize(("package", "extra"), [("viser", "[workbench]"), ("rclpy", "[ros]")])
+def test_without_what_it_needs_the_command_says_so_in_one_line(package, extra, monkeypatch, capsys) -> None:
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *given: None if name == package else find(name, *given)
     )
     assert main(["workbench"]) == 2
     told = capsys.readouterr()
-    assert told.out == "" and told.err.count("\n") == 1 and package in told.err and "[workbench]" in told.err
+    assert told.out == "" and told.err.count("\n") == 1 and package in told.err and extra in told.err
 
 
 def test_a_running_node_and_a_scene_to_start_one_are_refused_together(capsys) -> None:
