@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import sys
+from contextlib import redirect_stdout
+from io import StringIO
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from sweep_studies import POKES, study
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.ros.warm_up import warm_up
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
@@ -22,6 +25,12 @@ from rigid_proto_ros.sweep.chunk import run_chunk
 def node() -> None:
     """What a node flies by."""
     warm_up(read_scene(str(scene_path("t_handle"))).setup)
+
+
+def surface() -> None:
+    """What a mesh is read, checked and summed by; the report is nobody's."""
+    with redirect_stdout(StringIO()):
+        assert rigid_proto(["inspect", "t_handle"]) == 0
 
 
 def batch() -> None:
@@ -43,5 +52,5 @@ def integrators() -> None:
 if __name__ == "__main__":
     # As many at a time as there are cores on the smallest machine that tests run on.
     with get_context("spawn").Pool(2) as pool:
-        for done in [pool.apply_async(part) for part in (node, batch, integrators)]:
+        for done in [pool.apply_async(part) for part in (node, surface, batch, integrators)]:
             done.get()

@@ -80,6 +80,7 @@ def test_a_killed_run_is_resumed_without_a_row_lost_or_done_twice(long_run) -> N
     assert out.stat().st_mtime_ns == before
 
 
+@pytest.mark.stress
 def test_ctrl_c_leaves_a_readable_table_and_a_run_to_resume(long_run) -> None:
     command, out, own = long_run
     status, said = signalled(command, out, 1, signal.SIGINT)

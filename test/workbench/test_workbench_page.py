@@ -197,6 +197,7 @@ def test_a_finger_taps_to_poke_and_drags_to_pull(page, ear) -> None:
     ear.event("string_release", before)
 
 
+@pytest.mark.stress
 def test_two_pages_have_one_string_and_closing_one_lets_go_of_what_it_holds(page, ear, bench) -> None:
     def kinds(since: int) -> set[str]:
         return {event["kind"] for event in ear.events()[since:] if event["kind"].startswith("string")}
@@ -344,6 +345,7 @@ def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> Non
     ear.set_named({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 1.0]})
 
 
+@pytest.mark.stress
 def test_what_was_done_by_hand_is_saved_as_scene_and_script_and_as_a_link(page, ear, bench) -> None:
     before = len(ear.events())
     page.click(*page.middle)
@@ -489,6 +491,7 @@ def test_wheel_and_pinch_bring_the_view_nearer_and_a_click_still_pokes_where_it_
     page.until(lambda: nearness() < 0.9 * by_wheel, "a view that is nearer still")
 
 
+@pytest.mark.stress
 def test_with_the_page_closed_the_node_has_the_subscribers_that_it_had_before(page, ear) -> None:
     assert listeners(ear) == WITH_A_PAGE
     page.page.goto("about:blank")
