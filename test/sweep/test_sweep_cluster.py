@@ -16,6 +16,7 @@ from rigid_proto_ros.sweep.run import run_study
 distributed = pytest.importorskip("distributed")
 
 
+@pytest.mark.stress
 def test_a_worker_killed_in_mid_run_costs_no_row(tmp_path) -> None:
     own = study(PULLED, samples=320, duration=0.3)
     file = tmp_path / "t.parquet"
