@@ -144,16 +144,18 @@ def test_make_target_exists(command: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sweeps", [False, pytest.param(True, marks=pytest.mark.stress)])
+@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.stress)])
 def test_rigid_proto_commands_run(
-    in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture, sweeps: bool
+    in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture, whole: bool
 ) -> None:
-    """Sweeps fly thousands of rows, so they are for the long run."""
+    """Sweeps fly thousands of rows and films draw every picture, so they are for the long run."""
     pytest.importorskip("rerun")
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):
-        if command.startswith(STAYS_UP) or " demo" in command or command.startswith(SWEEP) != sweeps:
+        if command.startswith(STAYS_UP) or " demo" in command:
+            continue
+        if not whole and (command.startswith(SWEEP) or "--video" in command):
             continue
         if "--publish" in command:
             sent = subprocess.run(
@@ -293,6 +295,7 @@ MINUTE_S = 60.0
 
 
 @pytest.mark.slow
+@pytest.mark.stress
 def test_three_things_to_try_do_what_the_readme_says_in_their_order_with_a_minute_between(
     ros_environment: dict[str, str], tmp_path: Path
 ) -> None:

@@ -14,6 +14,7 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIG
 """One handler serves both; a node's end by SIGTERM is looked at in test_node_flight.py too."""
 
 
+@pytest.mark.stress
 @needs_rerun
 @BOTH
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):

@@ -176,6 +176,7 @@ def test_a_drag_ties_the_string_where_it_grabbed_and_moves_the_body_that_way(pag
     assert tail[-1] == "string_release"
 
 
+@pytest.mark.stress
 def test_a_finger_taps_to_poke_and_drags_to_pull(page, ear) -> None:
     before = len(ear.events())
     x, y = page.middle
@@ -320,6 +321,7 @@ def test_an_upload_shows_the_verdict_and_a_broken_one_leaves_the_body_as_it_is(p
     page.until(lambda: not list(folder.glob("rigid_proto_upload_*/*")), "a folder without uploads")
 
 
+@pytest.mark.stress
 def test_a_rewind_branches_and_the_old_future_stays_as_a_ghost(page, ear) -> None:
     before = len(ear.events())
     page.click(*page.middle)
