@@ -11,6 +11,7 @@ from flights import SECOND
 from one_segment import OneSegment, make_problem
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
+from problems import P2
 from rigid_proto_ros.base.rotation import cross
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
@@ -29,8 +30,8 @@ from rigid_proto_ros.motion.string import StringSettings, Tied, tie
 
 TENSOR = ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9))
 MASS = 2.0
-ROW = (0.3, -0.2, 0.1, *(v / 1.0 for v in (0.2, -0.4, 0.4, 0.8)), 0.4, 0.1, -0.3, 0.9, 1.3, -0.6)
-POINT = (0.2, 0.1, -0.15)
+ROW = (0.3, -0.2, 0.1, 0.2, -0.4, 0.4, 0.8, 0.4, 0.1, -0.3, 0.9, 1.3, -0.6)
+POINT, FORCE = P2.wrenches[0].point, P2.wrenches[0].force
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Scene:
         return _reference(self, tuple(times))
 
     def _values(self) -> dict:
-        force_world, force_body = np.array((0.4, -0.7, 0.5)), np.array((0.5, -0.3, 0.8))
+        force_world, force_body = np.array((0.4, -0.7, 0.5)), np.array(FORCE)
         world, body = WORLD_TORQUE in self.needs, BODY_FORCE in self.needs
         torque = BODY_TORQUE in self.needs
         point = np.array(POINT)

@@ -2,16 +2,12 @@
 """The benchmark's problems, their cached references and what is read from its table."""
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from flights import SECOND
 from mpmath import mp, mpf
 from reference_motion import angle_between, rotation_of
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
 
 from problem_references import compute, reference_row
 from problems import PROBLEMS

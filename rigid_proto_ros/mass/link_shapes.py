@@ -20,7 +20,7 @@ from .verdict import COUNTED_TWICE, WARNING
 
 def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarray]:
     """(volume, second moments (3,) of x², y², z² over it) of a primitive about its centre, ``size`` as in
-    PRIMITIVES.
+    Shape.
     """
     if not size or not all(0.0 < value < math.inf for value in size):
         raise InputError(kind, size, "finite sizes > 0")

@@ -21,15 +21,14 @@ from .robot_xacro import expand_xacro
 
 MAX_BYTES = 50_000_000
 VISUAL, COLLISION = "visual", "collision"
-PRIMITIVES = ("box", "cylinder", "sphere", "capsule", "ellipsoid")
-"""Shapes by closed form. ``size``: sides of the box; radius and length of cylinder and capsule (along z, the capsule's
-without its caps); radius; semi-axes."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape as a link shows it or collides with it: kind "mesh" with ``file`` and scale (3,), or one of PRIMITIVES
-    with ``size``; rotation (3, 3) and position (3,) [m] in the link's frame; ``problem``: why it can't be taken."""
+    """A shape as a link shows it or collides with it: kind "mesh" with ``file`` and scale (3,), or with ``size`` [m] a
+    "box" (sides), "cylinder" or "capsule" (radius, length along z, the capsule's without its caps), "sphere" (radius)
+    or "ellipsoid" (semi-axes); rotation (3, 3) and position (3,) [m] in the link's frame; ``problem``: why it can't be
+    taken."""
 
     role: str
     kind: str

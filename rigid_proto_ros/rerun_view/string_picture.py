@@ -112,7 +112,7 @@ class StringPicture:
         send(e.HAND, times, rr.Points3D.columns(positions=hands).partition(counts))
         send(e.STRING_TENSION, times, scalar_columns(tensions[:, np.newaxis]))
         send(e.STRING_ENERGY, times, scalar_columns(np.concatenate(self._energies)[:, np.newaxis]))
-        lines = np.concatenate(self._lines) if self._lines else np.empty((0, 2, 3))
+        lines = [line for several in self._lines for line in several]
         pulling = np.array([1 if pull else 0 for pull in pulls])
         drawn = np.zeros(len(counts), dtype=int)
         drawn[counts > 0] = pulling

@@ -9,12 +9,10 @@ from reference_double_double import attitude_angle, free_step
 from reference_motion import angle_between, free_motion, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
+from problems import P1, P2, P3, P4_PLATE, P4_ROD, tuples
+
 FULL = np.array([[1.3, 0.2, -0.1], [0.2, 2.0, 0.3], [-0.1, 0.3, 2.9]])
 ATTITUDE = (0.2, -0.4, 0.4, 0.8)
-
-
-def tuples(matrix):
-    return tuple(tuple(float(x) for x in row) for row in matrix)
 
 
 def largest_difference(a, b):
@@ -24,7 +22,7 @@ def largest_difference(a, b):
 @pytest.mark.parametrize(
     ("inertia", "spin", "time"),
     [
-        (np.diag([1.0, 2.0, 3.0]), (1e-3, 1.0, 1e-3), 20),
+        (np.array(P1.inertia), P1.row[10:], 20),
         (np.diag([1.0, 2.0, 3.0]), (0.1, 0.2, 3.0), 5),
         (np.diag([3.0, 1.0, 2.0]), (-2.0, 0.1, 0.2), 5),
         (FULL, (0.3, 1.0, -0.2), 5),
@@ -42,7 +40,7 @@ def test_closed_form_and_taylor_series_agree_to_38_digits(inertia, spin, time):
 
 def test_closed_form_holds_over_thousands_of_turns():
     """Turning 9000 rad in one go and in two goes gives the same attitude: the amplitude counts its turns."""
-    inertia, spin = np.diag([1e-3, 1.0, 1.001]), (1000 / 3, 2000 / 3, 2000 / 3)
+    inertia, spin = np.array(P4_PLATE.inertia), P4_PLATE.row[10:]
     R, w = free_motion(inertia, spin, 9.0)
     R1, w1 = free_motion(inertia, spin, 4.0)
     # The halfway state rounds to doubles, and 5 s at 1000 rad/s carry that rounding on.
@@ -53,12 +51,14 @@ def test_closed_form_holds_over_thousands_of_turns():
         assert max(abs(a - b) for a, b in zip(w, w2, strict=True)) < mpf("1e-8")
 
 
-@pytest.mark.parametrize("bilateral", [True, False])
-def test_undamped_string_keeps_energy_through_slack_and_taut(bilateral):
-    string = ReferenceString((0.1, 0.15, 0.2), (0.0, 0.0, 2.0), 200.0, rest_length=1.0, bilateral=bilateral)
-    problem = ReferenceProblem(2.0, tuples(np.diag([0.02, 0.03, 0.04])), gravity=(0.0, 0.0, -9.81), string=string)
-    row = [-0.1, -0.15, 0.8, 0, 0, 0, 1, 0, 0, 0, 0.5, -1.0, 2.0]
-    rows = reference_motion(problem, row, [0, 0.5, 1.0], digits=25)
+@pytest.mark.parametrize("flight", [p for p in P3 if p.spring.damping == 0.0 and p.spring.frequency == 10.0])
+def test_undamped_string_keeps_energy_through_slack_and_taut(flight):
+    spring = flight.spring
+    string = ReferenceString(
+        spring.point, spring.target, spring.stiffness, rest_length=spring.rest_length, bilateral=spring.bilateral
+    )
+    problem = ReferenceProblem(flight.mass, flight.inertia, gravity=flight.gravity, string=string)
+    rows = reference_motion(problem, flight.row, [0, 0.5, 1.0], digits=25)
     with mp.workdps(40):
         energies = [energy(problem, r) for r in rows]
         assert max(abs(e - energies[0]) for e in energies) < mpf("1e-22")
@@ -70,14 +70,14 @@ def energy(problem, row):
     stretch = mpmath.sqrt(sum((mpf(t) - p) ** 2 for t, p in zip(s.target, point, strict=True))) - mpf(s.rest_length)
     if not s.bilateral:
         stretch = max(mpf(0), stretch)
-    kinetic = sum(mpf(problem.inertia[i][i]) * row[10 + i] ** 2 for i in range(3)) / 2
+    kinetic = sum(mpf(problem.inertia[i][j]) * row[10 + i] * row[10 + j] for i in range(3) for j in range(3)) / 2
     kinetic += mpf(problem.mass) / 2 * sum(c * c for c in row[7:10])
     return kinetic + mpf(s.stiffness) / 2 * stretch**2 - mpf(problem.mass) * mpf(problem.gravity[2]) * row[2]
 
 
 def test_loads_are_what_they_say():
     """A world force at a point, a body force and damping against sums done by hand at time 0."""
-    arm, force = np.array([0.2, 0.1, -0.15]), np.array([0.5, -0.3, 0.8])
+    arm, force = np.array(P2.wrenches[0].point), np.array(P2.wrenches[0].force)
     R = np.array([[float(c) for c in row] for row in rotation_of(ATTITUDE)])
     problem = ReferenceProblem(
         2.0, tuples(FULL), moment=tuples(np.outer(arm, force)), force_world=tuple(force), linear_damping=0.5
@@ -104,8 +104,8 @@ def test_angle_between_sees_angles_far_below_epsilon():
     ("moments", "spin", "time"),
     [
         ((1.0, 2.0, 3.0), (0.3, 1.0, -0.2), 2.0),
-        ((1.0, 2.0, 3.0), (1e-3, 1.0, 1e-3), 2.5),
-        ((1e-6, 1.0, 1.0 + 5e-7), (1000 / 3, 2000 / 3, 2000 / 3), 2.5e-3),
+        (np.diag(P1.inertia), P1.row[10:], 2.5),
+        (np.diag(P4_ROD.inertia), P4_ROD.row[10:], 2.5e-3),
         ((1.0, 1.0 + 1e-9, 1.5), (1e-180, 2e-180, 5e-181), 7e179),
     ],
 )

@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: MIT
 """A body on a string of any stiffness, from one that a step resolves to one that swings many times within it."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from flights import SECOND, flight
 from reference_motion import angle_between, rotation_of
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import problems
 from motion_measures import energy
 from problem_references import reference_row

@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: MIT
 """auto keeps its word: each committed step errs by at most accuracy·h, against the exact flow from that step's own start."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from flights import SECOND
 from local_error import FLOOR, committed_steps, local_error
 from random_scenes import DURATION_S, random_scene
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from problems import PROBLEMS
 from work_precision_ours import simulation_of
 
