@@ -12,7 +12,7 @@ from .flight_record import FlightRecord
 from .keys import PoseKeys, pose_keys
 from .looks import Looks
 from .sampling import Motion, Sampler, Tolerance, body_size
-from .string_line import StringKeys, string_ends, string_keys
+from .string_line import StringKeys, shapes_apart, string_keys, string_shapes
 
 TIMES_CHECKED = 1000
 """Evenly over the flight, beside those that the keys were chosen from."""
@@ -50,9 +50,9 @@ def animate(
     keys = [pose_keys(motion, track, tolerance if fps is None else None) for track in motion.tracks]
     string = None
     if "string" in parts:
-        string = string_keys(motion.seconds, *ends_of(record, motion), tolerance.position if fps is None else None)
+        string = string_keys(motion.seconds, _shapes(record, motion), tolerance.position if fps is None else None)
     between = np.linspace(sampler.start_ns, sampler.end_ns, TIMES_CHECKED + 2)[1:-1].astype(np.int64)
-    checked = [motion, sampler.at(between), sampler.at(record.times_ns)]
+    checked = [sampler.at(sampler.without_changes(times)) for times in (motion.times_ns, between, record.times_ns)]
     errors = [
         own.errors((look.times_ns - motion.times_ns[0]) * 1e-9, track.poses)
         for look in checked
@@ -77,13 +77,11 @@ def animate(
     return Animation(motion, keys, string, worst, report)
 
 
-def ends_of(record: FlightRecord, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Both ends (n, 3) of the string at the motion's times; NaN while none is tied."""
-    return string_ends(record.strings, motion.times_ns, motion.body.poses)
+def _shapes(record: FlightRecord, motion: Motion) -> np.ndarray:
+    return string_shapes(record, motion.times_ns, motion.body.poses)
 
 
 def _string_error(string: StringKeys, record: FlightRecord, look: Motion, start_ns: int) -> float:
-    """How far the stick's ends are from the string's at most [m]."""
-    true, seen = ends_of(record, look), string.played((look.times_ns - start_ns) * 1e-9)
-    apart = np.fmax(*(np.linalg.norm(a - b, axis=1) for a, b in zip(true, seen, strict=True)))
+    """How far the string that is played is from the true one at most [m]."""
+    apart = shapes_apart(string.played((look.times_ns - start_ns) * 1e-9), _shapes(record, look))
     return float(np.nan_to_num(apart).max())

@@ -18,7 +18,7 @@ from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, HAND_COLOUR, STRI
 from .flight_record import FlightRecord
 from .looks import Looks
 from .sampling import Motion, Sampler, Tolerance, Track, body_size
-from .string_line import string_points
+from .string_line import string_points, string_shapes
 
 VIEW = np.array([0.55, -0.8, 0.4])
 """From what is looked at to the eye, z up."""
@@ -144,7 +144,7 @@ class _Stage:
             for (colour, opacity), track in zip(looks, motion.tracks, strict=False)
         ]
         self._trail = self._line(self._places, TRAIL_COLOUR, 2.0)
-        self._curves = string_points(record.strings, motion.times_ns, motion.body.poses)
+        self._curves = string_points(string_shapes(record, motion.times_ns, motion.body.poses))
         self._string = self._line(np.zeros(self._curves.shape[1:]), STRING_COLOUR, 3.0)
         self._hand = pygfx.Mesh(
             pygfx.sphere_geometry(0.03 * body_size(record)), pygfx.MeshPhongMaterial(color=_rgb(HAND_COLOUR))

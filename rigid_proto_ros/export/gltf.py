@@ -16,6 +16,7 @@ from .. import __version__
 from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
+from ..rerun_view.string_curve import POINTS
 from .animation import Animation
 from .flight_record import DrawnBody, DrawnMesh, FlightRecord
 from .interpolation import Keys
@@ -114,18 +115,32 @@ class Document:
         )
         return len(self.gltf.materials) - 1
 
-    def mesh(self, name: str, attributes: dict[str, int], indices: int | None, mode: int, material: int) -> int:
-        """The number of a new mesh of one primitive."""
+    def mesh(
+        self,
+        name: str,
+        attributes: dict[str, int],
+        indices: int | None,
+        mode: int,
+        material: int,
+        targets: dict[str, int] | None = None,
+    ) -> int:
+        """The number of a new mesh of one primitive. targets: accessors of what morph targets add to its points, by
+        name.
+        """
         import pygltflib
 
         primitive = pygltflib.Primitive(
             attributes=pygltflib.Attributes(**attributes), indices=indices, mode=mode, material=material
         )
-        self.gltf.meshes.append(pygltflib.Mesh(name=name, primitives=[primitive]))
+        mesh = pygltflib.Mesh(name=name, primitives=[primitive])
+        if targets:
+            primitive.targets = [pygltflib.Attributes(POSITION=number) for number in targets.values()]
+            mesh.weights, mesh.extras = [0.0] * len(targets), {"targetNames": list(targets)}
+        self.gltf.meshes.append(mesh)
         return len(self.gltf.meshes) - 1
 
     def animate(self, node: int, path: str, keys: Keys, interpolation: str = "LINEAR") -> None:
-        """Play these keys at a node's ``translation``, ``rotation`` or ``scale``."""
+        """Play these keys at a node's ``translation``, ``rotation``, ``scale`` or ``weights``."""
         import pygltflib
 
         animation = self.gltf.animations[0]
@@ -135,6 +150,8 @@ class Document:
         values = keys.values
         if path == "rotation":
             values = values / np.linalg.norm(values, axis=1, keepdims=True)
+        if path == "weights":
+            values = values.ravel()
         sampler = pygltflib.AnimationSampler(
             input=self.inputs[times.tobytes()], output=self.accessor(values), interpolation=interpolation
         )
@@ -261,27 +278,53 @@ def _draw_trail(document: Document, root: int, places: np.ndarray) -> None:
 
 
 def _draw_string(document: Document, root: int, string: StringKeys, width: float) -> None:
-    angles = np.linspace(0.0, 2.0 * np.pi, STRING_SIDES, endpoint=False)
-    around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(STRING_SIDES)])
-    points = np.vstack([0.5 * width * around, 0.5 * width * around + [0.0, 0.0, 1.0]])
-    low = np.arange(STRING_SIDES)
-    following = (low + 1) % STRING_SIDES
-    sides = np.vstack(
-        [
-            np.column_stack([low, following, following + STRING_SIDES]),
-            np.column_stack([low, following + STRING_SIDES, low + STRING_SIDES]),
-        ]
-    )
+    """A node at the free end, whose mesh is bent and stretched by morph targets of weights from 0 to 1: from the least
+    to the most of span and sag along each axis.
+    """
+    low, high = string.forms.values.min(axis=0), string.forms.values.max(axis=0)
+    sags = bool(low[3:].any() or high[3:].any())
+    along = np.linspace(0.0, 1.0, POINTS if sags else 2)
+    shares = np.column_stack([along] * 3 + [4.0 * along * (1.0 - along)] * 3)
+    around = _cross_sections()
+    ways = np.vstack([np.eye(3), np.eye(3)])
+    centres = (shares * low) @ ways
+    points = (centres[:, np.newaxis] + 0.5 * width * around).reshape(-1, 3)
+    moved = np.flatnonzero(high > low)
+    targets = {
+        f"{'span' if k < 3 else 'sag'} {'xyz'[k % 3]}": document.accessor(
+            np.repeat(shares[:, k] * (high - low)[k], len(around))[:, np.newaxis] * ways[k], bounds=True
+        )
+        for k in moved.tolist()
+    }
     attributes = {
         "POSITION": document.accessor(points, VERTICES, bounds=True),
-        "NORMAL": document.accessor(np.vstack([around, around]), VERTICES),
+        "NORMAL": document.accessor(np.tile(around, (len(along), 1)), VERTICES),
     }
+    corners = document.accessor(_sides(len(along)).ravel(), INDICES)
     material = document.material("string", STRING_COLOUR)
-    mesh = document.mesh("string", attributes, document.accessor(sides.ravel(), INDICES), TRIANGLES, material)
+    mesh = document.mesh("string", attributes, corners, TRIANGLES, material, targets)
     node = document.node("string", root, mesh=mesh)
     document.animate(node, "translation", string.places)
-    document.animate(node, "rotation", string.attitudes)
-    document.animate(node, "scale", string.scales)
+    document.animate(node, "scale", string.shown, "STEP")
+    if targets:
+        weights = (string.forms.values[:, moved] - low[moved]) / (high - low)[moved]
+        document.animate(node, "weights", Keys(string.forms.times, weights))
+
+
+def _cross_sections() -> np.ndarray:
+    """Unit circles (3 STRING_SIDES, 3) about x, y and z: along whichever way it is swept, one of them is seen broad."""
+    angles = np.linspace(0.0, 2.0 * np.pi, STRING_SIDES, endpoint=False)
+    circle = np.column_stack([np.zeros(STRING_SIDES), np.cos(angles), np.sin(angles)])
+    return np.vstack([np.roll(circle, axis, axis=1) for axis in range(3)])
+
+
+def _sides(count: int) -> np.ndarray:
+    """Triangles (n, 3) between neighbours of ``count`` cross-sections."""
+    low = np.arange(3 * STRING_SIDES)
+    following = low - low % STRING_SIDES + (low + 1) % STRING_SIDES
+    high, far = low + 3 * STRING_SIDES, following + 3 * STRING_SIDES
+    piece = np.vstack([np.column_stack([low, following, far]), np.column_stack([low, far, high])])
+    return np.vstack([piece + 3 * STRING_SIDES * k for k in range(count - 1)])
 
 
 def _save(document: Document, file: str) -> None:

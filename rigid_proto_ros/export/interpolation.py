@@ -110,7 +110,7 @@ def _kept(times: np.ndarray, keys: np.ndarray, truth: np.ndarray, tolerance: flo
 
 def fewest_keys(times: np.ndarray, truth: np.ndarray, tolerance: float) -> np.ndarray:
     """Numbers (k,) of the times (n,) to keep, so that what is played from their single-precision values stays within
-    ``tolerance`` of the truth (n, 3) [m], or (n, 4) of attitudes [rad], at all times.
+    ``tolerance`` of the truth (n, c) [m], or (n, 4) of attitudes [rad], at all times.
     """
     kept = np.zeros(len(times), dtype=bool)
     _kept(times, rounded(truth), np.ascontiguousarray(truth), tolerance, kept)
@@ -124,7 +124,8 @@ def rounded(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Keys:
-    """times (k,) [s], strictly ascending, and values (k, 3) or (k, 4): what is written, in single precision."""
+    """times (k,) [s], strictly ascending, and values (k, c), of attitudes where c is 4: what is written, in single
+    precision."""
 
     times: np.ndarray
     values: np.ndarray

@@ -18,7 +18,7 @@ from ..rerun_view.inertia_shapes import PrincipalFrame
 from .flight_record import DrawnBody, FlightRecord
 from .interpolation import attitude_angles, blend
 from .looks import POSE, Looks
-from .string_line import between_ends, string_breaks, string_ends
+from .string_line import shapes_apart, string_breaks, string_changes, string_shapes
 
 TURN_MAX = 0.5
 """[rad] Between two looks at least, so that no turn is missed."""
@@ -135,7 +135,7 @@ def single(times_ns: np.ndarray) -> np.ndarray:
 
 class Sampler:
     """Looks at a flight again. looks: None for one that can't be simulated; then its recorded states are all there
-    is, as ``note`` says. With ``ghost`` the ghost's motion counts too, with ``string`` that of the string's ends.
+    is, as ``note`` says. With ``ghost`` the ghost's motion counts too, with ``string`` that of the string.
     """
 
     def __init__(
@@ -186,7 +186,7 @@ class Sampler:
         tolerance = self.tolerance
         if self.looks is None:
             return self.at(self.record.times_ns)
-        marks = [*self.record.breaks, *string_breaks(self.record.strings), *(t for t, _ in self.record.strings)]
+        marks = [*self.record.breaks, *string_breaks(self.record), *(t for t, _ in self.record.strings)]
         breaks = [t for t in marks if self.start_ns <= t <= self.end_ns]
         times = np.union1d(self._snapped(np.union1d(self.record.times_ns, breaks)), self._changes()).astype(np.int64)
         rows, ghosts = self.looks.at(times)
@@ -208,9 +208,10 @@ class Sampler:
             if self._ghost:
                 errs = np.fmax(errs, _errs(tolerance, ghosts, where, u, ghosts_found))
             if self._string:
-                ends = string_ends(self.record.strings, times, rows[:, :POSE])
-                now = string_ends(self.record.strings, middles, found[:, :POSE])
-                errs = np.fmax(errs, between_ends(ends, where, u, now) / tolerance.position)
+                shapes = string_shapes(self.record, times, rows[:, :POSE])
+                now = string_shapes(self.record, middles, found[:, :POSE])
+                seen = (1.0 - u) * shapes[where] + u * shapes[where + 1]
+                errs = np.fmax(errs, shapes_apart(seen, now) / tolerance.position)
             again = np.repeat(errs > SHARE, 2)
             times, rows, ghosts = (
                 np.insert(old, where + 1, new, axis=0)
@@ -247,12 +248,18 @@ class Sampler:
         near = np.rint(single(times_ns - self.start_ns) * 1e9).astype(np.int64) + self.start_ns
         return np.clip(near, self.start_ns, self.end_ns)
 
+    def without_changes(self, times_ns: np.ndarray) -> np.ndarray:
+        """Those of the times [ns] that single precision tells from each change of what is drawn."""
+        changes = np.array(self._changes()) - self.start_ns
+        apart = np.abs((times_ns - self.start_ns)[:, np.newaxis] - changes)
+        return times_ns[(apart > 1e9 * np.spacing((changes * 1e-9).astype(np.float32))).all(axis=1)]
+
     def _changes(self) -> list[int]:
         """The last time before, and the first after, each change of what is drawn."""
         ghosts = drawn_alike(self.record.ghosts) if self._ghost else []
         bodies = [*drawn_alike(self.record.bodies)[1:], *ghosts[1:]]
         changes = [body.time_ns for body in bodies]
-        changes += [t for t, _ in self.record.strings if t > 0] if self._string else []
+        changes += string_changes(self.record) if self._string else []
         times = {t for change in changes for t in (change, change + 1)}
         return sorted(t for t in times if self.start_ns <= t <= self.end_ns)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the two ends of the string are, and the keys of a stick of length 1 along z that is stretched between them."""
+"""The string of a flight as numbers between which straight lines may be drawn, and the keys of an animation of them."""
 
 from __future__ import annotations
 
@@ -7,169 +7,128 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.rotation import matrix_from_quaternion, multiply
-from ..rerun_view.string_curve import POINTS, string_curves
+from ..base.rotation import matrix_from_quaternion
+from ..rerun_view.string_curve import curve_points, sags
 from ..simulation.observer import ShownString
-from .interpolation import Keys, fewest_keys, rounded, slerp
+from .flight_record import FlightRecord
+from .interpolation import Keys, fewest_keys, rounded
 
-SHARE = 0.2
-"""Of the tolerance, for keys that are left out of each of the stick's place, direction and length."""
+SHARE = 0.25
+"""Of the tolerance, for keys that are left out of the free end's, and as much for those of what is between the ends."""
 
-Strings = list[tuple[int, ShownString | None]]
-"""(time_ns, the string from then on or None)"""
+PLACE, SPAN, SAG = slice(0, 3), slice(3, 6), slice(6, 9)
+"""Columns of a shape: the free end [m, world], its way to the knot, how far the middle hangs below the span's."""
 
 
-def string_ends(strings: Strings, times_ns: np.ndarray, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The free end and the knot (n, 3) each [m, world] at times (n,) of a body with poses (n, 7); NaN while no string
-    is tied. At the time of a change it is the string before it, but for one that is tied from time 0 on.
+def string_shapes(record: FlightRecord, times_ns: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Shapes (n, 9) at times (n,) of a body with poses (n, 7); NaN while no string is tied. At the time of a change it
+    is the string before it, but for one that is tied from time 0 on.
     """
-    free, knots = np.full((len(times_ns), 3), np.nan), np.full((len(times_ns), 3), np.nan)
-    begins = np.searchsorted(times_ns, [t if t > 0 else -1 for t, _ in strings], side="right").tolist()
-    for begin, end, (_, string) in zip(begins, [*begins[1:], len(times_ns)], strings, strict=False):
+    shapes = np.full((len(times_ns), 9), np.nan)
+    gravity = _in_force(times_ns, [(drawn.time_ns, drawn.body.gravity) for drawn in record.bodies])
+    for begin, end, string in _spells(times_ns, record.strings):
         if string is None or end <= begin:
             continue
-        times, own = times_ns[begin:end], poses[begin:end]
-        free[begin:end] = string.free_end(times)
-        knots[begin:end] = own[:, :3] + matrix_from_quaternion(own[:, 3:]) @ string.attach
-    return free, knots
+        own = poses[begin:end]
+        free = string.free_end(times_ns[begin:end])
+        span = own[:, :3] + matrix_from_quaternion(own[:, 3:]) @ string.attach - free
+        slack = 0.0 if string.bilateral else string.rest_length
+        shapes[begin:end] = np.hstack([free, span, sags(span, slack, gravity[begin:end])])
+    return shapes
 
 
-def slack_lengths(strings: Strings, times_ns: np.ndarray) -> np.ndarray:
-    """Lengths (n,) [m] that the string has at times (n,) where its ends are nearer than that; 0 of one that pushes,
-    too, and of none.
-    """
-    lengths = [0.0, *(0.0 if string is None or string.bilateral else string.rest_length for _, string in strings)]
-    begins = [t if t > 0 else -1 for t, _ in strings]
-    return np.array(lengths)[np.searchsorted(begins, times_ns, side="left")]
+def _spells(
+    times_ns: np.ndarray, strings: list[tuple[int, ShownString | None]]
+) -> list[tuple[int, int, ShownString | None]]:
+    begins = np.searchsorted(times_ns, [t if t > 0 else -1 for t, _ in strings], side="right").tolist()
+    return [(b, e, own) for b, e, (_, own) in zip(begins, [*begins[1:], len(times_ns)], strings, strict=False)]
 
 
-def string_points(strings: Strings, times_ns: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """The string's points (n, POINTS, 3) [m, world], from the free end to the knot, as ``string_ends`` has them."""
-    free, knots = string_ends(strings, times_ns, poses)
-    curves = np.full((len(times_ns), POINTS, 3), np.nan)
-    tied = ~np.isnan(free[:, 0])
-    curves[tied] = string_curves(free[tied], knots[tied], slack_lengths(strings, times_ns)[tied])
-    return curves
+def _in_force(times_ns: np.ndarray, values: list[tuple[int, np.ndarray]]) -> np.ndarray:
+    """The value (n, 3) at each time; at that of a change the one before it."""
+    begins = np.array([t for t, _ in values[1:]], dtype=np.int64)
+    return np.array([value for _, value in values])[np.searchsorted(begins, times_ns, side="left")]
 
 
-def string_breaks(strings: Strings) -> list[int]:
+def string_points(shapes: np.ndarray) -> np.ndarray:
+    """The string's points (n, POINTS, 3) [m, world], from the free end to the knot."""
+    return curve_points(shapes[:, PLACE], shapes[:, SPAN], shapes[:, SAG])
+
+
+def string_breaks(record: FlightRecord) -> list[int]:
     """Times [ns] at which the free end begins to move or stops."""
-    return [t for _, string in strings if string is not None for t in (string.begin_ns, string.end_ns)]
+    return [t for _, string in record.strings if string is not None for t in (string.begin_ns, string.end_ns)]
 
 
-def between_ends(
-    ends: tuple[np.ndarray, np.ndarray], where: np.ndarray, u: np.ndarray, found: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """How far (m,) [m] the ends ``found`` lie from what is shown at the shares u (m, 1) between the times number
-    ``where`` and the next: of a straight line's two points, and of a stick that turns and stretches evenly. NaN where
-    there is no string.
+def string_changes(record: FlightRecord) -> list[int]:
+    """Times [ns] at which the drawn string may jump: another one, or another gravity."""
+    bodies = [(drawn.time_ns, drawn.body.gravity) for drawn in record.bodies]
+    pulled = [t for (_, old), (t, new) in zip(bodies, bodies[1:], strict=False) if not np.array_equal(old, new)]
+    return [t for t, _ in record.strings if t > 0] + pulled
+
+
+def shapes_apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """How far (n,) [m] two shapes (n, 9) lie apart at their ends or in the middle, whichever is most; NaN where there
+    is no string.
     """
-    free, knots = ends
-    mid = (1.0 - u) * free[where] + u * free[where + 1]
-    straight = (1.0 - u) * knots[where] + u * knots[where + 1]
-    lengths, ways = _lengths_and_ways(free, knots)
-    stick = mid + ((1.0 - u) * lengths[where] + u * lengths[where + 1]) * slerp(ways[where], ways[where + 1], u)
-    apart = [np.linalg.norm(seen - found[k], axis=1) for k, seen in ((0, mid), (1, straight), (1, stick))]
-    return np.max(apart, axis=0)
-
-
-def _lengths_and_ways(free: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    lengths = np.linalg.norm(knots - free, axis=1, keepdims=True)
-    return lengths, (knots - free) / np.maximum(lengths, np.finfo(float).tiny)
+    d = a - b
+    parts = d[:, PLACE], d[:, PLACE] + d[:, SPAN], d[:, PLACE] + 0.5 * d[:, SPAN] + d[:, SAG]
+    return np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0)
 
 
 @dataclass(frozen=True)
 class StringKeys:
-    """Of a stick along z: its lower end [m, world], its attitude xyzw, and its stretch along z, 0 without a string."""
+    """Of the string: its free end [m, world], its span and sag (k, 6) [m], and whether it is shown: (k, 3) of 1 or 0,
+    each until the next.
+    """
 
     places: Keys
-    attitudes: Keys
-    scales: Keys
+    forms: Keys
+    shown: Keys
 
-    def played(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Both ends (n, 3) that a player shows at these times (n,)."""
-        x, y, z, w = self.attitudes.played(times).T
-        way = np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
-        free = self.places.played(times)
-        return free, free + self.scales.played(times)[:, 2:] * way
+    def played(self, times: np.ndarray) -> np.ndarray:
+        """Shapes (n, 9) that a player shows at these times (n,)."""
+        return np.hstack([self.places.played(times), self.forms.played(times)])
 
 
-def string_keys(
-    seconds: np.ndarray, free: np.ndarray, knots: np.ndarray, tolerance: float | None = None
-) -> StringKeys | None:
-    """The stick at times (n,) [s, single precision] of its ends (n, 3): as few as keep it within the tolerance [m], or
-    all without one; None where a string is never tied.
+def string_keys(seconds: np.ndarray, shapes: np.ndarray, tolerance: float | None = None) -> StringKeys | None:
+    """Keys at times (n,) [s, single precision] of shapes (n, 9): as few as keep it within the tolerance [m], or all
+    without one; None where a string is never tied.
     """
-    tied = ~np.isnan(free[:, 0])
+    tied = ~np.isnan(shapes[:, 0])
     if not tied.any():
         return None
     times = seconds.copy()
-    # Two looks at one single-precision time stand on both sides of a change.
-    before = np.flatnonzero(times[1:] == times[:-1])
+    # Of looks at one single-precision time the first is before a change, the last after it.
+    alike = times[1:] == times[:-1]
+    before = np.flatnonzero(np.append(alike, False) & ~np.append(False, alike))
     times[before] = np.nextafter(times[before].astype(np.float32), np.float32(-1.0))
-    at = np.flatnonzero(np.append(times[1:] > times[:-1], True) & np.append(True, times[1:] > times[:-1]))
+    at = np.flatnonzero(np.append(times[1:] > times[:-1], True))
     times, tied = times[at], tied[at]
     known = np.flatnonzero(tied)
-    # Without a string the stick stays where it was, of no length.
-    nearest = at[known[np.clip(np.searchsorted(known, np.arange(len(at)), side="right") - 1, 0, None)]]
-    lengths, ways = _lengths_and_ways(free[nearest], knots[nearest])
-    shown = tied[:, np.newaxis].astype(float)
-    scales = np.hstack([shown, shown, lengths * shown])
-    attitudes = _attitudes(ways)
-    places = free[nearest]
-    chosen = [np.arange(len(times))] * 3
+    # Without a string it stays as it was, unseen.
+    values = shapes[at[known[np.clip(np.searchsorted(known, np.arange(len(at)), side="right") - 1, 0, None)]]]
+    places, forms = values[:, PLACE], values[:, 3:]
+    chosen = [np.arange(len(times))] * 2
     if tolerance is not None:
-        changed = np.isin(at[1:], before + 1) | (tied[1:] != tied[:-1])
+        changed = np.isin(at[:-1], before) | (tied[1:] != tied[:-1])
         runs = np.split(np.arange(len(times)), np.flatnonzero(changed) + 1)
-        own = SHARE * tolerance
-        of = ((places, own), (attitudes, own / max(float(lengths.max()), own)), (scales, own))
         chosen = [
-            np.concatenate([run[fewest_keys(times[run], values[run], within)] for run in runs]) for values, within in of
+            np.concatenate([run[fewest_keys(times[run], own[run], SHARE * tolerance)] for run in runs])
+            for own in (places, forms)
         ]
-    scale_times, scales = _with_ends(times[chosen[2]], scales[chosen[2]], tied[chosen[2]])
     return StringKeys(
         Keys(times[chosen[0]], rounded(places[chosen[0]])),
-        Keys(times[chosen[1]], rounded(attitudes[chosen[1]])),
-        Keys(scale_times, rounded(scales)),
+        Keys(times[chosen[1]], rounded(forms[chosen[1]])),
+        _shown(times, tied),
     )
 
 
-def _with_ends(times: np.ndarray, scales: np.ndarray, tied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Scales with a last zero right before a string is tied, and a first one right after it is let go."""
-    extra_times, extra = [], []
+def _shown(times: np.ndarray, tied: np.ndarray) -> Keys:
+    """From the first time at which a string is known on, until right after the last."""
+    begins, seen = [float(times[0])], [float(tied[0])]
     for k in (np.flatnonzero(tied[1:] != tied[:-1]) + 1).tolist():
-        # From one single-precision number to the next, on the side that has no string.
-        known, side = (k, -1.0) if tied[k] else (k - 1, np.inf)
-        t = float(np.nextafter(np.float32(times[known]), np.float32(side)))
-        if times[k - 1] < t < times[k]:
-            extra_times.append(t)
-            extra.append(np.zeros(3))
-    if not extra:
-        return times, scales
-    all_times = np.concatenate([times, extra_times])
-    order = np.argsort(all_times)
-    return all_times[order], np.vstack([scales, extra])[order]
-
-
-def _attitudes(ways: np.ndarray) -> np.ndarray:
-    """Attitudes (n, 4) xyzw that take z to these directions (n, 3), each turned from the one before the short way."""
-    attitudes = np.empty((len(ways), 4))
-    attitude, before = (0.0, 0.0, 0.0, 1.0), np.array([0.0, 0.0, 1.0])
-    for k, way in enumerate(ways):
-        if way.any():
-            attitude = multiply(*_short_turn(before, way), *attitude)
-            before = way
-        attitudes[k] = attitude
-        attitudes[k] /= np.linalg.norm(attitudes[k])
-    return attitudes
-
-
-def _short_turn(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float, float]:
-    """The attitude that turns the unit vector a to b about the axis square to both; any such one for opposite ones."""
-    half = a + b
-    if (length := float(np.linalg.norm(half))) < 1e-9:
-        side = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])
-        x, y, z = side / np.linalg.norm(side)
-        return x, y, z, 0.0
-    x, y, z = np.cross(a, half / length)
-    return x, y, z, float(a @ half) / length
+        after = float(np.nextafter(np.float32(times[k - 1]), np.float32(np.inf)))
+        begins.append(float(times[k]) if tied[k] else min(after, float(times[k])))
+        seen.append(float(tied[k]))
+    return Keys(np.array(begins), np.repeat(np.array(seen)[:, np.newaxis], 3, axis=1))

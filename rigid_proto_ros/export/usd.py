@@ -21,7 +21,7 @@ from .animation import Animation
 from .flight_record import DrawnMesh, FlightRecord
 from .keys import PoseKeys
 from .sampling import Motion, Track, body_size, single
-from .string_line import slack_lengths, string_points
+from .string_line import SAG, StringKeys, string_points
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
@@ -71,7 +71,7 @@ def write_usd(
         _draw_meshes(stage, prim, (colour, opacity), record, motion, track, rate)
     changes = _add_physics(stage, record, motion, rate)
     if made.string is not None:
-        _draw_string(stage, record, motion, rate, STRING_WIDTH * size)
+        _draw_string(stage, made.string, rate, STRING_WIDTH * size)
     if trail and len(keys[0].places.times) > 1:
         _draw_trail(stage, keys[0].places.values, TRAIL_WIDTH * size)
     with whole_file("--usd", file) as path:
@@ -225,27 +225,22 @@ def _add_mass(mass: Any, steps: list[tuple[float, BodySnapshot]], rate: float) -
         before = values
 
 
-def _draw_string(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: float, width: float) -> None:
+def _draw_string(stage: Usd.Stage, string: StringKeys, rate: float, width: float) -> None:
     from pxr import Vt
 
-    shown = string_points(record.strings, motion.times_ns, motion.body.poses)
-    tied = ~np.isnan(shown[:, 0, 0])
+    times = np.union1d(string.places.times, string.forms.times)
+    shapes = string.played(times)
+    shown = string_points(shapes)
     # Every sample needs as many points.
-    if not slack_lengths(record.strings, motion.times_ns).any():
+    if not shapes[:, SAG].any():
         shown = shown[:, [0, -1]]
     curve = _line(stage, "/flight/string", shown.shape[1], STRING_COLOUR, width)
+    for seconds, seen in zip(string.shown.times.tolist(), string.shown.values[:, 0].tolist(), strict=True):
+        _show(curve, bool(seen), seconds * rate)
     points, extent = curve.CreatePointsAttr(), curve.CreateExtentAttr()
-    was_tied: bool | None = None
-    # Of looks at equal times, on both sides of a change, the last counts.
-    for k in np.flatnonzero(np.append(np.diff(motion.seconds) > 0.0, True)):
-        code = float(motion.seconds[k]) * rate
-        if bool(tied[k]) != was_tied:
-            was_tied = bool(tied[k])
-            _show(curve, was_tied, code)
-        if tied[k]:
-            now = shown[k].astype(np.float32)
-            points.Set(Vt.Vec3fArray.FromNumpy(now), code)
-            extent.Set(Vt.Vec3fArray.FromNumpy(_extent(now, width)), code)
+    for seconds, now in zip(times.tolist(), shown.astype(np.float32), strict=True):
+        points.Set(Vt.Vec3fArray.FromNumpy(now), seconds * rate)
+        extent.Set(Vt.Vec3fArray.FromNumpy(_extent(now, width)), seconds * rate)
 
 
 def _draw_trail(stage: Usd.Stage, places: np.ndarray, width: float) -> None:

@@ -33,6 +33,8 @@ class StringPicture:
         self._ranges = ranges
         self.size = 1.0
         """[m] Of the body, through which the string's line is drawn on."""
+        self.gravity = np.zeros(3)
+        """[m/s², world], along which a slack string hangs."""
         self._string: ShownString | None = None
         self._ticks = Ticks(RATE)
         self._shown = False
@@ -95,7 +97,7 @@ class StringPicture:
         self._lines.append(np.stack([knots, knots + LINE_SIZES * self.size * along], axis=1)[tension > 0.0])
         away = rows[:, 0:3] - free_end
         self._distances.append(np.linalg.norm(np.cross(along, away), axis=1))
-        self._strips.extend(_drawn(string, free_end, knots))
+        self._strips.extend(_drawn(string, free_end, knots, self.gravity))
         self._shown = True
 
     def send(self, send: Send) -> None:
@@ -145,9 +147,9 @@ def _tension(string: ShownString, span: np.ndarray, distance: np.ndarray, veloci
     return np.where(distance < NO_DIRECTION * string.rest_length, 0.0, tension)
 
 
-def _drawn(string: ShownString, free_end: np.ndarray, knots: np.ndarray) -> list[np.ndarray]:
-    """Per state the string as points: its two ends, or as long a curve as it is, hanging down."""
+def _drawn(string: ShownString, free_end: np.ndarray, knots: np.ndarray, gravity: np.ndarray) -> list[np.ndarray]:
+    """Per state the string as points: its two ends, or as long a curve as it is, hanging along gravity."""
     length = 0.0 if string.bilateral else string.rest_length
     slack = np.linalg.norm(knots - free_end, axis=1) < length
-    curves = iter(string_curves(free_end[slack], knots[slack], length))
+    curves = iter(string_curves(free_end[slack], knots[slack], length, gravity))
     return [next(curves) if slack[k] else np.array([free_end[k], knots[k]]) for k in range(len(slack))]

@@ -290,7 +290,7 @@ class SceneWriter:
         self._size = self._scene.size(self._body) if self._scene is not None else 1.0
         self._tip = self._scene.farthest_point(self._body) if self._scene is not None else None
         self._loads.scale = ArrowScale.of(self._body.mass, self._size)
-        self._string.size = self._size
+        self._string.size, self._string.gravity = self._size, self._body.gravity
         self._fit_view()
 
     def _fit_view(self) -> None:

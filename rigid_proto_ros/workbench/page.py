@@ -292,7 +292,8 @@ class Page:
             view.place_surroundings(bool(np.any(setup.gravity)))
             view.body.look_again(now_s)
             view.draw_trails(now_s, state.time_ns, scenario)
-            view.show_string(None if looking else acting.string_ends(setup, state), acting.slack_length)
+            ends = None if looking else acting.string_ends(setup, state)
+            view.show_string(ends, acting.slack_length, setup.gravity)
             view.show_loads([] if looking else acting.arrows(setup, state, 2.0 * view.radius))
             view.show_hit(None if looking else acting.hit(setup, state))
             momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity

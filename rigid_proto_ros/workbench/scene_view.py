@@ -163,14 +163,14 @@ class SceneView:
         setup = scenario.setup
         self.trails.draw(now_s, until_ns, setup.body, setup.surface, self.origin, self.unit)
 
-    def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None, slack_length: float) -> None:
-        """From the knot to the hand, both in the world; None for no string. slack_length [m]: as ``string_curves`` has
-        it.
+    def show_string(self, ends: tuple[np.ndarray, np.ndarray] | None, slack_length: float, gravity: np.ndarray) -> None:
+        """From the knot to the hand, both in the world; None for no string. slack_length [m] and gravity (3,): as
+        ``string_curves`` has them.
         """
         shown = ends is not None and self.switches.shown("String")
         if ends is not None and shown:
             knot, hand = ends
-            curve = self._drawn(string_curves(hand[np.newaxis], knot[np.newaxis], slack_length)[0])
+            curve = self._drawn(string_curves(hand[np.newaxis], knot[np.newaxis], slack_length, gravity)[0])
             self._string.points = np.stack([curve[:-1], curve[1:]], axis=1)
             self.hand.position = curve[0]
         set_visible(self._string, shown)

@@ -33,7 +33,8 @@ class Player:
         for animation in self.document["animations"]:
             for channel in animation["channels"]:
                 sampler = animation["samplers"][channel["sampler"]]
-                keys = self.read(sampler["input"])[:, 0], self.read(sampler["output"]), sampler["interpolation"]
+                times, values = self.read(sampler["input"])[:, 0], self.read(sampler["output"])
+                keys = times, values.reshape(len(times), -1), sampler["interpolation"]
                 self._channels[channel["target"]["node"], channel["target"]["path"]] = keys
 
     def read(self, number: int) -> np.ndarray:
@@ -73,9 +74,18 @@ class Player:
             node = self._parents.get(node)
         return points
 
-    def mesh_points(self, name: str) -> np.ndarray:
+    def mesh_points(self, name: str, seconds: float | None = None) -> np.ndarray:
+        """The mesh's own points; at a time with what its morph targets add then."""
         mesh = self.document["meshes"][self.document["nodes"][self.nodes[name]]["mesh"]]
-        return self.read(mesh["primitives"][0]["attributes"]["POSITION"])
+        primitive = mesh["primitives"][0]
+        points = self.read(primitive["attributes"]["POSITION"])
+        if seconds is not None and "targets" in primitive:
+            weights = self.value(self.nodes[name], "weights", seconds)
+            points = points + sum(
+                weight * self.read(target["POSITION"])
+                for weight, target in zip(weights, primitive["targets"], strict=True)
+            )
+        return points
 
 
 def z_up(points: np.ndarray) -> np.ndarray:

@@ -17,7 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gltf_player import z_up
 from test_gltf import CHANGES, THROWN
+from test_string_line import ALLOWED, TIMES, curves_of, fly_on_string
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.interpolation import attitude_angles
@@ -47,6 +49,18 @@ window.play = async (url, names, times) => {
     for (const name of names) { gltf.scene.getObjectByName(name).matrixWorld.decompose(p, q, s); poses[name].push([...p, ...q]); }
   }
   return poses;
+};
+window.points = async (url, name, times) => {
+  const gltf = await new GLTFLoader().loadAsync(url), mixer = new THREE.AnimationMixer(gltf.scene), seen = [];
+  for (const clip of gltf.animations) { const a = mixer.clipAction(clip); a.setLoop(THREE.LoopOnce); a.clampWhenFinished = true; a.play(); }
+  const mesh = gltf.scene.getObjectByName(name), count = mesh.geometry.attributes.position.count, p = new THREE.Vector3();
+  for (const t of times) {
+    mixer.setTime(t); gltf.scene.updateMatrixWorld(true);
+    const points = [];
+    for (let k = 0; k < count; k++) { mesh.getVertexPosition(k, p); p.applyMatrix4(mesh.matrixWorld); points.push([...p]); }
+    seen.push(points);
+  }
+  return seen;
 };
 window.ready = true;
 </script>"""
@@ -105,6 +119,12 @@ def test_khronos_validator_accepts_every_kind_of_scene(modules, scene, tmp_path)
     assert (found["numErrors"], found["numWarnings"]) == (0, 0), found
 
 
+def test_khronos_validator_accepts_a_string_that_hangs_through(modules, tmp_path):
+    (file, _), _ = fly_on_string(tmp_path)
+    found = issues(modules, file)
+    assert (found["numErrors"], found["numWarnings"]) == (0, 0), found
+
+
 class Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_):
         pass
@@ -145,3 +165,16 @@ def test_three_js_shows_the_body_where_the_session_has_it_at_a_thousand_times(mo
     x, y, z, w = rows[:, 3:7].T
     turned = half * np.column_stack([x - w, y + z, z - y, w + x])
     assert attitude_angles(played[:, 3:], turned).max() < np.radians(0.1)
+
+
+def test_three_js_shows_the_string_as_it_hangs(modules, page, tmp_path):
+    (file, _), script = fly_on_string(tmp_path)
+    shutil.copy(file, modules / "string.glb")
+    played = page.evaluate("([u, n, t]) => window.points(u, n, t)", ["/string.glb", "string", TIMES.tolist()])
+    for points, curve in zip(played, curves_of(script), strict=True):
+        seen = np.array(points)
+        if curve is None:
+            assert np.ptp(seen, axis=0).max() == 0.0
+        else:
+            middles = z_up(seen.reshape(len(curve), -1, 3).mean(axis=1))
+            assert np.linalg.norm(middles - curve, axis=1).max() < ALLOWED

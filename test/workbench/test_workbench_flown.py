@@ -48,7 +48,7 @@ def test_a_drag_draws_the_string_from_the_grabbed_point_and_shows_the_energy_tha
     assert not flown.said
     apart = float(np.linalg.norm(hand - knot))
     for length in (0.0, 3.0 * apart):
-        flown.do(lambda length=length: page.view.show_string((knot, hand), length))
+        flown.do(lambda length=length: page.view.show_string((knot, hand), length, np.array([0.0, 0.0, -9.81])))
         pieces = np.asarray(page.view._string.points) * page.view.unit
         drawn = float(np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum())
         assert drawn == pytest.approx(length or apart, rel=5e-3)
