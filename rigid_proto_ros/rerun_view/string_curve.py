@@ -33,10 +33,9 @@ def arc_lengths(along: np.ndarray, across: np.ndarray, depths: np.ndarray) -> np
     flat = depths <= NEARLY_STRAIGHT * spans
     own = np.where(flat, 1.0, depths)
     closed = (integral(along + 4.0 * own) - integral(along - 4.0 * own)) / (8.0 * own)
-    spans = np.where(spans > 0.0, spans, 1.0)
-    return np.where(
-        flat, np.hypot(along, across) * (1.0 + 8.0 / 3.0 * ((depths / spans) * (across / spans)) ** 2), closed
-    )
+    spans = np.where(flat & (spans > 0.0), spans, np.inf)
+    series = np.hypot(along, across) * (1.0 + 8.0 / 3.0 * ((depths / spans) * (across / spans)) ** 2)
+    return np.where(flat, series, closed)
 
 
 def sags(spans: np.ndarray, lengths: np.ndarray | float, gravity: np.ndarray) -> np.ndarray:
