@@ -19,7 +19,7 @@ from numba.extending import models, overload, register_model
 
 from .compilation import INTERPRETED, intrinsic
 
-_DOUBLE, _NUMBER = ir.DoubleType(), ir.IntType(32)
+_DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 _LINE = 64
 """Bytes."""
 Packed = Any
@@ -124,6 +124,44 @@ def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
         return _shuffled(builder, first, second, list(range(4 * n)))
 
     return Doubles(4 * a.count)(a, b, c, d), code
+
+
+@_operation_on_vectors(lambda a, b: np.concatenate([a, b]))
+def paired(_typing_context: Any, a: Any, b: Any) -> tuple:
+    """The vector of a's numbers, then b's, of which there are as many."""
+
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
+        return _shuffled(builder, *arguments, list(range(2 * a.count)))
+
+    return Doubles(2 * a.count)(a, b), code
+
+
+@_operation_on_vectors(lambda vector, number: vector.reshape(2, -1)[number], prefer_literal=True)
+def half(_typing_context: Any, vector: Any, number: Any) -> tuple:
+    """The first or second half of a vector."""
+    each = vector.count // 2
+    chosen = [number.literal_value * each + k for k in range(each)]
+
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
+        return _shuffled(builder, arguments[0], arguments[0], chosen)
+
+    return Doubles(each)(vector, number), code
+
+
+@_operation_on_vectors(lambda vector: float(np.max(np.abs(vector))))
+def largest(_typing_context: Any, vector: Any) -> tuple:
+    """The largest absolute value; what is no number is larger than all."""
+
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
+        # The bits of positive doubles are in the order of their values.
+        bits = ir.VectorType(_BITS, vector.count)
+        unsigned = builder.and_(builder.bitcast(arguments[0], bits), ir.Constant(bits, [(1 << 63) - 1] * vector.count))
+        name, kind = f"llvm.vector.reduce.smax.v{vector.count}i64", ir.FunctionType(_BITS, [bits])
+        return builder.bitcast(
+            builder.call(builder.module.declare_intrinsic(name, (), kind), [unsigned]), _DOUBLE
+        )
+
+    return types.float64(vector), code
 
 
 @_operation_on_vectors(

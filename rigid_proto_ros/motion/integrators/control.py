@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.compilation import njit
+from ..variables import STORED
 from .error_measure import FLOOR
 
 ACCURACY = 0  # local error rate asked for [1/s]
@@ -44,6 +45,13 @@ def new_control(accuracy: float, degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
+def copy_variables(of: np.ndarray, to: np.ndarray) -> None:
+    """Number by number: numba would look first whether the two share memory."""
+    for k in range(STORED):
+        to[k] = of[k]
+
+
+@njit(cache=True, error_model="numpy")
 def accept(control: np.ndarray, length_ns: int) -> None:
     """Let a step of this length wait for its commitment, its allowance no less than the floor."""
     control[ACCEPTED_NS] = length_ns
@@ -59,11 +67,17 @@ def commit(control: np.ndarray, y: np.ndarray, following: np.ndarray, room_ns: i
     length = int(control[ACCEPTED_NS])
     if length > room_ns:
         return 0
-    y[:] = following
+    copy_variables(following, y)
+    count(control)
+    return length
+
+
+@njit(cache=True, error_model="numpy")
+def count(control: np.ndarray) -> None:
+    """The step that waits is committed."""
     control[ELAPSED_NS] += control[ACCEPTED_NS]
     control[EVALUATIONS] += control[PENDING]
     control[STEPS] += 1.0
     control[ACCEPTED_NS] = 0.0
     control[PENDING] = 0.0
     control[SERIES] = 0.0
-    return length

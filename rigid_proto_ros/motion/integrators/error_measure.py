@@ -33,12 +33,21 @@ WEIGHINGS = 4
 FLOOR = 32.0 * 2.0**-52
 
 
+_Three = tuple[float, float, float]
+
+
 @njit(cache=True, error_model="numpy")
 def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
     """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into
     the segment.
     """
-    spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
+    return scales_of((y[4], y[5], y[6]), (y[10], y[11], y[12]), p, elapsed)
+
+
+@njit(cache=True, error_model="numpy")
+def scales_of(w: _Three, u: _Three, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
+    """The same at ω = w and the added velocity u."""
+    spin = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     if p[TRANSLATES] == 0.0:
         return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
     c = p[REFERENCE_DAMPING]
@@ -46,7 +55,7 @@ def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, 
     speed = 0.0
     for k in range(3):
         v = p[REFERENCE_VELOCITY + k]
-        v += push * (p[REFERENCE_ACCELERATION + k] - c * v) + y[10 + k]
+        v += push * (p[REFERENCE_ACCELERATION + k] - c * v) + u[k]
         speed += v * v
     length = p[LENGTH]
     return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)

@@ -16,9 +16,9 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.simd import aligned
+from ...base.simd import aligned, filled, joined
 from ..problem import HAS_STRING, STIFFNESS
-from ..variables import ATTITUDE, DISPLACEMENT, HEAT, SPIN, STORED, VELOCITY
+from ..variables import ATTITUDE, HEAT, STORED
 from . import control as ctl
 from .error_measure import (
     WEIGHINGS,
@@ -29,7 +29,6 @@ from .error_measure import (
 from .first_root import NONE
 from .motion_series import A_KNOT, COLUMNS, motion_at, motion_series, stretch_at
 from .passage import before_passage, may_pass, pass_by
-from .rough_logarithm import rough_log2
 from .runge_kutta import is_good
 from .string_law import PASSES, PULLS, SHORTENS, is_one_sided, knot_at, law_of, next_law
 from .taylor_adaptive import MAX_DEGREE, PART, length_for, log2_growth
@@ -69,8 +68,14 @@ def allowed_length(
     c: np.ndarray, degree: int, weights: tuple[float, float, float, float], accuracy: float, part: float
 ) -> float:
     """h [s] after which a series of the motion errs by this part of the accuracy times h."""
-    growth = log2_growth(c, degree, weights, ATTITUDE, SPIN, DISPLACEMENT, VELOCITY)
-    return length_for(growth, accuracy, degree, part)
+    attitude, spin, place, speed = weights
+    of_row = joined(
+        filled(attitude, 4),
+        joined(filled(spin, 1), filled(spin, 1), filled(spin, 1), filled(place, 1)),
+        joined(filled(place, 1), filled(place, 1), filled(speed, 1), filled(speed, 1)),
+        joined(filled(speed, 1), filled(0.0, 1), filled(0.0, 1), filled(0.0, 1)),
+    )
+    return length_for(log2_growth(c, ATTITUDE, COLUMNS, degree, of_row), accuracy, degree, part)
 
 
 @njit(cache=True, error_model="numpy")
@@ -78,12 +83,8 @@ def known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part
     """h [s] after which the series of the knot's place errs as much. It turns with the body, and attitude by half the
     angle: of the degree N its remainder is up to 2ᴺ times that of the attitude's series.
     """
-    growth = -math.inf
-    for k in range(degree - 2, degree + 1):
-        a = place * (abs(c[k, A_KNOT]) + abs(c[k, A_KNOT + 1]) + abs(c[k, A_KNOT + 2]))
-        if a > 0.0:
-            growth = max(growth, rough_log2(a) / k)
-    return length_for(growth, accuracy, degree, part)
+    of_row = joined(filled(place, 1), filled(place, 1), filled(place, 1), filled(0.0, 1))
+    return length_for(log2_growth(c, A_KNOT, COLUMNS, degree, of_row), accuracy, degree, part)
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,7 +134,7 @@ def _lay_out(
             # One switch a step: each multiplies what the step has erred before it.
             return before_ns
         if parts == 1:
-            last[:STORED] = y
+            ctl.copy_variables(y, last)
             control[ctl.SWITCH] = switch
         _move(series, p, degree, switch, law, last)
         start, series = last, c[degree + 2 : 2 * (degree + 2)]
@@ -152,7 +153,7 @@ def _reach(p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out:
     if t <= control[ctl.SWITCH]:
         _move(c, p, degree, t, control[ctl.LAW], out)
     else:
-        out[:] = c[2 * (degree + 2)][:STORED]
+        ctl.copy_variables(c[2 * (degree + 2)], out)
         _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control[ctl.LAST_START], control[ctl.LAST_LAW], out)
 
 
@@ -178,7 +179,7 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
         length = _lay_out(y, p, control, weights, c)
         if length < 1:
             return False
-        following[:] = y
+        ctl.copy_variables(y, following)
         _reach(p, control, c, length, following)
         good = is_good(following)
         # The errors of velocities are measured by those at the end: where they fall within the step, that counts.

@@ -9,20 +9,12 @@ held body-axes wrench; beyond it the series diverges.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.simd import (
-    Packed,
-    arranged,
-    component,
-    filled,
-    joined,
-    load,
-    root,
-    store,
-    width,
-)
+from ...base.simd import Packed, arranged, component, filled, half, joined, largest, load, number, paired, store
 from ..problem import (
     ACCELERATION_ADDED,
     ACCELERATION_BODY,
@@ -33,37 +25,39 @@ from ..problem import (
     TORQUE_BODY,
     TRANSLATES,
 )
-from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
-from .runge_kutta import is_good
+from .error_measure import scales_of
+from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, MAX_SPEED, Integrator
 from .stepping import fixed_steps
 
 DEGREE = 18
 
-# Where the parts of a coefficient stand in its row, four components each, of which the fourth counts for q alone: ω,
-# then q times the unit vectors and q itself, so that one vector holds what a product takes of a row.
-_YZX, _QX, _Q = 0, 4, 16
-_W, _D, _U = 20, 24, 28
-# The other factors: ω in another order and each of its components four times, and those of g_b ⊗ q* with the real part
-# negated.
-_ZXY, _G = 32, 48
-COLUMNS = 64
+# Where the parts of a coefficient stand in its row, four numbers each, of which the fourth counts for q alone. Two of
+# them fill a line of the processor's cache: q times the unit vectors, and ω in another order; the variables; what those are
+# multiplied by, each component of ω four times and ω in a third order; q z and q once more; and likewise g_b ⊗ q*, its
+# real part negated.
+_QX, _QZ, _Q, _W, _D, _U = 0, 8, 16, 20, 24, 28
+_WX, _WZ, _QZ_Q, _GX, _GZ = 32, 40, 48, 56, 64
+COLUMNS = 72
+
+VARIABLES_AT = _Q
+"""Where q, ω, d and u begin, one behind the other."""
 
 
 @njit(cache=True, error_model="numpy")
-def _four(x: Packed) -> Packed:
-    return joined(x, x, x, x)
+def _four(x: float) -> Packed:
+    """Four times the number x."""
+    return filled(x, 4)
 
 
 @njit(cache=True, error_model="numpy")
-def _triple(array: np.ndarray, at: int, last: Packed) -> Packed:
-    """Three numbers of an array and ``last``; where flights go side by side each number has one for every flight."""
-    n = width(last)
-    return joined(load(array, at * n, last), load(array, (at + 1) * n, last), load(array, (at + 2) * n, last), last)
+def _triple(array: np.ndarray, at: int, last: float) -> Packed:
+    """Three numbers of an array and ``last``."""
+    return joined(filled(array[at], 1), filled(array[at + 1], 1), filled(array[at + 2], 1), filled(last, 1))
 
 
 @njit(cache=True, error_model="numpy")
 def _spread(v: Packed) -> tuple[Packed, Packed, Packed]:
-    return _four(component(v, 0)), _four(component(v, 1)), _four(component(v, 2))
+    return arranged(v, (0, 0, 0, 0)), arranged(v, (1, 1, 1, 1)), arranged(v, (2, 2, 2, 2))
 
 
 @njit(cache=True, error_model="numpy")
@@ -73,139 +67,170 @@ def _axes(q: Packed) -> tuple[Packed, Packed, Packed]:
 
 
 @njit(cache=True, error_model="numpy")
-def series_beside(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray, translates: bool, zero: Packed) -> None:
-    """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u. zero: one number, or one for every flight
-    that goes beside others; then y (≥ 13, n), p (SIZE, n) and c (degree + 1, COLUMNS n) hold the flights' numbers next
-    to each other.
-    """
-    n, zeros = width(zero), _four(zero)
-    one, many = zero + 1.0, _four(_four(zero))
-    moments = _triple(p, MOMENTS, one)
+def variables_of(y: np.ndarray) -> Packed:
+    """q, ω, d and u, four numbers each. Kept so from step to step, nothing waits until it is written."""
+    return joined(load(y, 0, _four(0.0)), _triple(y, 4, 0.0), _triple(y, 7, 0.0), _triple(y, 10, 0.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _put_triple(array: np.ndarray, at: int, vector: Packed) -> None:
+    array[at], array[at + 1], array[at + 2] = number(vector, 0), number(vector, 1), number(vector, 2)
+
+
+@njit(cache=True, error_model="numpy")
+def put_variables(variables: Packed, y: np.ndarray) -> None:
+    """Put them into y (≥ 13,)."""
+    store(y, 0, component(variables, 0))
+    _put_triple(y, 4, component(variables, 1))
+    _put_triple(y, 7, component(variables, 2))
+    _put_triple(y, 10, component(variables, 3))
+
+
+@njit(cache=True, error_model="numpy")
+def scales_at(variables: Packed, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
+    """Weights of errors at the variables, ``elapsed`` seconds into the segment (integrators/error_measure.py)."""
+    w = number(variables, 4), number(variables, 5), number(variables, 6)
+    return scales_of(w, (number(variables, 12), number(variables, 13), number(variables, 14)), p, elapsed)
+
+
+@njit(cache=True, error_model="numpy")
+def series(variables: Packed, p: np.ndarray, degree: int, c: np.ndarray) -> None:
+    """Coefficients c (degree + 1, COLUMNS) of the motion from these variables: q, ω, d, u."""
+    translates = p[TRANSLATES] != 0.0
+    moments = _triple(p, MOMENTS, 1.0)
     gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) / moments
-    gyroscopic = _four(load(p, GYROSCOPIC * n, zero)) * gyroscopic
-    cw, cv = _four(load(p, DAMPING_ANGULAR * n, zero)) / moments, _four(load(p, DAMPING_LINEAR * n, zero))
-    b = ACCELERATION_BODY * n
-    bx, by, bz = _four(load(p, b, zero)), _four(load(p, b + n, zero)), _four(load(p, b + 2 * n, zero))
-    q, w = load(y, 0, zeros), _triple(y, 4, zero)
-    d, u = _triple(y, 7, zero), _triple(y, 10, zero)
-    length = COLUMNS * n
-    # Products with the first and the latest coefficient come last in every sum: what is older need not wait for them.
+    gyroscopic = gyroscopic * p[GYROSCOPIC]
+    cw, cv = p[DAMPING_ANGULAR] / moments, p[DAMPING_LINEAR]
+    bx, by, bz = _spread(_triple(p, ACCELERATION_BODY, 0.0))
+    zeros, eight = _four(0.0), filled(0.0, 8)
+    q, w, d, u = (component(variables, 0), component(variables, 1), component(variables, 2), component(variables, 3))
+    # What is constant counts in the first order alone.
+    turning, pushing = _triple(p, TORQUE_BODY, 0.0) / moments, _triple(p, ACCELERATION_ADDED, 0.0)
     q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
-    yzx0, zxy0 = arranged(w, (1, 2, 0, 3)), arranged(w, (2, 0, 1, 3))
-    for k in range(degree + 1):
-        row = k * length
-        store(c, row + _Q * n, q)
-        store(c, row + _W * n, w)
-        store(c, row + _D * n, d)
-        store(c, row + _U * n, u)
-        if k == degree:
-            break
+    yzx0, zxy0 = gyroscopic * arranged(w, (1, 2, 0, 3)), gyroscopic * arranged(w, (2, 0, 1, 3))
+    row = 0
+    for k in range(degree):
         qx, qy, qz = _axes(q)
         wx, wy, wz = _spread(w)
         yzx, zxy = arranged(w, (1, 2, 0, 3)), arranged(w, (2, 0, 1, 3))
-        g = bx * qx + by * qy + bz * qz
-        gx, gy, gz = _spread(g)
-        gw = _four(component(g, 3))
-        store(c, row + _YZX * n, joined(yzx, qx, qy, qz))
-        store(c, row + _ZXY * n, joined(zxy, wx, wy, wz))
-        store(c, row + _G * n, joined(gx, gy, gz, gw))
-        turn, push = many, many
-        # Rows i and j = k − i, by their first numbers: both of a pair at once, and the middle one where there is one.
-        i, j = length, row - length
-        for _ in range((k - 1) // 2):
-            one_way = load(c, i + _YZX * n, many) * load(c, j + _ZXY * n, many)
-            turn = turn + (one_way + load(c, j + _YZX * n, many) * load(c, i + _ZXY * n, many))
-            if translates:
-                push = push + load(c, i + _QX * n, many) * load(c, j + _G * n, many)
-            i += length
-            j -= length
-        # The vector part of a ⊗ (g ⊗ b*) is that of b ⊗ (g ⊗ a*): half of the sum counts twice, its middle once.
-        push = push + push
+        # Of rows i and j = k − i both products at once, from the middle outwards: the newest row comes last, and those
+        # with the first and the latest, which are still in registers, after that.
+        turn, rest, push, far = eight, eight, eight, eight
+        i, j = (k // 2) * COLUMNS, row - (k // 2) * COLUMNS
         if k % 2 == 0 and k > 0:
-            turn = turn + load(c, i + _YZX * n, many) * load(c, i + _ZXY * n, many)
+            turn = load(c, i + _QX, eight) * load(c, i + _WX, eight)
+            rest = load(c, i + _QZ, eight) * load(c, i + _WZ, eight)
             if translates:
-                push = push + load(c, i + _QX * n, many) * load(c, i + _G * n, many)
-        spin, turned = component(turn, 0), component(turn, 1) + component(turn, 2) + component(turn, 3)
-        spin, turned = spin + yzx * zxy0, turned + (wx0 * qx + wy0 * qy + wz0 * qz)
-        if k > 0:
-            spin, turned = spin + yzx0 * zxy, turned + (wx * qx0 + wy * qy0 + wz * qz0)
+                # Half of a sum that is symmetric counts twice, its middle once.
+                push = load(c, i + _QX, eight) * load(c, i + _GX, eight) * 0.5
+                far = load(c, i + _QZ_Q, eight) * load(c, i + _GZ, eight) * 0.5
+            i -= COLUMNS
+            j += COLUMNS
+        while i > 0:
+            x, z = load(c, i + _QX, eight), load(c, i + _QZ, eight)
+            turn = turn + (x * load(c, j + _WX, eight) + load(c, j + _QX, eight) * load(c, i + _WX, eight))
+            rest = rest + (z * load(c, j + _WZ, eight) + load(c, j + _QZ, eight) * load(c, i + _WZ, eight))
+            if translates:
+                push = push + x * load(c, j + _GX, eight)
+                far = far + load(c, i + _QZ_Q, eight) * load(c, j + _GZ, eight)
+            i -= COLUMNS
+            j += COLUMNS
+        store(c, row + _QX, paired(qx, qy))
+        store(c, row + _QZ, paired(qz, yzx))
+        store(c, row + _Q, paired(q, w))
+        store(c, row + _D, paired(d, u))
+        store(c, row + _WX, paired(wx, wy))
+        store(c, row + _WZ, paired(wz, zxy))
         f = 1.0 / (k + 1.0)
+        half_f = 0.5 * f
+        # What the next coefficient waits for, the products with the latest one, is multiplied and added once each.
+        before = (gyroscopic * half(rest, 1) - cw * w + turning) * f
+        turned = (half(turn, 0) + half(turn, 1) + half(rest, 0)) * half_f
+        if k > 0:
+            before = before + zxy * (yzx0 * f)
+            turned = turned + ((wx * (qx0 * half_f) + wy * (qy0 * half_f)) + wz * (qz0 * half_f))
+        next_w = before + yzx * (zxy0 * f)
+        next_q = turned + ((qx * (wx0 * half_f) + qy * (wy0 * half_f)) + qz * (wz0 * half_f))
+        turning = zeros
         if translates:
-            force = (component(push, 0) + component(push, 1)) + (component(push, 2) - component(push, 3))
-            ends = (gx * qx0 + gy * qy0) + (gz * qz0 - gw * q0)
-            force = force + (ends + ends if k > 0 else ends + _triple(p, ACCELERATION_ADDED, zero))
+            g = bx * qx + by * qy + bz * qz
+            gx, gy, gz = _spread(g)
+            gw = arranged(g, (3, 3, 3, 3))
+            store(c, row + _QZ_Q, paired(qz, q))
+            store(c, row + _GX, paired(gx, gy))
+            store(c, row + _GZ, paired(gz, arranged(gw, (4, 5, 6, 7))))
+            # The vector part of a ⊗ (g ⊗ b*) is that of b ⊗ (g ⊗ a*).
+            force = (half(push, 0) + half(push, 1)) + (half(far, 0) + half(far, 1))
+            last = (gx * qx0 + gy * qy0) + (gz * qz0 - gw * q0)
+            force = force + (last if k > 0 else last * 0.5)
             d = u * f
-            u = (force - cv * u) * f
-        rate = gyroscopic * spin - cw * w
-        if k == 0:
-            rate = rate + _triple(p, TORQUE_BODY, zero) / moments
-        w = rate * f
-        q = turned * (0.5 * f)
+            u = (force + force + pushing - cv * u) * f
+            pushing = zeros
+        else:
+            d, u = zeros, zeros
+        q, w = next_q, next_w
+        row += COLUMNS
+    store(c, row + _Q, paired(q, w))
+    store(c, row + _D, paired(d, u))
 
 
 @njit(cache=True, error_model="numpy")
-def series(y: np.ndarray, p: np.ndarray, degree: int, c: np.ndarray) -> None:
-    """Coefficients c (degree + 1, COLUMNS) of the motion from y: q, ω, d, u."""
-    series_beside(y, p, degree, c, p[TRANSLATES] != 0.0, filled(0.0, 1))
-
-
-@njit(cache=True, error_model="numpy")
-def _sum(c: np.ndarray, at: int, degree: int, length: int, h: Packed, zeros: Packed) -> Packed:
-    """Of the part that begins at the number ``at`` of each row, h seconds on: even and odd powers by themselves, each
-    from the smallest term (Horner), so that neither waits for the other.
+def _sum(c: np.ndarray, at: int, degree: int, h: float, like: Packed) -> Packed:
+    """Of the part that begins at the number ``at`` of each row, h seconds on: every fourth power by itself, each
+    from the smallest term (Horner), so that none waits for another; the largest term comes last.
     """
     square = h * h
-    even, odd = at + (degree - degree % 2) * length, at + (degree - 1 + degree % 2) * length
-    evens, odds = load(c, even, zeros), load(c, odd, zeros)
-    for _ in range((degree - 1) // 2):
-        even -= 2 * length
-        odd -= 2 * length
-        evens = evens * square + load(c, even, zeros)
-        odds = odds * square + load(c, odd, zeros)
-    if degree % 2 == 0:
-        evens = evens * square + load(c, at, zeros)
-    return evens + odds * h
+    fourth = square * square
+    at += (degree // 4) * 4 * COLUMNS
+    past = degree % 4
+    a, b, e, f = load(c, at, like), like, like, like
+    if past > 0:
+        b = load(c, at + COLUMNS, like)
+    if past > 1:
+        e = load(c, at + 2 * COLUMNS, like)
+    if past > 2:
+        f = load(c, at + 3 * COLUMNS, like)
+    for _ in range(degree // 4 - 1):
+        at -= 4 * COLUMNS
+        a = a * fourth + load(c, at, like)
+        b = b * fourth + load(c, at + COLUMNS, like)
+        e = e * fourth + load(c, at + 2 * COLUMNS, like)
+        f = f * fourth + load(c, at + 3 * COLUMNS, like)
+    at -= 4 * COLUMNS
+    b = b * fourth + load(c, at + COLUMNS, like)
+    e = e * fourth + load(c, at + 2 * COLUMNS, like)
+    f = f * fourth + load(c, at + 3 * COLUMNS, like)
+    return load(c, at, like) + ((a * fourth + e * square) + (b + f * square) * h)
 
 
 @njit(cache=True, error_model="numpy")
-def _put_triple(array: np.ndarray, at: int, vector: Packed, n: int) -> None:
-    store(array, at * n, component(vector, 0))
-    store(array, (at + 1) * n, component(vector, 1))
-    store(array, (at + 2) * n, component(vector, 2))
+def sum_series(c: np.ndarray, degree: int, h: float) -> Packed:
+    """The variables h seconds on, with a unit quaternion; degree: 4 or more."""
+    sums = _sum(c, _Q, degree, h, filled(0.0, 16))
+    q = component(sums, 0)
+    x, y, z, w = number(q, 0), number(q, 1), number(q, 2), number(q, 3)
+    q = q * (1.0 / math.sqrt((x * x + y * y) + (z * z + w * w)))
+    return joined(q, component(sums, 1), component(sums, 2), component(sums, 3))
 
 
 @njit(cache=True, error_model="numpy")
-def sum_beside(c: np.ndarray, translates: bool, degree: int, h: Packed, out: np.ndarray, zero: Packed) -> None:
-    """The variables out (≥ 13, n), h seconds on, with unit quaternions; h as ``zero`` one number or one
-    for every flight.
-    """
-    n, zeros, hs = width(zero), _four(zero), _four(h)
-    length = COLUMNS * n
-    q = _sum(c, _Q * n, degree, length, hs, zeros)
-    x, y, z, w = component(q, 0), component(q, 1), component(q, 2), component(q, 3)
-    store(out, 0, q * _four((zero + 1.0) / root(x * x + y * y + z * z + w * w)))
-    _put_triple(out, 4, _sum(c, _W * n, degree, length, hs, zeros), n)
-    if translates:
-        _put_triple(out, 7, _sum(c, _D * n, degree, length, hs, zeros), n)
-        _put_triple(out, 10, _sum(c, _U * n, degree, length, hs, zeros), n)
-
-
-@njit(cache=True, error_model="numpy")
-def sum_series(c: np.ndarray, p: np.ndarray, degree: int, h: float, out: np.ndarray) -> None:
-    """The variables h seconds on, with a unit quaternion."""
-    sum_beside(c, p[TRANSLATES] != 0.0, degree, filled(h, 1), out, filled(0.0, 1))
+def are_good(variables: Packed) -> bool:
+    """Finite and no runaway."""
+    return largest(variables) <= MAX_SPEED
 
 
 @njit(cache=True, error_model="numpy")
 def taylor_steps_of_degree(y: np.ndarray, p: np.ndarray, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
-    c, new = np.zeros((degree + 1, COLUMNS)), y.copy()
+    c, here = np.zeros((degree + 1, COLUMNS)), variables_of(y)
     for done in range(n):
-        series(y, p, degree, c)
-        sum_series(c, p, degree, h, new)
-        if not is_good(new):
-            return done
-        y[:] = new
+        series(here, p, degree, c)
+        there = sum_series(c, degree, h)
+        if not are_good(there):
+            n = done
+            break
+        here = there
+    put_variables(here, y)
     return n
 
 

@@ -14,12 +14,11 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.elementary import logarithm
-from ...base.simd import aligned
+from ...base.simd import Packed, aligned, filled, joined, largest, load
 from . import control as ctl
-from .error_measure import FLOOR, WEIGHINGS, heavier, scales
+from .error_measure import FLOOR, WEIGHINGS, heavier
 from .rough_logarithm import rough_exp2, rough_log2
-from .runge_kutta import is_good
-from .taylor import _D, _Q, _U, _W, COLUMNS, series, sum_series
+from .taylor import COLUMNS, VARIABLES_AT, are_good, put_variables, scales_at, series, sum_series, variables_of
 
 PART = 0.5
 """Of what is allowed, a remainder gets this part: the last coefficients are no bound on those to come. Measured over
@@ -27,8 +26,11 @@ random scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is a
 """
 
 
-# log₂ of 0.4, 0.6 and 0.9.
-_LOG2_START, _LOG2_REST, _LOG2_MOST = -1.3219280948873623, -0.7369655941662062, -0.15200309344504997
+# log₂(1 − 2ˣ) is concave: chords from σh = 0.18 to 0.6, and from there to 0.9, as constant − slope x.
+_REST, _SLOPE = -1.7613260844219780, 0.5962259201961054
+_REST_NEAR, _SLOPE_NEAR = -3.8416301040166890, 3.4190225827029095
+_LOG2_MOST = -0.15200309344504997
+"""log₂ of 0.9"""
 
 MAX_DEGREE = 26
 
@@ -42,34 +44,26 @@ def degree_for(accuracy: float) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def log2_growth(
-    c: np.ndarray, degree: int, weights: tuple[float, float, float, float], q: int, w: int, d: int, u: int
-) -> float:
-    """log₂ σ from the last three coefficients: of the largest k-th root of their measure. −∞ where all are zero.
-    q, w, d, u: where in a row of c attitude, spin, displacement and velocity begin.
+def log2_growth(c: np.ndarray, at: int, columns: int, degree: int, weights: Packed) -> float:
+    """log₂ σ from the last three coefficients: of the largest k-th root of a bound on their measure. at: where a row's
+    variables begin, of ``columns`` numbers; weights: of each of them.
     """
-    attitude, spin, place, speed = weights
-    growth = -math.inf
-    for k in range(degree - 2, degree + 1):
-        # Sums of absolute values bound the lengths, and no square of a large coefficient overflows.
-        a = attitude * (abs(c[k, q]) + abs(c[k, q + 1]) + abs(c[k, q + 2]) + abs(c[k, q + 3]))
-        a = max(a, spin * (abs(c[k, w]) + abs(c[k, w + 1]) + abs(c[k, w + 2])))
-        if place != 0.0:
-            a = max(a, place * (abs(c[k, d]) + abs(c[k, d + 1]) + abs(c[k, d + 2])))
-            a = max(a, speed * (abs(c[k, u]) + abs(c[k, u + 1]) + abs(c[k, u + 2])))
-        if a > 0.0:
-            growth = max(growth, rough_log2(a) / k)
-    return growth
+    last = degree * columns + at
+    # No length is more than twice the largest number in it, and no square of a large coefficient overflows.
+    growth = rough_log2(2.0 * largest(load(c, last - 2 * columns, weights) * weights)) * (1.0 / (degree - 2.0))
+    growth = max(growth, rough_log2(2.0 * largest(load(c, last - columns, weights) * weights)) * (1.0 / (degree - 1.0)))
+    return max(growth, rough_log2(2.0 * largest(load(c, last, weights) * weights)) * (1.0 / degree))
 
 
 @njit(cache=True, error_model="numpy")
 def length_for(log2_growth: float, accuracy: float, degree: int, part: float) -> float:
-    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``."""
-    inverse = 1.0 / (degree + 1.0)
+    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less."""
     share, least = rough_log2(part * accuracy) - log2_growth, rough_log2(part * FLOOR)
-    # Two steps of a fixed-point iteration for x = log₂ σh from σh = .4: each divides the error by the degree and more.
-    x = (max(share + _LOG2_START, least) + _LOG2_REST) * inverse
-    x = (max(share + x, least) + rough_log2(max(1.0 - rough_exp2(x), 0.1))) * inverse
+    # (N + 1) x = max(share + x, least) + log₂(1 − 2ˣ) for x = log₂ σh, the last term replaced by two chords below it.
+    x = max(
+        min((share + _REST) / (degree + _SLOPE), (share + _REST_NEAR) / (degree + _SLOPE_NEAR)),
+        min((least + _REST) / (degree + 1.0 + _SLOPE), (least + _REST_NEAR) / (degree + 1.0 + _SLOPE_NEAR)),
+    )
     return min(rough_exp2(min(x, _LOG2_MOST) - log2_growth), ctl.LONGEST)
 
 
@@ -78,6 +72,12 @@ def workspace(degree: int) -> np.ndarray:
     them once more.
     """
     return aligned((degree + 1, COLUMNS))
+
+
+@njit(cache=True, error_model="numpy")
+def _weights_of_row(weights: tuple[float, float, float, float]) -> Packed:
+    attitude, spin, place, speed = weights
+    return joined(filled(attitude, 4), filled(spin, 4), filled(place, 4), filled(speed, 4))
 
 
 @njit(cache=True, error_model="numpy")
@@ -96,41 +96,47 @@ def steps(
     sampling: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
     failed.
     """
-    degree = int(control[ctl.DEGREE])
-    advanced = 0
-    ending, follows = (0.0, 0.0, 0.0, 0.0), False
-    while True:
+    degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
+    here = variables_of(y)
+    if sampling:
         if control[ctl.SERIES] == 0.0:
-            # What has just been committed is still in registers, or on its way to where it was copied from.
-            series(following if follows else y, p, degree, c)
+            series(here, p, degree, c)
             control[ctl.SERIES] = 1.0
-        if sampling:
-            sum_series(c, p, degree, span_ns * 1e-9, y)
-            return span_ns if is_good(y) else 0
-        if control[ctl.ACCEPTED_NS] == 0.0:
-            # A step begins with the scales with which the one before it has ended.
-            weights = ending if follows else scales(y, p, control[ctl.ELAPSED_NS] * 1e-9)
-            for _ in range(WEIGHINGS):
-                growth = log2_growth(c, degree, weights, _Q, _W, _D, _U)
-                length_ns = math.floor(length_for(growth, control[ctl.ACCURACY], degree, PART) * 1e9)
-                good = length_ns >= 1.0
-                if not good:
-                    break
-                following[:] = y
-                sum_series(c, p, degree, length_ns * 1e-9, following)
-                good = is_good(following)
-                # The error of a spin is measured by the spin at the end: where it falls within the step, that counts.
-                ending = scales(following, p, (control[ctl.ELAPSED_NS] + length_ns) * 1e-9)
-                weights, more = heavier(ending, weights)
-                if not (good and more):
-                    break
-            if not good:
-                control[ctl.FAILED] = 1.0
-                return advanced
-            ctl.accept(control, length_ns)
-            control[ctl.PENDING] = 1.0
-        length = ctl.commit(control, y, following, span_ns - advanced)
+        there = sum_series(c, degree, span_ns * 1e-9)
+        put_variables(there, y)
+        return span_ns if are_good(there) else 0
+    advanced, elapsed = 0, control[ctl.ELAPSED_NS]
+    length, there = int(control[ctl.ACCEPTED_NS]), variables_of(following)
+    # A step begins with the scales with which the one before it has ended.
+    weights = scales_at(here, p, elapsed * 1e-9)
+    ending = weights
+    while True:
         if length == 0:
+            if control[ctl.SERIES] == 0.0:
+                series(here, p, degree, c)
+                control[ctl.SERIES] = 1.0
+            for _ in range(WEIGHINGS):
+                growth = log2_growth(c, VARIABLES_AT, COLUMNS, degree, _weights_of_row(weights))
+                length = int(length_for(growth, accuracy, degree, PART) * 1e9)
+                there = sum_series(c, degree, length * 1e-9)
+                if length < 1 or not are_good(there):
+                    control[ctl.FAILED] = 1.0
+                    put_variables(here, y)
+                    return advanced
+                # The error of a spin is measured by the spin at the end: where it falls within the step, that counts.
+                ending = scales_at(there, p, (elapsed + length) * 1e-9)
+                weights, more = heavier(ending, weights)
+                if not more:
+                    break
+            ctl.accept(control, length)
+            control[ctl.PENDING] = 1.0
+        else:
+            ending = scales_at(there, p, (elapsed + length) * 1e-9)
+        if length > span_ns - advanced:
+            put_variables(here, y)
+            put_variables(there, following)
             return advanced
+        ctl.count(control)
         advanced += length
-        follows = ending[0] != 0.0
+        elapsed += length
+        here, weights, length = there, ending, 0
