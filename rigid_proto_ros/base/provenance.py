@@ -16,8 +16,10 @@ from llvmlite import binding
 
 from .. import __version__
 
-MOTION = "2026-11-22"
-"""Since when the motion has had its present bits: versions with this date give the same ones, on any machine."""
+MOTION = "2026-11-22b"
+"""Since when the motion has had its present bits, with a letter from the second time on one day: versions with the same
+give the same ones, on any machine.
+"""
 
 PACKAGES = ("numpy", "numba", "scipy", "pyarrow", "distributed")
 

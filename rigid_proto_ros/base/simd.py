@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Vectors of doubles in processor registers, for compiled kernels: several numbers go through each operation at once.
 
-A vector has n components; where L flights go side by side each component has L numbers, one for each flight. Operations
-are those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one: so a flight
-has the same bits whether it goes alone or beside others.
+Operations are those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one:
+the bits are those of the same operations on single numbers.
 """
 
 from __future__ import annotations
@@ -106,14 +105,6 @@ def filled(_typing_context: Any, _x: Any, count: Any) -> tuple:
     )
 
 
-@_operation_on_vectors(lambda vector: vector.size)
-def width(_typing_context: Any, vector: Any) -> tuple:
-    """How many doubles a vector has."""
-    return types.int64(vector), lambda _context, _builder, _signature, _arguments: ir.Constant(
-        ir.IntType(64), vector.count
-    )
-
-
 @_operation_on_vectors(lambda *parts: np.concatenate(parts))
 def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
     """The vector of the components a, b, c, d."""
@@ -157,9 +148,7 @@ def largest(_typing_context: Any, vector: Any) -> tuple:
         bits = ir.VectorType(_BITS, vector.count)
         unsigned = builder.and_(builder.bitcast(arguments[0], bits), ir.Constant(bits, [(1 << 63) - 1] * vector.count))
         name, kind = f"llvm.vector.reduce.smax.v{vector.count}i64", ir.FunctionType(_BITS, [bits])
-        return builder.bitcast(
-            builder.call(builder.module.declare_intrinsic(name, (), kind), [unsigned]), _DOUBLE
-        )
+        return builder.bitcast(builder.call(builder.module.declare_intrinsic(name, (), kind), [unsigned]), _DOUBLE)
 
     return types.float64(vector), code
 
@@ -212,18 +201,6 @@ def number(_typing_context: Any, vector: Any, at: Any) -> tuple:
     return types.float64(vector, at), lambda _, builder, _signature, arguments: builder.extract_element(
         arguments[0], index
     )
-
-
-@_operation_on_vectors(lambda vector: np.sqrt(vector))
-def root(_typing_context: Any, vector: Any) -> tuple:
-    """Square roots."""
-
-    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
-        kind = arguments[0].type
-        function = builder.module.declare_intrinsic(f"llvm.sqrt.v{vector.count}f64", (), ir.FunctionType(kind, [kind]))
-        return builder.call(function, arguments)
-
-    return vector(vector), code
 
 
 def _operation(name: str) -> Callable:

@@ -1,51 +1,40 @@
 # SPDX-License-Identifier: MIT
-"""Series in vector registers: a flight's coefficients don't depend on whether others go beside it."""
+"""Vector registers and rough logarithms: what series are computed with."""
 
 import numpy as np
+import pytest
 from numba import njit
 
-from rigid_proto_ros.base.simd import aligned, filled
-from rigid_proto_ros.motion import problem as of
+from rigid_proto_ros.base.simd import aligned, filled, largest, load
 from rigid_proto_ros.motion.integrators.rough_logarithm import rough_exp2, rough_log2
-from rigid_proto_ros.motion.integrators.taylor import COLUMNS, series, series_beside, sum_beside, sum_series
-from rigid_proto_ros.motion.variables import STORED
-
-FLIGHTS, DEGREE, STEP = 8, 13, 0.17
+from rigid_proto_ros.motion.integrators.taylor import COLUMNS, power_sum
 
 
 @njit
-def eight_series(y, p, c):
-    series_beside(y, p, DEGREE, c, True, filled(0.0, FLIGHTS))
+def sum_of_four(c, at, degree, h):
+    return largest(power_sum(c, at, c.shape[1], degree, h, filled(0.0, 4)))
 
 
 @njit
-def eight_sums(c, out):
-    sum_beside(c, True, DEGREE, filled(STEP, FLIGHTS), out, filled(0.0, FLIGHTS))
+def largest_of(row):
+    return largest(load(row, 0, filled(0.0, 16)))
 
 
-def test_eight_flights_side_by_side_have_the_bits_of_each_alone():
-    rng = np.random.default_rng(3)
-    for _ in range(250):
-        y, p = np.zeros((STORED, FLIGHTS)), np.zeros((of.SIZE, FLIGHTS))
-        y[:13] = rng.normal(size=(13, FLIGHTS))
-        y[:4] /= np.linalg.norm(y[:4], axis=0)
-        y[4:7] *= 10.0 ** rng.uniform(-3.0, 3.0, FLIGHTS)
-        p[of.MOMENTS : of.MOMENTS + 3] = np.sort(rng.uniform(1.0, 1.9, (3, FLIGHTS)), axis=0)
-        p[of.TORQUE_BODY : of.TORQUE_BODY + 3] = rng.normal(size=(3, FLIGHTS))
-        p[of.ACCELERATION_BODY : of.ACCELERATION_BODY + 3] = rng.normal(size=(3, FLIGHTS))
-        p[of.DAMPING_LINEAR], p[of.DAMPING_ANGULAR] = rng.uniform(0.0, 1.0, (2, FLIGHTS))
-        p[of.GYROSCOPIC] = rng.integers(0, 2, FLIGHTS)
-        p[of.TRANSLATES] = 1.0
-        beside, sums = aligned((DEGREE + 1, COLUMNS * FLIGHTS)), np.zeros((STORED, FLIGHTS))
-        eight_series(y, p, beside)
-        eight_sums(beside, sums)
-        for flight in range(FLIGHTS):
-            alone, row = aligned((DEGREE + 1, COLUMNS)), np.zeros(STORED)
-            own = np.ascontiguousarray(p[:, flight])
-            series(np.ascontiguousarray(y[:, flight]), own, DEGREE, alone)
-            sum_series(alone, own, DEGREE, STEP, row)
-            np.testing.assert_array_equal(beside.reshape(DEGREE + 1, COLUMNS, FLIGHTS)[..., flight], alone)
-            np.testing.assert_array_equal(sums[:13, flight], row[:13])
+@pytest.mark.parametrize("degree", range(4, 27))
+def test_a_sum_of_powers_takes_every_coefficient_once(degree):
+    c = np.zeros((degree + 1, 8))
+    c[:, 4] = np.random.default_rng(degree).uniform(0.5, 1.0, degree + 1)
+    known = sum(float(a) * 0.7**k for k, a in enumerate(c[:, 4]))
+    assert abs(sum_of_four(c, 4, degree, 0.7) / known - 1.0) < 1e-15 * degree
+
+
+def test_what_is_no_number_is_larger_than_all():
+    row = np.array([0.0, -3.0, 2.0, -0.0] * 4)
+    assert largest_of(row) == 3.0
+    row[7] = -np.inf
+    assert largest_of(row) == np.inf
+    row[9] = np.nan
+    assert np.isnan(largest_of(row))
 
 
 def test_a_workspace_begins_a_line_of_the_cache():

@@ -39,6 +39,7 @@ from ..problem import (
 from ..string import NO_DIRECTION
 from ..variables import LOW
 from .knot import Knot, moved_pair, unit_attitude
+from .taylor import power_sum
 
 # Columns of the coefficient array c (degree + 2, COLUMNS); the first 15 are the variables of motion/variables.py.
 _Q, _W, _D, _U, _WORK, _HEAT = 0, 4, 7, 10, 13, 14
@@ -300,13 +301,9 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
 
 @njit(cache=True, error_model="numpy")
 def motion_at(c: np.ndarray, p: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
-    """Take the variables y, those that c is the series of, h seconds on; summed from the smallest term (Horner)."""
+    """Take the variables y, those that c is the series of, h seconds on."""
     columns = 15 if p[HAS_STRING] != 0.0 else 13 if p[TRANSLATES] != 0.0 else 7
-    at = degree * COLUMNS
-    sums = load(c, at, filled(0.0, 16))
-    for _ in range(degree - 1):
-        at -= COLUMNS
-        sums = sums * h + load(c, at, sums)
+    sums = power_sum(c, COLUMNS, COLUMNS, degree - 1, h, filled(0.0, 16))
     # The row past the last coefficient's is spare.
     changes = c[degree + 1]
     store(c, (degree + 1) * COLUMNS, sums)

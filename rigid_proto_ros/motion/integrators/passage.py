@@ -34,7 +34,7 @@ from ..problem import (
     STRING_DAMPING,
 )
 from ..string import NO_DIRECTION
-from ..variables import HAND_WORK, HEAT, LOW
+from ..variables import HAND_WORK, HEAT, LOW, SPIN
 from .equations import accelerations
 from .equations import knot as moving_knot
 from .knot import Knot, knot_and_stretch, moved_pair, unit_attitude
@@ -55,6 +55,10 @@ _BEFORE = 0.75
 """Of the time until the nearest point, a step is no longer."""
 _NO_TIME = 1e-24
 """b/|v| [s]: below it the knot goes straight through."""
+
+
+_MOST_TURN = 0.1
+"""rad that a step past the free end may turn the body: its few terms leave 1e-12 of that."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -78,8 +82,10 @@ def before_passage(c: np.ndarray, p: np.ndarray, degree: int, knot: Knot, h: flo
         straight = math.sqrt(bx * bx + by * by + bz * bz) <= MISSES * speed
         inside = length < shortest and speed * 1e-9 > shortest
         if h * 1e9 < 1.0 or inside or (straight and 0.0 <= nearest <= AT_ONCE):
-            away = 2.0 * nearest if nearest > 0.0 else -nearest
-            return h, max(int(math.ceil(away * 1e9)), 2)
+            length_ns = max(int(math.ceil((2.0 * nearest if nearest > 0.0 else -nearest) * 1e9)), 2)
+            spin = math.sqrt(c[0, SPIN] ** 2 + c[0, SPIN + 1] ** 2 + c[0, SPIN + 2] ** 2)
+            if spin * length_ns * 1e-9 <= _MOST_TURN:
+                return h, length_ns
     if length < shortest:
         # No direction, no tension: not for longer than until there is one.
         push = abs(c[2, A_KNOT]) + abs(c[2, A_KNOT + 1]) + abs(c[2, A_KNOT + 2])

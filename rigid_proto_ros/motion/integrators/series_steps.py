@@ -18,7 +18,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.simd import aligned, filled, joined
 from ..problem import HAS_STRING, STIFFNESS
-from ..variables import ATTITUDE, HEAT, STORED
+from ..variables import ATTITUDE, HEAT
 from . import control as ctl
 from .error_measure import (
     WEIGHINGS,

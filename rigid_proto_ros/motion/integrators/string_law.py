@@ -87,7 +87,7 @@ def next_law(
     """
     if law == SLACK:
         return _tautens(c, p, degree, h), PULLS, h
-    g = np.empty(degree + 1)
+    g = c[degree + 1]  # spare
     tolerance = math.sqrt(accuracy) * (_AGREEMENT if law == PULLS else _AGREEMENT_SLACK)
     if law == SHORTENS:
         distance_series(c, degree)

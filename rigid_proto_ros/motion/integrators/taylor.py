@@ -32,9 +32,9 @@ from .stepping import fixed_steps
 DEGREE = 18
 
 # Where the parts of a coefficient stand in its row, four numbers each, of which the fourth counts for q alone. Two of
-# them fill a line of the processor's cache: q times the unit vectors, and ω in another order; the variables; what those are
-# multiplied by, each component of ω four times and ω in a third order; q z and q once more; and likewise g_b ⊗ q*, its
-# real part negated.
+# them fill a line of the processor's cache: q times the unit vectors, and ω in another order; the variables; what those
+# are multiplied by, each component of ω four times and ω in a third order; q z and q once more; and likewise g_b ⊗ q*,
+# its real part negated.
 _QX, _QZ, _Q, _W, _D, _U = 0, 8, 16, 20, 24, 28
 _WX, _WZ, _QZ_Q, _GX, _GZ = 32, 40, 48, 56, 64
 COLUMNS = 72
@@ -175,38 +175,38 @@ def series(variables: Packed, p: np.ndarray, degree: int, c: np.ndarray) -> None
 
 
 @njit(cache=True, error_model="numpy")
-def _sum(c: np.ndarray, at: int, degree: int, h: float, like: Packed) -> Packed:
-    """Of the part that begins at the number ``at`` of each row, h seconds on: every fourth power by itself, each
-    from the smallest term (Horner), so that none waits for another; the largest term comes last.
+def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like: Packed) -> Packed:
+    """Σ cₖ hᵏ to k = degree, 4 or more, of the numbers from ``at`` on in rows of ``columns``: every fourth power by
+    itself, each from the smallest term (Horner), so that none waits for another; the largest term comes last.
     """
     square = h * h
     fourth = square * square
-    at += (degree // 4) * 4 * COLUMNS
+    at += (degree // 4) * 4 * columns
     past = degree % 4
     a, b, e, f = load(c, at, like), like, like, like
     if past > 0:
-        b = load(c, at + COLUMNS, like)
+        b = load(c, at + columns, like)
     if past > 1:
-        e = load(c, at + 2 * COLUMNS, like)
+        e = load(c, at + 2 * columns, like)
     if past > 2:
-        f = load(c, at + 3 * COLUMNS, like)
+        f = load(c, at + 3 * columns, like)
     for _ in range(degree // 4 - 1):
-        at -= 4 * COLUMNS
+        at -= 4 * columns
         a = a * fourth + load(c, at, like)
-        b = b * fourth + load(c, at + COLUMNS, like)
-        e = e * fourth + load(c, at + 2 * COLUMNS, like)
-        f = f * fourth + load(c, at + 3 * COLUMNS, like)
-    at -= 4 * COLUMNS
-    b = b * fourth + load(c, at + COLUMNS, like)
-    e = e * fourth + load(c, at + 2 * COLUMNS, like)
-    f = f * fourth + load(c, at + 3 * COLUMNS, like)
+        b = b * fourth + load(c, at + columns, like)
+        e = e * fourth + load(c, at + 2 * columns, like)
+        f = f * fourth + load(c, at + 3 * columns, like)
+    at -= 4 * columns
+    b = b * fourth + load(c, at + columns, like)
+    e = e * fourth + load(c, at + 2 * columns, like)
+    f = f * fourth + load(c, at + 3 * columns, like)
     return load(c, at, like) + ((a * fourth + e * square) + (b + f * square) * h)
 
 
 @njit(cache=True, error_model="numpy")
 def sum_series(c: np.ndarray, degree: int, h: float) -> Packed:
     """The variables h seconds on, with a unit quaternion; degree: 4 or more."""
-    sums = _sum(c, _Q, degree, h, filled(0.0, 16))
+    sums = power_sum(c, _Q, COLUMNS, degree, h, filled(0.0, 16))
     q = component(sums, 0)
     x, y, z, w = number(q, 0), number(q, 1), number(q, 2), number(q, 3)
     q = q * (1.0 / math.sqrt((x * x + y * y) + (z * z + w * w)))

@@ -8,7 +8,6 @@ after degree N is (σh)^(N+1)/(1 − σh); h is where that is the accuracy times
 from __future__ import annotations
 
 import functools
-import math
 
 import numpy as np
 
