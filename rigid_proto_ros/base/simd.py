@@ -122,7 +122,7 @@ def paired(_typing_context: Any, a: Any, b: Any) -> tuple:
     """The vector of a's numbers, then b's, of which there are as many."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
-        return _shuffled(builder, *arguments, list(range(2 * a.count)))
+        return _shuffled(builder, arguments[0], arguments[1], list(range(2 * a.count)))
 
     return Doubles(2 * a.count)(a, b), code
 
