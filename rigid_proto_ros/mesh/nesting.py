@@ -240,7 +240,7 @@ def component_nesting(
     )
     found = (outside > 0) & (within > 0)
     found |= found.T
-    crossing, complete = crossing_components(vertices, triangles, component, leaf_order, boxes, near & ~found)
+    crossing, complete = crossing_components(vertices, triangles, component, chosen, near & ~found)
     found |= crossing
     inside = (within > 0) & (outside == 0) & ~found & ~undecided[:, None]
     pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))

@@ -15,9 +15,9 @@ from ..base.compilation import njit
 LEAF = 4
 """Triangles in a leaf: fewer cost more boxes, more cost tests in vain."""
 
-
-_CELLS_BITS = 11
-"""Bits of a centre's place along each axis: 2048 cells."""
+CELLS_BITS = 11
+"""Bits of a centre's place along each axis."""
+CELLS = 1 << CELLS_BITS
 
 
 @njit(cache=True, nogil=True)
@@ -30,9 +30,14 @@ def _spread(cell: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _along_curve(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The numbers ``chosen`` (k,) of triangles by the place of their centres on the curve, sorted digit by digit."""
-    cells = 1 << _CELLS_BITS
+def curve_place(x: int, y: int, z: int) -> int:
+    """The place along the curve of a cell, CELLS along each axis."""
+    return _spread(x) | (_spread(y) << 1) | (_spread(z) << 2)
+
+
+@njit(cache=True, nogil=True)
+def _curve_places(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Places along the curve (k,) of the centres of the triangles numbered ``chosen`` (k,)."""
     low, size = np.full(3, np.inf), np.full(3, -np.inf)
     for i in range(len(chosen)):
         for corner in range(3):
@@ -40,32 +45,39 @@ def _along_curve(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray
                 x = vertices[triangles[chosen[i], corner], k]
                 low[k], size[k] = min(low[k], x), max(size[k], x)
     size -= low
-    codes = np.empty(len(chosen), np.int64)
-    counts = np.zeros((3, cells), np.int64)
+    places = np.empty(len(chosen), np.int64)
+    cells = np.empty(3, np.int64)
     for i in range(len(chosen)):
-        code = 0
         for k in range(3):
             centre = 0.0
             for corner in range(3):
                 centre += (vertices[triangles[chosen[i], corner], k] - low[k]) / 3.0
-            cell = centre / size[k] * cells if size[k] > 0.0 else 0.0
-            code |= _spread(min(max(int(cell), 0), cells - 1)) << k
-        codes[i] = code
+            cell = centre / size[k] * CELLS if size[k] > 0.0 else 0.0
+            cells[k] = min(max(int(cell), 0), CELLS - 1)
+        places[i] = curve_place(cells[0], cells[1], cells[2])
+    return places
+
+
+@njit(cache=True, nogil=True)
+def along_curve(places: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The numbers ``chosen`` (k,) by their places (k,) along the curve, sorted digit by digit; uses up ``places``."""
+    counts = np.zeros((3, CELLS), np.int64)
+    for i in range(len(places)):
         for digit in range(3):
-            counts[digit, (code >> (_CELLS_BITS * digit)) & (cells - 1)] += 1
-    order, sorted_codes = chosen.astype(np.int64), np.empty_like(codes)
+            counts[digit, (places[i] >> (CELLS_BITS * digit)) & (CELLS - 1)] += 1
+    order, sorted_places = chosen.astype(np.int64), np.empty_like(places)
     other = np.empty_like(order)
     for digit in range(3):
         start = 0
-        for cell in range(cells):
+        for cell in range(CELLS):
             start, counts[digit, cell] = start + counts[digit, cell], start
         for i in range(len(order)):
-            place = (codes[i] >> (_CELLS_BITS * digit)) & (cells - 1)
+            place = (places[i] >> (CELLS_BITS * digit)) & (CELLS - 1)
             to = counts[digit, place]
             counts[digit, place] += 1
-            other[to], sorted_codes[to] = order[i], codes[i]
+            other[to], sorted_places[to] = order[i], places[i]
         order, other = other, order
-        codes, sorted_codes = sorted_codes, codes
+        places, sorted_places = sorted_places, places
     return order
 
 
@@ -93,7 +105,7 @@ def triangle_tree(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarra
     """(order, boxes) of the triangles numbered ``chosen`` (k,): their order (k,) along the curve, leaf after leaf, and
     the nodes' boxes (2·leaves − 1, 6), lower and upper corner; leaf l is node leaves − 1 + l.
     """
-    order = _along_curve(vertices, triangles, chosen)
+    order = along_curve(_curve_places(vertices, triangles, chosen), chosen)
     leaves = 1
     while leaves * LEAF < len(order):
         leaves *= 2

@@ -52,9 +52,7 @@ def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
     expected = np.zeros((40, 40), dtype=bool)
     for i, j in pairs:
         expected[component[i], component[j]] = expected[component[j], component[i]] = True
-    found, complete = crossing_components(
-        points, corners, component, *triangle_tree(points, corners, np.arange(count)), asked
-    )
+    found, complete = crossing_components(points, corners, component, np.arange(count), asked)
     assert complete and np.array_equal(found, expected & asked)
     assert found.any() and not found.all()
 
@@ -67,6 +65,21 @@ def test_triangles_that_share_a_corner_do_not_cross():
     apart = np.array([[0, 1, 2], [5, 3, 4]])
     points = np.concatenate([points, [[0.05, 0.05, 0.0]]])
     assert self_crossings(points, apart, np.zeros(2, np.int64)) == 1
+
+
+def test_a_needle_through_a_fan_of_slivers_and_a_far_larger_mesh_is_found_once_for_each_triangle_it_passes():
+    # 4000 slivers around one corner, a quarter of the mesh squeezed into one cell, and a needle through the fan.
+    angles = np.linspace(0.0, 2.0 * np.pi, 4001)[:-1]
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(4000)])
+    needle = np.array(
+        [[0.5, 1e-4, -1.0], [0.5, 2e-4, -1.0], [0.5, 1.5e-4, 1.0], [1e6, 1e6, 1e6], [2e6, 1e6, 1e6], [1e6, 2e6, 1e6]]
+    )
+    points = np.vstack([np.zeros((1, 3)), rim, needle])
+    fan = np.column_stack([np.zeros(4000, int), 1 + np.arange(4000), 1 + (np.arange(4000) + 1) % 4000])
+    for last in ([[4001, 4002, 4003]], [[4001, 4002, 4003], [4004, 4005, 4006]]):
+        corners = np.vstack([fan, last])
+        assert self_crossings(points, corners, np.zeros(len(corners), np.int64)) == 1
+    assert self_crossings(points, fan, np.zeros(4000, np.int64)) == 0
 
 
 def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
