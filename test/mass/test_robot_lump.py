@@ -237,9 +237,9 @@ def test_real_robots_are_the_bodies_that_mujoco_makes_of_them():
     random = np.random.default_rng(1)
     for path in sorted(Path(ROBOTS).rglob("*.urdf")):
         try:
-            model = for_mujoco(path.read_text("utf-8"))
             lump_robot(path, {})
-        except (InputError, ValueError):  # MuJoCo refuses tensors that no body has, we a file of two trees
+            model = for_mujoco(path.read_text("utf-8"))
+        except (InputError, ValueError):  # we refuse a file of two trees or of none, MuJoCo tensors that no body has
             continue
         values = {
             model.joint(k).name: float(random.uniform(-1.0, 1.0)) for k in range(model.njnt) if model.jnt_type[k] > 1
