@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_proto_ros.motion.body import LENGTH, Body
+from rigid_proto_ros.motion.integrators import control
 from rigid_proto_ros.motion.integrators.integrator import Integrator
 from rigid_proto_ros.motion.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
 from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
@@ -13,6 +14,7 @@ from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.problem import SIZE, begin_body, begin_problem, begin_string
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import Tied
+from rigid_proto_ros.motion.variables import STORED, to_variables
 from rigid_proto_ros.simulation import flight as fl
 
 
@@ -35,6 +37,20 @@ def make_problem(
     if string is not None:
         begin_string(p, row, string.row, string.begin_ns, string.end_ns, state.row, state.time_ns)
     return p
+
+
+def new_variables(row: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Variables (STORED,) of a state row at a segment's start."""
+    y = np.zeros(STORED)
+    to_variables(row, p, y)
+    return y
+
+
+def new_control(accuracy: float, degree: int) -> np.ndarray:
+    """The step control of a segment's start."""
+    array = np.zeros(control.SIZE)
+    array[control.ACCURACY], array[control.DEGREE] = accuracy, degree
+    return array
 
 
 class OneSegment:

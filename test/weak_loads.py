@@ -8,6 +8,7 @@ steps are judged in test_stress_auto.py.
 from __future__ import annotations
 
 import numpy as np
+from one_segment import new_control
 from random_scenes import log_uniform
 
 from rigid_proto_ros.motion import problem as of
@@ -67,7 +68,7 @@ def weak_scene(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]
 def exact_flow(y: np.ndarray, p: np.ndarray, accuracy: float, h_ns: int) -> np.ndarray:
     """Variables after h_ns."""
     method = series_steps if p[of.HAS_WORLD_TORQUE] else taylor_adaptive
-    control = ctl.new_control(1e-3 * accuracy, MAX_DEGREE)
+    control = new_control(1e-3 * accuracy, MAX_DEGREE)
     room, following, y = method.workspace(MAX_DEGREE), np.zeros(STORED), y.copy()
     far = method.steps(y, p, control, following, room, h_ns, False)
     assert not control[ctl.FAILED]
@@ -85,7 +86,7 @@ def share_of_allowance(p: np.ndarray, y: np.ndarray, accuracy: float, part: floa
     part = min(part, most_ns / longest_ns)
     h_ns = max(1, int(part * longest_ns))
     stepped = y.copy()
-    control, room = ctl.new_control(accuracy, MAX_DEGREE), splitting_steps.workspace(0)
+    control, room = new_control(accuracy, MAX_DEGREE), splitting_steps.workspace(0)
     assert splitting_steps.steps(stepped, p, control, np.zeros(STORED), room, h_ns, part < 1.0) == h_ns
     exact = exact_flow(y, p, accuracy, h_ns)
     attitude, spin, place, speed = scales(exact, p, 0.0)

@@ -90,10 +90,3 @@ def to_good_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray, l
     for k in range(13):
         good = good and abs(row[k]) <= limit
     return good
-
-
-def new_variables(row: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Variables (STORED,) of a state row at a segment's start."""
-    y = np.zeros(STORED)
-    to_variables(row, p, y)
-    return y

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from flights import spinning
-from one_segment import make_problem
+from one_segment import make_problem, new_variables
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion.body import make_body
@@ -13,7 +13,6 @@ from rigid_proto_ros.motion.integrators.integrator import STRING
 from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings, tie
-from rigid_proto_ros.motion.variables import new_variables
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
 BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag(MOMENTS))

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from flights import SECOND
 from integrator_scenes import Scene, error, flown, scene_for
+from one_segment import new_variables
 
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING
 from rigid_proto_ros.motion.integrators.taylor import taylor_steps_of_degree
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings
-from rigid_proto_ros.motion.variables import new_variables, to_row
+from rigid_proto_ros.motion.variables import to_row
 
 FLOOR = 2e-15
 """What rounding leaves after a second of these motions: errors of the orders' tests lie at least 1e3 times above it."""

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from flights import SECOND, flight, spinning, wrench
 from local_error import CommittedStep, local_error
+from one_segment import new_control
 from random_scenes import random_body
 from weak_loads import exact_flow, share_of_allowance, weak_scene
 
 from rigid_proto_ros.motion import problem as of
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators import control as ctl
 from rigid_proto_ros.motion.integrators import splitting_steps
 from rigid_proto_ros.motion.variables import STORED
 
@@ -95,7 +95,7 @@ def test_a_spin_that_its_loads_stop_is_followed_through_zero():
     p[of.MASS] = p[of.LENGTH] = p[of.GYROSCOPIC] = 1.0
     y[3], y[6], p[of.TORQUE_BODY + 2] = 1.0, 10.0, -0.15
     assert splitting_steps.splitting_pays(p, y, accuracy)
-    control, following, room = ctl.new_control(accuracy, 6), np.zeros(STORED), splitting_steps.workspace(6)
+    control, following, room = new_control(accuracy, 6), np.zeros(STORED), splitting_steps.workspace(6)
     elapsed_ns = 0
     while elapsed_ns < 300 * SECOND:
         before = y.copy()

@@ -37,13 +37,6 @@ LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
 
 
-def new_control(accuracy: float, degree: int) -> np.ndarray:
-    """The array at a segment's start."""
-    control = np.zeros(SIZE)
-    control[ACCURACY], control[DEGREE] = accuracy, degree
-    return control
-
-
 @njit(cache=True, error_model="numpy")
 def copy_variables(of: np.ndarray, to: np.ndarray) -> None:
     """Number by number: numba would look first whether the two share memory."""
