@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What an integrator is given for one segment, as one flat array that compiled kernels read by name.
 
+Kernels import this module as ``of``: ``p[of.MASS]`` is the mass of the problem p.
+
 Within a segment all commands are constant. Everything is in principal axes (the body's, turned so that the tensor is
 diagonal): I₁ ≤ I₂ ≤ I₃, torques τ and arms r. The motion is
 

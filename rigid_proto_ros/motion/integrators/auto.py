@@ -25,24 +25,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
-from ..problem import (
-    ACCELERATION_ADDED,
-    ACCELERATION_BODY,
-    ATTACH,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    GYROSCOPIC,
-    HAND_VELOCITY,
-    HAS_STRING,
-    HAS_WORLD_TORQUE,
-    MASS,
-    MOMENTS,
-    REFERENCE_ACCELERATION,
-    REFERENCE_VELOCITY,
-    STIFFNESS,
-    TORQUE_BODY,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..variables import damping_functions
 from . import series_steps, splitting_steps, stiff_steps, taylor_adaptive
 from .discrete_gradient import DISCRETE_GRADIENT
@@ -77,12 +60,12 @@ RADIANS_A_STEP = 1.5
 def steady_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Closed form for a body that doesn't spin, or whose spin nothing changes for want of the gyroscopic term."""
     for done in range(n):
-        B, c = ACCELERATION_BODY, p[DAMPING_LINEAR]
+        B, c = of.ACCELERATION_BODY, p[of.DAMPING_LINEAR]
         push = rotate(y[0], y[1], y[2], y[3], p[B], p[B + 1], p[B + 2])
         phi1, phi2 = damping_functions(c * h)
-        if p[TRANSLATES] != 0.0:
+        if p[of.TRANSLATES] != 0.0:
             for k in range(3):
-                a, u = push[k] + p[ACCELERATION_ADDED + k], y[10 + k]
+                a, u = push[k] + p[of.ACCELERATION_ADDED + k], y[10 + k]
                 y[7 + k] += h * (phi1 * u + h * phi2 * a)
                 y[10 + k] += h * phi1 * (a - c * u)
         rx, ry, rz, rw = exponential(h * y[4], h * y[5], h * y[6])
@@ -109,15 +92,15 @@ def fastest_swing(p: np.ndarray) -> float:
     """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against
     the smallest moment.
     """
-    x, y, z = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
-    return math.sqrt(p[STIFFNESS] * (1.0 / p[MASS] + (x * x + y * y + z * z) / p[MOMENTS]))
+    x, y, z = p[of.ATTACH], p[of.ATTACH + 1], p[of.ATTACH + 2]
+    return math.sqrt(p[of.STIFFNESS] * (1.0 / p[of.MASS] + (x * x + y * y + z * z) / p[of.MOMENTS]))
 
 
 @njit(cache=True, error_model="numpy")
 def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
-    turns = _vector(y, 4) or _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0
-    accelerated = _vector(p, ACCELERATION_ADDED) or _vector(p, ACCELERATION_BODY)
-    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, HAND_VELOCITY)):
+    turns = _vector(y, 4) or _vector(p, of.TORQUE_BODY) or p[of.HAS_WORLD_TORQUE] != 0.0
+    accelerated = _vector(p, of.ACCELERATION_ADDED) or _vector(p, of.ACCELERATION_BODY)
+    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, of.HAND_VELOCITY)):
         return SLACK_AT_REST
     if damping_is_stiff(p, y, True):
         return STIFF
@@ -128,23 +111,23 @@ def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
 def kind_of_segment(p: np.ndarray, y: np.ndarray, accuracy: float) -> int:
     """Which of the kinds a segment with problem p from variables y on is, at this accuracy."""
     spins = _vector(y, 4)
-    turned = _vector(p, TORQUE_BODY) or p[HAS_WORLD_TORQUE] != 0.0 or (spins and p[DAMPING_ANGULAR] != 0.0)
-    translates = p[TRANSLATES] != 0.0
-    if p[HAS_STRING] != 0.0:
+    turned = _vector(p, of.TORQUE_BODY) or p[of.HAS_WORLD_TORQUE] != 0.0 or (spins and p[of.DAMPING_ANGULAR] != 0.0)
+    translates = p[of.TRANSLATES] != 0.0
+    if p[of.HAS_STRING] != 0.0:
         return _kind_on_string(p, y)
     if damping_is_stiff(p, y, False):
         return STIFF
     if not turned:
         if not spins and not translates:
-            moves = _vector(p, REFERENCE_VELOCITY) or _vector(p, REFERENCE_ACCELERATION)
+            moves = _vector(p, of.REFERENCE_VELOCITY) or _vector(p, of.REFERENCE_ACCELERATION)
             return COASTING if moves else ASLEEP
-        if not spins or (p[GYROSCOPIC] == 0.0 and not translates):
+        if not spins or (p[of.GYROSCOPIC] == 0.0 and not translates):
             return STEADY
         if not translates:
             return FREE
     if spins and splitting_steps.splitting_pays(p, y, accuracy):
         return WEAK_LOADS
-    return ANY_LOADS if p[HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
+    return ANY_LOADS if p[of.HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
 
 
 def _constant(choice: str) -> Callable[..., str]:

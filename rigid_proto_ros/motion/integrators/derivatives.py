@@ -9,23 +9,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate, rotate_inverse
-from ..problem import (
-    ACCELERATION_BODY,
-    ATTACH,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    GYROSCOPIC,
-    HAS_STRING,
-    HAS_WORLD_TORQUE,
-    MASS,
-    MOMENT,
-    MOMENTS,
-    REST_LENGTH,
-    STIFFNESS,
-    STRING_DAMPING,
-    TORQUE_WORLD,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..string import NO_DIRECTION
 from .equations import knot
 
@@ -64,8 +48,8 @@ def derivatives(
     for k in range(3):
         e0, e1, e2 = rotate(q[0], q[1], q[2], q[3], 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
         R[0, k], R[1, k], R[2, k] = e0, e1, e2
-    i1, i2, i3 = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
-    g, cw = p[GYROSCOPIC], p[DAMPING_ANGULAR]
+    i1, i2, i3 = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
+    g, cw = p[of.GYROSCOPIC], p[of.DAMPING_ANGULAR]
     # Torque in principal axes by ω there, then by W: G Rᵀ.
     g01, g02 = g * (i2 - i3) * w[2], g * (i2 - i3) * w[1]
     g10, g12 = g * (i3 - i1) * w[2], g * (i3 - i1) * w[0]
@@ -77,8 +61,8 @@ def derivatives(
     # A torque in world axes: its change, less ξ × τ, is turned into principal axes below.
     S = K[0]
     S[:, :] = 0.0
-    if p[HAS_WORLD_TORQUE] != 0.0:
-        T, M = TORQUE_WORLD, MOMENT
+    if p[of.HAS_WORLD_TORQUE] != 0.0:
+        T, M = of.TORQUE_WORLD, of.MOMENT
         for k in range(3):
             x, y, z = rotate_inverse(q[0], q[1], q[2], q[3], 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
             # Rᵀ(τ × e_k), and vee of M [e_k]× R: the arms of world forces turn.
@@ -93,13 +77,13 @@ def derivatives(
             Jx[0, k] += S[1, 2] - S[2, 1]
             Jx[1, k] += S[2, 0] - S[0, 2]
             Jx[2, k] += S[0, 1] - S[1, 0]
-    if p[TRANSLATES] != 0.0:
-        B, cv = ACCELERATION_BODY, p[DAMPING_LINEAR]
+    if p[of.TRANSLATES] != 0.0:
+        B, cv = of.ACCELERATION_BODY, p[of.DAMPING_LINEAR]
         bx, by, bz = rotate(q[0], q[1], q[2], q[3], p[B], p[B + 1], p[B + 2])
         _cross_into(Jx, -1.0, bx, by, bz, 3, 0)
         for k in range(3):
             Jv[3 + k, 3 + k] -= cv
-        if p[HAS_STRING] != 0.0:
+        if p[of.HAS_STRING] != 0.0:
             _string_derivatives(q, w, d, u, p, taut, R, Jv, Jx, K)
     for k in range(6):
         Jv[0, k] /= i1
@@ -125,12 +109,12 @@ def _string_derivatives(
 ) -> None:
     """Add the string's part, its torque not yet divided by the moments: δF = K₀ δa' + K₁ δa with δa = δd + ξ × ρ and
     δa' = δu + δW × ρ + ξ × (W × ρ), torque Rᵀ(ρ × (δF − ξ × F))."""
-    k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
+    k, c, rest = p[of.STIFFNESS], p[of.STRING_DAMPING], p[of.REST_LENGTH]
     ax, ay, az, vx, vy, vz = knot(q[0], q[1], q[2], q[3], w[0], w[1], w[2], d[0], d[1], d[2], u[0], u[1], u[2], p)
     length = math.sqrt(ax * ax + ay * ay + az * az)
     if rest != 0.0 and (not taut or length < NO_DIRECTION * rest):
         return
-    r0, r1, r2 = rotate(q[0], q[1], q[2], q[3], p[ATTACH], p[ATTACH + 1], p[ATTACH + 2])
+    r0, r1, r2 = rotate(q[0], q[1], q[2], q[3], p[of.ATTACH], p[of.ATTACH + 1], p[of.ATTACH + 2])
     # W × ρ
     e0, e1, e2 = vx - u[0], vy - u[1], vz - u[2]
     Kv, Kx = K[0], K[1]
@@ -153,7 +137,7 @@ def _string_derivatives(
                 across = (1.0 if i == j else 0.0) - nn
                 Kv[i, j] = -c * nn
                 Kx[i, j] = -k * nn - tension / length * across - c * n[i] * (v[j] - rate * n[j]) / length
-    m = p[MASS]
+    m = p[of.MASS]
     for j in range(12):
         # Column j: unit change of W, u, ξ or d.
         x, y, z = 1.0 * (j % 3 == 0), 1.0 * (j % 3 == 1), 1.0 * (j % 3 == 2)

@@ -30,21 +30,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, rotate, rotate_inverse
-from ..problem import (
-    ACCELERATION_ADDED,
-    ACCELERATION_BODY,
-    ATTACH,
-    BILATERAL,
-    DAMPING_LINEAR,
-    HAND_VELOCITY,
-    HAS_STRING,
-    MASS,
-    MOMENTS,
-    REST_LENGTH,
-    STIFFNESS,
-    STRING_DAMPING,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..string import NO_DIRECTION
 from ..variables import HAND_WORK, HEAT, LOW
 from .equations import torque
@@ -93,8 +79,8 @@ def _momentum(
     tx, ty, tz = mean_torque(ox, oy, oz, tx, ty, tz, h)
     gx, gy, gz = gyroscopic_torque(ox, oy, oz, p)
     tx, ty, tz = tx + gx, ty + gy, tz + gz
-    if p[HAS_STRING] != 0.0:
-        R, F, G = ATTACH, ACCELERATION_BODY, ACCELERATION_ADDED
+    if p[of.HAS_STRING] != 0.0:
+        R, F, G = of.ATTACH, of.ACCELERATION_BODY, of.ACCELERATION_ADDED
         # What the Cayley turn adds to the arm, in the axes of the step's start: 2(v × r + v × (v × r))/(1 + v²), v =
         # ½hω̄.
         vx, vy, vz = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
@@ -104,8 +90,8 @@ def _momentum(
         turned = rotate(qx, qy, qz, qw, dx, dy, dz)
         push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
         # The mean velocity is (u + ½h(push + F/m))/(1 + ½hc).
-        soft = 1.0 / (1.0 + 0.5 * h * p[DAMPING_LINEAR])
-        give = 0.5 * h * h * soft / p[MASS]
+        soft = 1.0 / (1.0 + 0.5 * h * p[of.DAMPING_LINEAR])
+        give = 0.5 * h * h * soft / p[of.MASS]
         for k in range(3):
             a = s[_A + k]
             free = h * soft * (y[10 + k] + 0.5 * h * (push[k] + p[G + k])) + turned[k]
@@ -125,12 +111,12 @@ def _momentum(
 @njit(cache=True, error_model="numpy")
 def _solve_spin(y: np.ndarray, p: np.ndarray, h: float, mu: float, rho: float, s: np.ndarray) -> bool:
     """The mean spin under a given pull, from the one in s; returns whether it was found."""
-    A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    A, B, C = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
     change = 0.0
     # How the knot resists: h² μ/(1 + give μ) per unit of its displacement.
-    give = 0.5 * h * h / p[MASS]
-    extra = h * h * mu / (1.0 + give * mu) if p[HAS_STRING] != 0.0 and mu > 0.0 else 0.0
-    rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    give = 0.5 * h * h / p[of.MASS]
+    extra = h * h * mu / (1.0 + give * mu) if p[of.HAS_STRING] != 0.0 and mu > 0.0 else 0.0
+    rx, ry, rz = p[of.ATTACH], p[of.ATTACH + 1], p[of.ATTACH + 2]
     for _ in range(MAX_ITERATIONS):
         ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
         kx, ky, kz = _momentum(y, p, h, mu, rho, s)
@@ -160,9 +146,9 @@ def _length_after(s: np.ndarray) -> tuple[float, float]:
 @njit(cache=True, error_model="numpy")
 def _tension(x0: float, change: float, h: float, p: np.ndarray) -> tuple[float, float]:
     """T over a step in which the stretch x0 changes, and the part of the way θ in which the damper works."""
-    k, c = p[STIFFNESS], p[STRING_DAMPING]
+    k, c = p[of.STIFFNESS], p[of.STRING_DAMPING]
     x1 = x0 + change
-    if p[BILATERAL] != 0.0:
+    if p[of.BILATERAL] != 0.0:
         return 0.5 * k * (x0 + x1) + c * change / h, 1.0
     if x0 <= 0.0 and x1 <= 0.0:
         return 0.0, 0.0
@@ -192,12 +178,12 @@ def _lightness(y: np.ndarray, p: np.ndarray, s: np.ndarray) -> float:
     """1/m + (r × n)ᵀ I⁻¹ (r × n) with n along a: what the knot yields to a pull."""
     length = s[_LENGTH]
     if length == 0.0:
-        return 1.0 / p[MASS]
+        return 1.0 / p[of.MASS]
     x, z, w = s[_A] / length, s[_A + 1] / length, s[_A + 2] / length
     nx, ny, nz = rotate_inverse(y[0], y[1], y[2], y[3], x, z, w)
-    rx, ry, rz = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    rx, ry, rz = p[of.ATTACH], p[of.ATTACH + 1], p[of.ATTACH + 2]
     a, b, c = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
-    return 1.0 / p[MASS] + a * a / p[MOMENTS] + b * b / p[MOMENTS + 1] + c * c / p[MOMENTS + 2]
+    return 1.0 / p[of.MASS] + a * a / p[of.MOMENTS] + b * b / p[of.MOMENTS + 1] + c * c / p[of.MOMENTS + 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -208,12 +194,12 @@ def _solve_pull(y: np.ndarray, p: np.ndarray, h: float, s: np.ndarray) -> float:
     f, total = _excess(y, p, h, mu, s)
     if not math.isfinite(f) or f == 0.0:
         return f
-    if p[BILATERAL] != 0.0:
+    if p[of.BILATERAL] != 0.0:
         # A push so strong that 1 + ½h²μ/m vanishes is no solution.
-        lower = -2.0 * p[MASS] / (h * h)
+        lower = -2.0 * p[of.MASS] / (h * h)
     # The slope of μ(l + l⁺) − T by the mass that the knot shows along the string.
     give = 0.5 * h * h * _lightness(y, p, s)
-    stiff = 0.5 * p[STIFFNESS] + p[STRING_DAMPING] / h
+    stiff = 0.5 * p[of.STIFFNESS] + p[of.STRING_DAMPING] / h
     slope = total * (1.0 + give * stiff)
     old_mu, old_f = mu, f
     for _ in range(_PULL_TRIALS):
@@ -245,15 +231,15 @@ def _solve_pull(y: np.ndarray, p: np.ndarray, h: float, s: np.ndarray) -> float:
 def _keeps_energy(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray) -> bool:
     """Whether kinetic and potential energy changed by the work of loads and dampers, as a solution's do."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
-    F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
+    F, G, c = of.ACCELERATION_BODY, of.ACCELERATION_ADDED, p[of.DAMPING_LINEAR]
     mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
     tx, ty, tz = torque(mx, my, mz, mw, ox, oy, oz, p)
     push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
     work, weight = h * (ox * tx + oy * ty + oz * tz), 0.0
     for k in range(3):
         mean = 0.5 * (y[10 + k] + out[10 + k])
-        work += h * p[MASS] * mean * (push[k] + p[G + k] - c * mean)
-        weight += p[MASS] * abs(p[G + k])
+        work += h * p[of.MASS] * mean * (push[k] + p[G + k] - c * mean)
+        weight += p[of.MASS] * abs(p[G + k])
     before = kinetic_energy(y, p) + potential_energy(s[_STRETCH], p)
     after = kinetic_energy(out, p) + potential_energy(knot_and_stretch(out, p)[4], p)
     heat = out[HEAT] - y[HEAT]
@@ -265,25 +251,25 @@ def _keeps_energy(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np
 def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray) -> bool:
     """One step from y into out; returns whether a solution was found."""
     s[_O], s[_O + 1], s[_O + 2] = y[4], y[5], y[6]
-    if p[HAS_STRING] != 0.0:
+    if p[of.HAS_STRING] != 0.0:
         s[_A], s[_A + 1], s[_A + 2], s[_LENGTH], s[_STRETCH] = knot_and_stretch(y, p)
     mu, rho = 0.0, 0.0
     found = True
-    if p[HAS_STRING] == 0.0 or p[REST_LENGTH] == 0.0:
-        if p[HAS_STRING] != 0.0:
+    if p[of.HAS_STRING] == 0.0 or p[of.REST_LENGTH] == 0.0:
+        if p[of.HAS_STRING] != 0.0:
             # −½k(a + a⁺) − c(a⁺ − a)/h, as −μ(a + a⁺) + ρ a.
-            mu, rho = 0.5 * p[STIFFNESS] + p[STRING_DAMPING] / h, 2.0 * p[STRING_DAMPING] / h
+            mu, rho = 0.5 * p[of.STIFFNESS] + p[of.STRING_DAMPING] / h, 2.0 * p[of.STRING_DAMPING] / h
         found = _solve_spin(y, p, h, mu, rho, s)
     else:
         mu = _solve_pull(y, p, h, s)
         found = math.isfinite(mu)
-        if found and max(s[_LENGTH], _length_after(s)[0]) < NO_DIRECTION * p[REST_LENGTH]:
+        if found and max(s[_LENGTH], _length_after(s)[0]) < NO_DIRECTION * p[of.REST_LENGTH]:
             mu = 0.0
             found = _solve_spin(y, p, h, mu, rho, s)
     if not found:
         return False
     kx, ky, kz = _momentum(y, p, h, mu, rho, s)
-    out[4], out[5], out[6] = y[4] + kx / p[MOMENTS], y[5] + ky / p[MOMENTS + 1], y[6] + kz / p[MOMENTS + 2]
+    out[4], out[5], out[6] = y[4] + kx / p[of.MOMENTS], y[5] + ky / p[of.MOMENTS + 1], y[6] + kz / p[of.MOMENTS + 2]
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
     # q ⊗ (v, 1)/n as q and what is added to it, n² = 1 + v².
     vx, vy, vz = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
@@ -294,41 +280,41 @@ def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray
         moved_pair(y, out, k, LOW + k, turn[k] / n)
     unit_attitude(out)
     out[13], out[14] = y[13], y[14]
-    if p[TRANSLATES] != 0.0:
+    if p[of.TRANSLATES] != 0.0:
         _translate(y, p, h, out, s)
-    return p[HAS_STRING] == 0.0 or _keeps_energy(y, p, h, out, s)
+    return p[of.HAS_STRING] == 0.0 or _keeps_energy(y, p, h, out, s)
 
 
 @njit(cache=True, error_model="numpy")
 def _translate(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray, s: np.ndarray) -> None:
     """Displacement, velocity and the string's energies from the force in s."""
     ox, oy, oz = s[_O], s[_O + 1], s[_O + 2]
-    F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
+    F, G, c = of.ACCELERATION_BODY, of.ACCELERATION_ADDED, p[of.DAMPING_LINEAR]
     mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
     push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
     work = 0.0
     for k in range(3):
-        force = s[_FORCE + k] if p[HAS_STRING] != 0.0 else 0.0
-        a = push[k] + p[G + k] + force / p[MASS]
+        force = s[_FORCE + k] if p[of.HAS_STRING] != 0.0 else 0.0
+        a = push[k] + p[G + k] + force / p[of.MASS]
         mean = (y[10 + k] + 0.5 * h * a) / (1.0 + 0.5 * h * c)
         moved_pair(y, out, 7 + k, LOW + 4 + k, h * mean)
         out[10 + k] = y[10 + k] + h * (a - c * mean)
-        work += force * p[HAND_VELOCITY + k]
-    if p[HAS_STRING] == 0.0:
+        work += force * p[of.HAND_VELOCITY + k]
+    if p[of.HAS_STRING] == 0.0:
         return
     out[HAND_WORK] = y[HAND_WORK] + h * work
-    if p[REST_LENGTH] == 0.0:
+    if p[of.REST_LENGTH] == 0.0:
         d0, d1, d2 = s[_CHANGE], s[_CHANGE + 1], s[_CHANGE + 2]
-        out[HEAT] = y[HEAT] + p[STRING_DAMPING] / h * (d0 * d0 + d1 * d1 + d2 * d2)
+        out[HEAT] = y[HEAT] + p[of.STRING_DAMPING] / h * (d0 * d0 + d1 * d1 + d2 * d2)
         return
     # What the pull took beyond the change of potential.
     _, change = _length_after(s)
     tension, _ = _tension(s[_STRETCH], change, h, p)
     x0, x1 = s[_STRETCH], s[_STRETCH] + change
-    if p[BILATERAL] == 0.0:
+    if p[of.BILATERAL] == 0.0:
         x0, x1 = max(x0, 0.0), max(x1, 0.0)
-    if p[STRING_DAMPING] != 0.0:
-        out[HEAT] = y[HEAT] + (tension * change - 0.5 * p[STIFFNESS] * (x1 - x0) * (x1 + x0))
+    if p[of.STRING_DAMPING] != 0.0:
+        out[HEAT] = y[HEAT] + (tension * change - 0.5 * p[of.STIFFNESS] * (x1 - x0) * (x1 + x0))
 
 
 @njit(cache=True, error_model="numpy")
@@ -361,7 +347,7 @@ def discrete_gradient_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> i
     for done in range(n):
         found = _step(y, p, h, new, scratch) and is_good(new)
         if not found and not _step_in_parts(y, p, h, new, part, scratch):
-            if p[HAS_STRING] == 0.0:
+            if p[of.HAS_STRING] == 0.0:
                 return done
             inextensible_step(y, p, h, new)
             if not is_good(new):

@@ -14,37 +14,16 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate, rotate_inverse
-from ..problem import (
-    ACCELERATION_ADDED,
-    ACCELERATION_BODY,
-    ATTACH,
-    BILATERAL,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    GYROSCOPIC,
-    HAND_VELOCITY,
-    HAS_STRING,
-    HAS_WORLD_TORQUE,
-    MASS,
-    MOMENT,
-    MOMENTS,
-    REST_LENGTH,
-    STIFFNESS,
-    STRING_DAMPING,
-    STRING_START,
-    TORQUE_BODY,
-    TORQUE_WORLD,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..string import NO_DIRECTION
 
 
 @njit(cache=True, error_model="numpy")
 def undamped_torque(qx: float, qy: float, qz: float, qw: float, p: np.ndarray) -> tuple[float, float, float]:
     """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
-    tx, ty, tz = p[TORQUE_BODY], p[TORQUE_BODY + 1], p[TORQUE_BODY + 2]
-    if p[HAS_WORLD_TORQUE] != 0.0:
-        W, M = TORQUE_WORLD, MOMENT
+    tx, ty, tz = p[of.TORQUE_BODY], p[of.TORQUE_BODY + 1], p[of.TORQUE_BODY + 2]
+    if p[of.HAS_WORLD_TORQUE] != 0.0:
+        W, M = of.TORQUE_WORLD, of.MOMENT
         x, y, z = rotate_inverse(qx, qy, qz, qw, p[W], p[W + 1], p[W + 2])
         # Row i of M R is Rᵀ times row i of M; vee takes (M R)₁₂ − (M R)₂₁ and so on, counted from 0.
         _, m01, m02 = rotate_inverse(qx, qy, qz, qw, p[M], p[M + 1], p[M + 2])
@@ -62,7 +41,7 @@ def torque(
 ) -> tuple[float, float, float]:
     """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
     tx, ty, tz = undamped_torque(qx, qy, qz, qw, p)
-    c = p[DAMPING_ANGULAR]
+    c = p[of.DAMPING_ANGULAR]
     return tx - c * wx, ty - c * wy, tz - c * wz
 
 
@@ -71,8 +50,8 @@ def angular_acceleration(
     wx: float, wy: float, wz: float, tx: float, ty: float, tz: float, p: np.ndarray
 ) -> tuple[float, float, float]:
     """Euler's equations in principal axes: ω' = I⁻¹(τ − ω × Iω); without the gyroscopic term I⁻¹τ."""
-    a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
-    g = p[GYROSCOPIC]
+    a, b, c = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
+    g = p[of.GYROSCOPIC]
     return (tx - g * (c - b) * wy * wz) / a, (ty - g * (a - c) * wz * wx) / b, (tz - g * (b - a) * wx * wy) / c
 
 
@@ -81,9 +60,9 @@ def added_acceleration(
     qx: float, qy: float, qz: float, qw: float, ux: float, uy: float, uz: float, p: np.ndarray
 ) -> tuple[float, float, float]:
     """Acceleration of the added motion without the string: its constant part, R g_b and −c_v u."""
-    B, G = ACCELERATION_BODY, ACCELERATION_ADDED
+    B, G = of.ACCELERATION_BODY, of.ACCELERATION_ADDED
     ax, ay, az = rotate(qx, qy, qz, qw, p[B], p[B + 1], p[B + 2])
-    c = p[DAMPING_LINEAR]
+    c = p[of.DAMPING_LINEAR]
     return ax + (p[G] - c * ux), ay + (p[G + 1] - c * uy), az + (p[G + 2] - c * uz)
 
 
@@ -105,7 +84,7 @@ def knot(
     p: np.ndarray,
 ) -> tuple[float, ...]:
     """From the free end to the knot, a (3,), and its rate a' (3,), world axes."""
-    A, S = ATTACH, STRING_START
+    A, S = of.ATTACH, of.STRING_START
     rx, ry, rz = p[A], p[A + 1], p[A + 2]
     bx, by, bz = rotate(qx, qy, qz, qw, rx, ry, rz)
     vx, vy, vz = rotate(qx, qy, qz, qw, wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx)
@@ -134,7 +113,7 @@ def string_pull(
     lost in the damper.
     """
     ax, ay, az, vx, vy, vz = knot(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p)
-    k, c, rest = p[STIFFNESS], p[STRING_DAMPING], p[REST_LENGTH]
+    k, c, rest = p[of.STIFFNESS], p[of.STRING_DAMPING], p[of.REST_LENGTH]
     if rest == 0.0:
         fx, fy, fz = -k * ax - c * vx, -k * ay - c * vy, -k * az - c * vz
         heat = c * (vx * vx + vy * vy + vz * vz)
@@ -147,7 +126,7 @@ def string_pull(
         tension = k * (length - rest) + c * rate
         fx, fy, fz = -tension * nx, -tension * ny, -tension * nz
         heat = c * rate * rate
-    A, H = ATTACH, HAND_VELOCITY
+    A, H = of.ATTACH, of.HAND_VELOCITY
     bx, by, bz = rotate_inverse(qx, qy, qz, qw, fx, fy, fz)
     rx, ry, rz = p[A], p[A + 1], p[A + 2]
     work = fx * p[H] + fy * p[H + 1] + fz * p[H + 2]
@@ -174,14 +153,14 @@ def accelerations(
 ) -> tuple[float, ...]:
     """ω' (principal axes), u' (world axes), power of the hand, power lost in the string's damper, for a unit q."""
     tx, ty, tz = torque(qx, qy, qz, qw, wx, wy, wz, p)
-    if p[TRANSLATES] == 0.0:
+    if p[of.TRANSLATES] == 0.0:
         ex, ey, ez = angular_acceleration(wx, wy, wz, tx, ty, tz, p)
         return ex, ey, ez, 0.0, 0.0, 0.0, 0.0, 0.0
     ax, ay, az = added_acceleration(qx, qy, qz, qw, ux, uy, uz, p)
     work, heat = 0.0, 0.0
-    if p[HAS_STRING] != 0.0:
+    if p[of.HAS_STRING] != 0.0:
         fx, fy, fz, sx, sy, sz, work, heat = string_pull(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, taut)
-        m = p[MASS]
+        m = p[of.MASS]
         ax, ay, az = ax + fx / m, ay + fy / m, az + fz / m
         tx, ty, tz = tx + sx, ty + sy, tz + sz
     ex, ey, ez = angular_acceleration(wx, wy, wz, tx, ty, tz, p)
@@ -191,17 +170,17 @@ def accelerations(
 @njit(cache=True, error_model="numpy")
 def stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
-    if p[BILATERAL] != 0.0 or p[HAS_STRING] == 0.0:
+    if p[of.BILATERAL] != 0.0 or p[of.HAS_STRING] == 0.0:
         return 1.0, 0.0
     ax, ay, az, vx, vy, vz = knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
     length = math.sqrt(ax * ax + ay * ay + az * az)
     if length == 0.0:
-        return -p[REST_LENGTH], 0.0
-    return length - p[REST_LENGTH], (ax * vx + ay * vy + az * vz) / length
+        return -p[of.REST_LENGTH], 0.0
+    return length - p[of.REST_LENGTH], (ax * vx + ay * vy + az * vz) / length
 
 
 @njit(cache=True, error_model="numpy")
 def tension_margin(x: float, rate: float, p: np.ndarray) -> float:
     """Positive exactly while the string pulls: min(k x, k x + c x')."""
-    spring = p[STIFFNESS] * x
-    return min(spring, spring + p[STRING_DAMPING] * rate)
+    spring = p[of.STIFFNESS] * x
+    return min(spring, spring + p[of.STRING_DAMPING] * rate)

@@ -13,18 +13,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ..problem import (
-    ATTACH,
-    HAS_STRING,
-    LENGTH,
-    MASS,
-    MOMENTS,
-    REFERENCE_ACCELERATION,
-    REFERENCE_DAMPING,
-    REFERENCE_VELOCITY,
-    STRING_DAMPING,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..variables import damping_functions
 
 WEIGHINGS = 4
@@ -48,16 +37,16 @@ def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, 
 def scales_of(w: _Three, u: _Three, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
     """The same at ω = w and the added velocity u."""
     spin = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    if p[TRANSLATES] == 0.0:
+    if p[of.TRANSLATES] == 0.0:
         return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
-    c = p[REFERENCE_DAMPING]
+    c = p[of.REFERENCE_DAMPING]
     push = elapsed * damping_functions(c * elapsed)[0]
     speed = 0.0
     for k in range(3):
-        v = p[REFERENCE_VELOCITY + k]
-        v += push * (p[REFERENCE_ACCELERATION + k] - c * v) + u[k]
+        v = p[of.REFERENCE_VELOCITY + k]
+        v += push * (p[of.REFERENCE_ACCELERATION + k] - c * v) + u[k]
         speed += v * v
-    length = p[LENGTH]
+    length = p[of.LENGTH]
     return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
 
 
@@ -106,9 +95,9 @@ def jump_of_displacement(p: np.ndarray, spin: float, speed: float) -> float:
     """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
     much too early or late.
     """
-    if p[HAS_STRING] == 0.0:
+    if p[of.HAS_STRING] == 0.0:
         return 0.0
-    arm = math.sqrt(p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2)
+    arm = math.sqrt(p[of.ATTACH] ** 2 + p[of.ATTACH + 1] ** 2 + p[of.ATTACH + 2] ** 2)
     # What a force at the knot does to the measured velocities, per newton and second.
-    response = max(speed / p[MASS], spin * arm / p[MOMENTS])
-    return p[STRING_DAMPING] * p[LENGTH] * response
+    response = max(speed / p[of.MASS], spin * arm / p[of.MOMENTS])
+    return p[of.STRING_DAMPING] * p[of.LENGTH] * response

@@ -7,14 +7,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate
-from ..problem import (
-    ACCELERATION_ADDED,
-    ACCELERATION_BODY,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    MOMENTS,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..variables import damping_functions
 from .equations import undamped_torque
 
@@ -23,9 +16,9 @@ from .equations import undamped_torque
 def push(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
-    if p[TRANSLATES] == 0.0:
+    if p[of.TRANSLATES] == 0.0:
         return tx, ty, tz, 0.0, 0.0, 0.0
-    B, G = ACCELERATION_BODY, ACCELERATION_ADDED
+    B, G = of.ACCELERATION_BODY, of.ACCELERATION_ADDED
     ax, ay, az = rotate(y[0], y[1], y[2], y[3], p[B], p[B + 1], p[B + 2])
     return tx, ty, tz, ax + p[G], ay + p[G + 1], az + p[G + 2]
 
@@ -33,16 +26,16 @@ def push(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
 @njit(cache=True, error_model="numpy")
 def kick(y: np.ndarray, p: np.ndarray, h: float, pushed: tuple[float, ...]) -> None:
     """Let ``push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
-    angular, linear = p[DAMPING_ANGULAR], p[DAMPING_LINEAR]
+    angular, linear = p[of.DAMPING_ANGULAR], p[of.DAMPING_LINEAR]
     for k in range(3):
-        rate = pushed[k] / p[MOMENTS + k]
+        rate = pushed[k] / p[of.MOMENTS + k]
         if angular == 0.0:
             y[4 + k] += h * rate
         else:
             # ω' = rate − z ω: ω + h φ₁(zh)(rate − z ω).
-            z = angular / p[MOMENTS + k]
+            z = angular / p[of.MOMENTS + k]
             y[4 + k] += h * damping_functions(z * h)[0] * (rate - z * y[4 + k])
-        if p[TRANSLATES] != 0.0:
+        if p[of.TRANSLATES] != 0.0:
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 

@@ -12,13 +12,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate
-from ..problem import (
-    ACCELERATION_ADDED,
-    ACCELERATION_BODY,
-    DAMPING_LINEAR,
-    MOMENTS,
-    TRANSLATES,
-)
+from .. import problem as of
 from .equations import torque
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 from .midpoint_spin import (
@@ -49,7 +43,7 @@ def _change_of_momentum(
 @njit(cache=True, error_model="numpy")
 def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> bool:
     """One step from y into out; returns whether the iteration converged."""
-    A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    A, B, C = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
     wx, wy, wz = y[4], y[5], y[6]
     ox, oy, oz = wx, wy, wz
     change = 0.0
@@ -68,8 +62,8 @@ def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> bool:
     kx, ky, kz = _change_of_momentum(y, ox, oy, oz, p, h)
     out[4], out[5], out[6] = wx + kx / A, wy + ky / B, wz + kz / C
     out[0], out[1], out[2], out[3] = cayley_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
-    if p[TRANSLATES] != 0.0:
-        F, G, c = ACCELERATION_BODY, ACCELERATION_ADDED, p[DAMPING_LINEAR]
+    if p[of.TRANSLATES] != 0.0:
+        F, G, c = of.ACCELERATION_BODY, of.ACCELERATION_ADDED, p[of.DAMPING_LINEAR]
         mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
         push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
         for k in range(3):

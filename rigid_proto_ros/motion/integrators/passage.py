@@ -22,17 +22,7 @@ from ...base.compilation import njit
 from ...base.elementary import inverse_tangent, logarithm
 from ...base.rotation import multiply, normalize, rotate_inverse
 from ...base.simd import filled, load, number
-from ..problem import (
-    ATTACH,
-    BILATERAL,
-    HAND_VELOCITY,
-    HAS_STRING,
-    MASS,
-    MOMENTS,
-    REST_LENGTH,
-    STIFFNESS,
-    STRING_DAMPING,
-)
+from .. import problem as of
 from ..string import NO_DIRECTION
 from ..variables import HAND_WORK, HEAT, LOW, SPIN
 from .equations import accelerations
@@ -64,7 +54,7 @@ _MOST_TURN = 0.1
 @njit(cache=True, error_model="numpy")
 def may_pass(p: np.ndarray) -> bool:
     """Whether the string is one that pushes at no length."""
-    return p[HAS_STRING] != 0.0 and p[BILATERAL] != 0.0 and p[REST_LENGTH] != 0.0
+    return p[of.HAS_STRING] != 0.0 and p[of.BILATERAL] != 0.0 and p[of.REST_LENGTH] != 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -75,7 +65,7 @@ def before_passage(c: np.ndarray, p: np.ndarray, degree: int, knot: Knot, h: flo
     ax, ay, az, length, _ = knot
     vx, vy, vz = c[1, A_KNOT], c[1, A_KNOT + 1], c[1, A_KNOT + 2]
     square = vx * vx + vy * vy + vz * vz
-    speed, shortest = math.sqrt(square), NO_DIRECTION * p[REST_LENGTH]
+    speed, shortest = math.sqrt(square), NO_DIRECTION * p[of.REST_LENGTH]
     if speed > 0.0 and length <= FARTHEST * speed:
         nearest = -(ax * vx + ay * vy + az * vz) / square
         bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest
@@ -167,7 +157,7 @@ def _impulse(knot: tuple[float, ...], p: np.ndarray, h: float, J: np.ndarray) ->
         path += 0.5 * b * b * across
         turn = end * across_last - start * across_first - (after - before) / square - across_first * h
     path = (path - before * h) / square
-    k, c, push = p[STIFFNESS], p[STRING_DAMPING], p[STIFFNESS] * p[REST_LENGTH]
+    k, c, push = p[of.STIFFNESS], p[of.STRING_DAMPING], p[of.STIFFNESS] * p[of.REST_LENGTH]
     a, v = (ax, ay, az), (vx, vy, vz)
     for i in range(3):
         damped = c * (v[i] * along_twice + miss[i] * across_twice)
@@ -190,20 +180,20 @@ def pass_by(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> None:
     # The impulse turns the body as it lies halfway.
     mx, my, mz, mw = multiply(*q, 0.25 * h * w[0], 0.25 * h * w[1], 0.25 * h * w[2], 1.0)
     mx, my, mz, mw = normalize(mx, my, mz, mw)
-    e, g, r = (ex, ey, ez), (gx, gy, gz), (p[ATTACH], p[ATTACH + 1], p[ATTACH + 2])
+    e, g, r = (ex, ey, ez), (gx, gy, gz), (p[of.ATTACH], p[of.ATTACH + 1], p[of.ATTACH + 2])
     kicks = np.zeros((2, 3))
     for i in range(2):
         fx, fy, fz = rotate_inverse(mx, my, mz, mw, J[i, 0], J[i, 1], J[i, 2])
-        kicks[i, 0] = (r[1] * fz - r[2] * fy) / p[MOMENTS]
-        kicks[i, 1] = (r[2] * fx - r[0] * fz) / p[MOMENTS + 1]
-        kicks[i, 2] = (r[0] * fy - r[1] * fx) / p[MOMENTS + 2]
+        kicks[i, 0] = (r[1] * fz - r[2] * fy) / p[of.MOMENTS]
+        kicks[i, 1] = (r[2] * fx - r[0] * fz) / p[of.MOMENTS + 1]
+        kicks[i, 2] = (r[0] * fy - r[1] * fx) / p[of.MOMENTS + 2]
     out[:] = start
     turn = np.zeros(3)
     for i in range(3):
         turn[i] = h * (w[i] + 0.5 * h * e[i]) + kicks[1, i]
         out[4 + i] = w[i] + h * e[i] + kicks[0, i]
-        moved_pair(start, out, 7 + i, LOW + 4 + i, h * (u[i] + 0.5 * h * g[i]) + J[1, i] / p[MASS])
-        out[10 + i] = u[i] + h * g[i] + J[0, i] / p[MASS]
+        moved_pair(start, out, 7 + i, LOW + 4 + i, h * (u[i] + 0.5 * h * g[i]) + J[1, i] / p[of.MASS])
+        out[10 + i] = u[i] + h * g[i] + J[0, i] / p[of.MASS]
     # exp of half the turn, less 1: a few nanoseconds' turn needs few terms.
     x = turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2
     s, less = 0.5 - x * (1.0 / 48.0 - x / 3840.0), -x * (0.125 - x * (1.0 / 384.0 - x / 46080.0))
@@ -213,6 +203,6 @@ def pass_by(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> None:
     moved_pair(start, out, 2, LOW + 2, qz)
     moved_pair(start, out, 3, LOW + 3, qw)
     unit_attitude(out)
-    work = J[0, 0] * p[HAND_VELOCITY] + J[0, 1] * p[HAND_VELOCITY + 1] + J[0, 2] * p[HAND_VELOCITY + 2]
+    work = J[0, 0] * p[of.HAND_VELOCITY] + J[0, 1] * p[of.HAND_VELOCITY + 1] + J[0, 2] * p[of.HAND_VELOCITY + 2]
     out[HAND_WORK] += work
     out[HEAT] += heat

@@ -14,14 +14,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import normalize
-from ..problem import (
-    DAMPING_ANGULAR,
-    GYROSCOPIC,
-    HAS_WORLD_TORQUE,
-    MOMENTS,
-    TORQUE_BODY,
-    TRANSLATES,
-)
+from .. import problem as of
 from .equations import added_acceleration, angular_acceleration, torque
 from .integrator import (
     ANGULAR_DAMPING,
@@ -59,7 +52,7 @@ def _rates(
 ) -> _Ten:
     """Time derivatives of q, ω and the added velocity u."""
     nx, ny, nz, nw = qx, qy, qz, qw
-    if translate or p[HAS_WORLD_TORQUE] != 0.0:
+    if translate or p[of.HAS_WORLD_TORQUE] != 0.0:
         # Stages leave the unit sphere by O(h²); directions of loads must not grow with them.
         nx, ny, nz, nw = normalize(qx, qy, qz, qw)
     tx, ty, tz = torque(nx, ny, nz, nw, wx, wy, wz, p)
@@ -94,9 +87,9 @@ def _sum(y: _Ten, k: _Ten, c: float) -> _Ten:
 @njit(cache=True, error_model="numpy")
 def rk4_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    if p[TRANSLATES] == 0.0 and p[HAS_WORLD_TORQUE] == 0.0:
+    if p[of.TRANSLATES] == 0.0 and p[of.HAS_WORLD_TORQUE] == 0.0:
         return _turning_steps(y, p, h, n)
-    translate = p[TRANSLATES] != 0.0
+    translate = p[of.TRANSLATES] != 0.0
     half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
     # Variables stay out of the array, so that what p holds is read once and not in every step.
     u0: _Ten = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12])
@@ -161,8 +154,8 @@ def _moved(u: _Seven, k: _Seven, c: float) -> _Seven:
 @njit(cache=True, error_model="numpy")
 def _turning_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """The same where translation is closed form and no load hangs on the attitude: a fifth of the time."""
-    a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
-    T, g, d = TORQUE_BODY, p[GYROSCOPIC], p[DAMPING_ANGULAR]
+    a, b, c = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
+    T, g, d = of.TORQUE_BODY, p[of.GYROSCOPIC], p[of.DAMPING_ANGULAR]
     k = (
         *(p[T] / a, p[T + 1] / b, p[T + 2] / c),
         *(d / a, d / b, d / c),

@@ -30,19 +30,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.elementary import cube_root
-from ..problem import (
-    ACCELERATION_BODY,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    GYROSCOPIC,
-    HAS_WORLD_TORQUE,
-    LENGTH,
-    MOMENT,
-    MOMENTS,
-    TORQUE_BODY,
-    TORQUE_WORLD,
-    TRANSLATES,
-)
+from .. import problem as of
 from ..variables import SPIN
 from . import control as ctl
 from .averaged_loads import DIRECT, averaged_error
@@ -84,9 +72,10 @@ def _length(p: np.ndarray, at: int, count: int) -> float:
 @njit(cache=True, error_model="numpy")
 def _strongest(p: np.ndarray) -> float:
     """κ [rad/s²]: no attitude gives the loads a larger angular acceleration."""
-    x, y, z = p[TORQUE_BODY] / p[MOMENTS], p[TORQUE_BODY + 1] / p[MOMENTS + 1], p[TORQUE_BODY + 2] / p[MOMENTS + 2]
-    turning = _length(p, TORQUE_WORLD, 3) + math.sqrt(2.0) * _length(p, MOMENT, 9)
-    return math.sqrt(x * x + y * y + z * z) + turning / p[MOMENTS]
+    T, I = of.TORQUE_BODY, of.MOMENTS
+    x, y, z = p[T] / p[I], p[T + 1] / p[I + 1], p[T + 2] / p[I + 2]
+    turning = _length(p, of.TORQUE_WORLD, 3) + math.sqrt(2.0) * _length(p, of.MOMENT, 9)
+    return math.sqrt(x * x + y * y + z * z) + turning / p[I]
 
 
 @njit(cache=True, error_model="numpy")
@@ -110,7 +99,7 @@ def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
     strongest, spin = _strongest(p), _length(y, SPIN, 3)
     h = ctl.LONGEST
     if strongest > 0.0:
-        rate, distance = circulation(p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2], y[4], y[5], y[6])
+        rate, distance = circulation(p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2], y[4], y[5], y[6])
         allowed = accuracy / strongest
         # The last one is for a spin that the loads have stopped: |ω| is κh then.
         resolved = min(RESOLVED / spin, math.sqrt(2.0 * allowed / spin), cube_root(allowed / strongest))
@@ -119,8 +108,8 @@ def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
         h = max(resolved, short, long)
         known = (1.0 + SPREAD + SPREAD_AT_SEPARATRIX / distance) * strongest
         h = min(max(h, _averaged(y, p, accuracy, strongest, known)), ctl.LONGEST)
-    if p[TRANSLATES] != 0.0:
-        h = min(h, accuracy * p[LENGTH] / _length(p, ACCELERATION_BODY, 3))
+    if p[of.TRANSLATES] != 0.0:
+        h = min(h, accuracy * p[of.LENGTH] / _length(p, of.ACCELERATION_BODY, 3))
     return h
 
 
@@ -128,13 +117,13 @@ def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
 def splitting_pays(p: np.ndarray, y: np.ndarray, accuracy: float) -> bool:
     """Whether loads are so weak against the spin that steps are cheaper than those of a series."""
     spin = _length(y, SPIN, 3)
-    if p[GYROSCOPIC] == 0.0 or p[DAMPING_ANGULAR] != 0.0 or accuracy < ROUNDING * spin:
+    if p[of.GYROSCOPIC] == 0.0 or p[of.DAMPING_ANGULAR] != 0.0 or accuracy < ROUNDING * spin:
         return False
     # What a kick adds to the velocity may be wrong altogether.
-    force_shows = p[DAMPING_LINEAR] != 0.0 or 2.0 * _length(p, ACCELERATION_BODY, 3) > accuracy * p[LENGTH]
-    if p[TRANSLATES] != 0.0 and force_shows:
+    force_shows = p[of.DAMPING_LINEAR] != 0.0 or 2.0 * _length(p, of.ACCELERATION_BODY, 3) > accuracy * p[of.LENGTH]
+    if p[of.TRANSLATES] != 0.0 and force_shows:
         return False
-    least = TURN_THAT_PAYS_IN_WORLD if p[HAS_WORLD_TORQUE] != 0.0 else TURN_THAT_PAYS
+    least = TURN_THAT_PAYS_IN_WORLD if p[of.HAS_WORLD_TORQUE] != 0.0 else TURN_THAT_PAYS
     return spin * step_length(y, p, accuracy) >= least
 
 

@@ -8,20 +8,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ..problem import (
-    ATTACH,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    HAS_STRING,
-    MASS,
-    MOMENT,
-    MOMENTS,
-    STIFFNESS,
-    STRING_DAMPING,
-    TORQUE_BODY,
-    TORQUE_WORLD,
-    TRANSLATES,
-)
+from .. import problem as of
 
 STIFF_RATE = 2e4
 """/s; slower damping leaves explicit steps of 75 µs and more, so that even they are far faster than the clock."""
@@ -47,27 +34,27 @@ def damping_and_motion(p: np.ndarray, y: np.ndarray, taut: bool) -> tuple[float,
     [rad/s]. taut: the string counts.
     """
     spin = math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])
-    smallest = p[MOMENTS]
-    angular, fastest, motion = p[DAMPING_ANGULAR], 0.0, spin
+    smallest = p[of.MOMENTS]
+    angular, fastest, motion = p[of.DAMPING_ANGULAR], 0.0, spin
     if angular > 0.0:
         torque = 0.0
         for k in range(3):
-            torque += abs(p[TORQUE_BODY + k]) + abs(p[TORQUE_WORLD + k])
+            torque += abs(p[of.TORQUE_BODY + k]) + abs(p[of.TORQUE_WORLD + k])
         for k in range(9):
-            torque += abs(p[MOMENT + k])
+            torque += abs(p[of.MOMENT + k])
         # Where damping is stiff the spin is soon what the torque keeps up.
         motion += torque / angular
-        if spin > 0.0 or torque > 0.0 or p[HAS_STRING] != 0.0:
+        if spin > 0.0 or torque > 0.0 or p[of.HAS_STRING] != 0.0:
             fastest = angular / smallest
-    if p[TRANSLATES] != 0.0:
-        fastest = max(fastest, p[DAMPING_LINEAR])
-    if taut and p[HAS_STRING] != 0.0:
-        arm = p[ATTACH] ** 2 + p[ATTACH + 1] ** 2 + p[ATTACH + 2] ** 2
-        lightness = 1.0 / p[MASS] + arm / smallest
-        swing, damping = math.sqrt(p[STIFFNESS] * lightness), p[STRING_DAMPING] * lightness
+    if p[of.TRANSLATES] != 0.0:
+        fastest = max(fastest, p[of.DAMPING_LINEAR])
+    if taut and p[of.HAS_STRING] != 0.0:
+        arm = p[of.ATTACH] ** 2 + p[of.ATTACH + 1] ** 2 + p[of.ATTACH + 2] ** 2
+        lightness = 1.0 / p[of.MASS] + arm / smallest
+        swing, damping = math.sqrt(p[of.STIFFNESS] * lightness), p[of.STRING_DAMPING] * lightness
         if damping > OVERDAMPED * swing:
             fastest = max(fastest, damping)
-            motion += p[STIFFNESS] / p[STRING_DAMPING]
+            motion += p[of.STIFFNESS] / p[of.STRING_DAMPING]
         else:
             motion += swing
     return fastest, motion
@@ -87,7 +74,7 @@ def damping_is_stiff(p: np.ndarray, y: np.ndarray, taut: bool) -> bool:
 def implicit_effort(p: np.ndarray, y: np.ndarray, taut: bool) -> tuple[float, float]:
     """Steps, and evaluations of the equations of motion, that a second takes where damping is stiff, about."""
     _, motion = damping_and_motion(p, y, taut)
-    if p[DAMPING_ANGULAR] / p[MOMENTS + 2] > STIFF_RATE:
+    if p[of.DAMPING_ANGULAR] / p[of.MOMENTS + 2] > STIFF_RATE:
         motion -= math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6])  # soon gone
-    steps = motion / (RADIANS_ON_A_STRING if taut and p[HAS_STRING] != 0.0 else RADIANS)
+    steps = motion / (RADIANS_ON_A_STRING if taut and p[of.HAS_STRING] != 0.0 else RADIANS)
     return steps, steps * EVALUATIONS

@@ -15,13 +15,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ..problem import (
-    BILATERAL,
-    HAS_STRING,
-    REST_LENGTH,
-    STIFFNESS,
-    STRING_DAMPING,
-)
+from .. import problem as of
 from .equations import knot as moving_knot
 from .first_root import NONE, first_rise
 from .knot import Knot, knot_and_stretch
@@ -52,13 +46,13 @@ _NEGLIGIBLE = 1e-19
 @njit(cache=True, error_model="numpy")
 def is_one_sided(p: np.ndarray) -> bool:
     """Whether the string's law may change at all."""
-    return p[HAS_STRING] != 0.0 and p[BILATERAL] == 0.0
+    return p[of.HAS_STRING] != 0.0 and p[of.BILATERAL] == 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def knot_at(y: np.ndarray, p: np.ndarray) -> Knot:
     """The knot of a string at variables y; zeros where none is tied."""
-    if p[HAS_STRING] == 0.0:
+    if p[of.HAS_STRING] == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     return knot_and_stretch(y, p)
 
@@ -75,7 +69,7 @@ def law_of(y: np.ndarray, p: np.ndarray, knot: Knot) -> float:
         y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p
     )
     rate = (ax * vx + ay * vy + az * vz) / length
-    return PULLS if p[STIFFNESS] * x + p[STRING_DAMPING] * rate > 0.0 else SHORTENS
+    return PULLS if p[of.STIFFNESS] * x + p[of.STRING_DAMPING] * rate > 0.0 else SHORTENS
 
 
 @njit(cache=True, error_model="numpy")
@@ -98,7 +92,7 @@ def next_law(
                 g[k] = -c[k, TENSION] * power
                 power *= h
             g[0] = min(g[0], 0.0)
-            time, after = first_rise(g, degree - 1), SHORTENS if p[STRING_DAMPING] > 0.0 else SLACK
+            time, after = first_rise(g, degree - 1), SHORTENS if p[of.STRING_DAMPING] > 0.0 else SLACK
             told = time if time == NONE else time * h
         else:
             time, after = _stops_shortening(c, p, degree, h, g)
@@ -111,7 +105,7 @@ def next_law(
 @njit(cache=True, error_model="numpy")
 def _tautens(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> float:
     """When |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
-    rest = p[REST_LENGTH]
+    rest = p[of.REST_LENGTH]
     reach, power, last = c[0, DISTANCE], 1.0, 0
     for k in range(1, degree + 1):
         power *= h
@@ -161,7 +155,7 @@ def _stops_shortening(c: np.ndarray, p: np.ndarray, degree: int, h: float, g: np
     power = 1.0
     for k in range(degree):
         x = c[k, DISTANCE] if k > 0 else c[0, STRETCH]
-        g[k] = (p[STIFFNESS] * x + p[STRING_DAMPING] * (k + 1) * c[k + 1, DISTANCE]) * power
+        g[k] = (p[of.STIFFNESS] * x + p[of.STRING_DAMPING] * (k + 1) * c[k + 1, DISTANCE]) * power
         power *= end
     g[0] = min(g[0], 0.0)
     pulls = first_rise(g, degree - 1)
@@ -173,7 +167,7 @@ def _stops_shortening(c: np.ndarray, p: np.ndarray, degree: int, h: float, g: np
 @njit(cache=True, error_model="numpy")
 def _converges(c: np.ndarray, p: np.ndarray, degree: int, t: float, tolerance: float) -> bool:
     """Whether the series of the knot's distance gives the tension that the motion's series give."""
-    stiffness, damping = p[STIFFNESS], p[STRING_DAMPING]
+    stiffness, damping = p[of.STIFFNESS], p[of.STRING_DAMPING]
     tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0
     for k in range(1, degree + 1):
         slope = damping * k * c[k, DISTANCE] * power

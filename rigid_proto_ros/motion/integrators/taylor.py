@@ -15,16 +15,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import Packed, arranged, component, filled, half, joined, largest, load, number, paired, store
-from ..problem import (
-    ACCELERATION_ADDED,
-    ACCELERATION_BODY,
-    DAMPING_ANGULAR,
-    DAMPING_LINEAR,
-    GYROSCOPIC,
-    MOMENTS,
-    TORQUE_BODY,
-    TRANSLATES,
-)
+from .. import problem as of
 from .error_measure import scales_of
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, MAX_SPEED, Integrator
 from .stepping import fixed_steps
@@ -96,16 +87,16 @@ def scales_at(variables: Packed, p: np.ndarray, elapsed: float) -> tuple[float, 
 @njit(cache=True, error_model="numpy")
 def series(variables: Packed, p: np.ndarray, degree: int, c: np.ndarray) -> None:
     """Coefficients c (degree + 1, COLUMNS) of the motion from these variables: q, ω, d, u."""
-    translates = p[TRANSLATES] != 0.0
-    moments = _triple(p, MOMENTS, 1.0)
+    translates = p[of.TRANSLATES] != 0.0
+    moments = _triple(p, of.MOMENTS, 1.0)
     gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) / moments
-    gyroscopic = gyroscopic * p[GYROSCOPIC]
-    cw, cv = p[DAMPING_ANGULAR] / moments, p[DAMPING_LINEAR]
-    bx, by, bz = _spread(_triple(p, ACCELERATION_BODY, 0.0))
+    gyroscopic = gyroscopic * p[of.GYROSCOPIC]
+    cw, cv = p[of.DAMPING_ANGULAR] / moments, p[of.DAMPING_LINEAR]
+    bx, by, bz = _spread(_triple(p, of.ACCELERATION_BODY, 0.0))
     zeros, eight = _four(0.0), filled(0.0, 8)
     q, w, d, u = (component(variables, 0), component(variables, 1), component(variables, 2), component(variables, 3))
     # What is constant counts in the first order alone.
-    turning, pushing = _triple(p, TORQUE_BODY, 0.0) / moments, _triple(p, ACCELERATION_ADDED, 0.0)
+    turning, pushing = _triple(p, of.TORQUE_BODY, 0.0) / moments, _triple(p, of.ACCELERATION_ADDED, 0.0)
     q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
     yzx0, zxy0 = gyroscopic * arranged(w, (1, 2, 0, 3)), gyroscopic * arranged(w, (2, 0, 1, 3))
     row = 0
