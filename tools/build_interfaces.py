@@ -5,12 +5,15 @@ libraries, but not ament_cmake, which colcon would need.
     python tools/build_interfaces.py interfaces/rigid_proto_interfaces [MORE ...] [--out FOLDER]
 
 A package comes behind those that it uses. Each becomes a Python package in FOLDER, by default among those of the environment.
-Needs a C and a C++ compiler.
+Needs a C and a C++ compiler. What can't be built ends in one line and status 2; the compiler's or generator's own words stand
+above it.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import shutil
 import subprocess
@@ -35,8 +38,8 @@ RUNTIME = (
 )
 
 
-def main() -> None:
-    """Build the packages in turn."""
+def main() -> int:
+    """Build the packages in turn; 2 when one can't be built, with the reason in one line on stderr."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("packages", type=Path, nargs="+", help="folders with package.xml and msg, srv or action")
     parser.add_argument("--out", type=Path, default=Path(sysconfig.get_path("platlib")), help="where they are to lie")
@@ -46,26 +49,55 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as work:
         built: list[Package] = []
         for folder in options.packages:
-            package = Package(folder.resolve(), Path(work), options.out.resolve())
-            package.generate([b.share.parent for b in built])
-            package.compile(built)
-            built.append(package)
-            print(f"{package.name}: {package.python}")
+            try:
+                built.append(built_package(folder.resolve(), Path(work), options.out.resolve(), built))
+            except BuildError as error:
+                print(f"build_interfaces: {folder}: {' '.join(str(error).split())}", file=sys.stderr)
+                return 2
+            print(f"{built[-1].name}: {built[-1].python}")
+    return 0
+
+
+class BuildError(Exception):
+    """Why a package can't be built, in one line."""
+
+
+def built_package(folder: Path, work: Path, out: Path, others: list[Package]) -> Package:
+    """The package, built and moved to ``out`` when it is whole; raises BuildError."""
+    if missing := [name for name in ("cc", "c++") if shutil.which(name) is None]:
+        raise BuildError(f"no {' and no '.join(missing)} found; accepted: a C and a C++ compiler (apt: g++)")
+    package = Package(folder, work)
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said):
+            package.generate([other.share.parent for other in others])
+    except Exception as error:  # rosidl's parsers and generators raise many kinds
+        reason = f"a package that isn't here: {error}" if isinstance(error, KeyError) else str(error)
+        raise BuildError(f"rosidl refuses its interfaces: {reason}") from error
+    package.compile(others)
+    package.move_to(out)
+    return package
 
 
 class Package:
-    """One package: its folder, the generated sources below ``work``, and what is installed below ``out``."""
+    """One package: its folder, and the generated sources below ``work``."""
 
-    def __init__(self, folder: Path, work: Path, out: Path) -> None:
-        name = ElementTree.parse(folder / "package.xml").getroot().findtext("name")
-        assert name
+    def __init__(self, folder: Path, work: Path) -> None:
+        try:
+            name = ElementTree.parse(folder / "package.xml").getroot().findtext("name")
+        except (OSError, ElementTree.ParseError) as error:
+            raise BuildError(f"package.xml: {error}") from None
+        if not name:
+            raise BuildError("package.xml: no <name>")
+        if not any(_relative(folder, f"{kind}/*.{kind}") for kind in KINDS):
+            raise BuildError("no msg/*.msg, srv/*.srv or action/*.action in it")
         self.name = name
         self.folder = folder
         self.share = work / "share" / name
         # Two generators write files of the same names.
         self.sources, self.introspection = work / name / "c", work / name / "introspection"
         self.objects = work / name / "objects"
-        self.python = out / name
+        self.python = work / "python" / name
 
     def generate(self, others: list[Path]) -> None:
         """IDL, type descriptions, C and Python sources. others: folders with the IDL of packages built before."""
@@ -94,8 +126,6 @@ class Package:
         dispatch.generate(self.name, idl, include, sources)
         GenerateFastRTPSCTypesupport("fastrtps_c").generate(self.name, idl, include, sources)
         GenerateIntrospectionCTypesupport("introspection_c").generate(self.name, idl, include, introspection)
-        if self.python.exists():
-            shutil.rmtree(self.python)
         GeneratePython("py").generate(self.name, idl, include, self.python)
         (self.python / "__init__.py").touch()
 
@@ -125,17 +155,34 @@ class Package:
             objects = [self._object(file, flags) for file in sorted(files)]
             # All of them are loaded with the module: then rmw finds the libraries by their names.
             link = ["c++", "-shared", f"-Wl,-soname,{name}", "-Wl,--no-as-needed", *rpath, "-o", python / name]
-            subprocess.run([*map(str, (*link, *objects, *made, *libraries))], check=True)
+            _run([*map(str, (*link, *objects, *made, *libraries))])
             made.append(python / name)
         for source in (*python.rglob("*.c"),):
             source.unlink()
+
+    def move_to(self, out: Path) -> None:
+        """Put the package where Python finds it, in the place of one that is there."""
+        target = out / self.name
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            shutil.rmtree(target, ignore_errors=True)
+            shutil.move(str(self.python), str(target))
+        except OSError as error:
+            raise BuildError(f"{target}: {error.strerror or error}") from None
+        self.python = target
 
     def _object(self, source: Path, flags: list[str]) -> Path:
         made = self.objects / f"{len(list(self.objects.glob('*')))}_{source.name}.o"
         made.parent.mkdir(parents=True, exist_ok=True)
         compiler = ["c++", "-std=c++17"] if source.suffix == ".cpp" else ["cc", "-std=gnu11"]
-        subprocess.run([*compiler, "-O1", "-fPIC", "-c", str(source), "-o", str(made), *flags], check=True)
+        _run([*compiler, "-O1", "-fPIC", "-c", str(source), "-o", str(made), *flags])
         return made
+
+
+def _run(command: list[str]) -> None:
+    """Run a compiler, whose words stand on stderr above the one line."""
+    if status := subprocess.run(command, check=False).returncode:
+        raise BuildError(f"{command[0]} ended with status {status}")
 
 
 def _relative(folder: Path, pattern: str) -> list[str]:
@@ -144,4 +191,4 @@ def _relative(folder: Path, pattern: str) -> list[str]:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -5,17 +5,25 @@ options say in the ``frame_id`` of a WrenchStamped, each in a field of its own.
 
 from __future__ import annotations
 
+import importlib.util
 from typing import Any
 
+from ..base.errors import InputError
 from ..base.rotation import Vector
 
 
 def body_wrench_type() -> type | None:
-    """The message's type, or None where its package isn't installed."""
-    try:
-        from rigid_proto_interfaces.msg import BodyWrench
-    except ImportError:
+    """The message's type, or None where its package isn't installed. Raises InputError for one that can't be loaded."""
+    if importlib.util.find_spec("rigid_proto_interfaces") is None:
         return None
+    try:
+        from rclpy.type_support import check_for_type_support
+        from rigid_proto_interfaces.msg import BodyWrench
+
+        check_for_type_support(BodyWrench)
+    except Exception as error:  # whatever a half-built package raises
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError("rigid_proto_interfaces", reason, "a whole build (`make interfaces`), or none") from None
     return BodyWrench
 
 

@@ -234,7 +234,7 @@ class CommandIntake:
         try:
             if message.refusal is not None:
                 raise message.refusal
-            times = [self._effective(entry.t_ns) for entry in message.entries]
+            times = [self._effective(entry.t_ns, listed=True) for entry in message.entries]
         except CommandRefused as refusal:
             simulation.refuse(refusal, message.count)
             return message.count
@@ -250,9 +250,10 @@ class CommandIntake:
         self._count_stamps(counter, 1)
         return when_ns
 
-    def _effective(self, stamp_ns: int) -> tuple[int, str]:
+    def _effective(self, stamp_ns: int, listed: bool = False) -> tuple[int, str]:
         horizon_ns = nanoseconds(self._loop.scenario.parameters.schedule_horizon)
-        return effective_time(stamp_ns, self._loop.simulation.time_ns, time.time_ns(), horizon_ns)
+        offset_ns = 0 if listed else self._loop.stamps.offset_ns
+        return effective_time(stamp_ns, self._loop.simulation.time_ns, time.time_ns(), horizon_ns, offset_ns)
 
     def _count_stamps(self, counter: str, count: int) -> None:
         if counter == "late":
@@ -266,26 +267,27 @@ class CommandIntake:
                 )
 
 
-def effective_time(stamp_ns: int, now_ns: int, wall_ns: int, horizon_ns: int) -> tuple[int, str]:
+def effective_time(stamp_ns: int, now_ns: int, wall_ns: int, horizon_ns: int, offset_ns: int = 0) -> tuple[int, str]:
     """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
 
     Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day of
     the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
-    (``stamp``).
+    (``stamp``). offset_ns: how far stamps are ahead of simulated time.
     """
     if stamp_ns == 0:
         return now_ns, ""
-    if stamp_ns <= now_ns:
-        return now_ns, "late" if stamp_ns < now_ns else ""
-    if stamp_ns <= now_ns + horizon_ns:
-        return stamp_ns, ""
+    time_ns = stamp_ns - offset_ns
+    if time_ns <= now_ns:
+        return now_ns, "late" if time_ns < now_ns else ""
+    if time_ns <= now_ns + horizon_ns:
+        return time_ns, ""
     if abs(stamp_ns - wall_ns) <= DAY_NS:
         return now_ns, "wall_stamp"
     raise CommandRefused(
         "stamp",
         "header.stamp",
         f"{stamp_ns / 1e9:.9g} s",
-        f"0, or simulated time up to {horizon_ns / 1e9:g} s (schedule_horizon) after {now_ns / 1e9:.9g} s",
+        f"0, or time up to {horizon_ns / 1e9:g} s (schedule_horizon) after {(now_ns + offset_ns) / 1e9:.9g} s",
     )
 
 

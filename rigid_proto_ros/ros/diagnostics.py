@@ -70,6 +70,7 @@ class Diagnostics:
         refused = dict(simulation.refused)
         return {
             "sim_time_ns": time_ns,
+            "stamp_offset_ns": loop.stamps.offset_ns,
             "publish_rate": loop.scenario.parameters.publish_rate,
             "overruns": timekeeping.overruns,
             "real_time_lost_s": timekeeping.real_time_lost_s,

@@ -162,7 +162,7 @@ class EntityServices:
         simulation = self._loop.simulation
         state, (linear, angular) = self._call(lambda: (simulation.state, simulation.accelerations()))
         message.header.frame_id = self._world_frame
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.time_ns, 1_000_000_000)
+        message.header.stamp.sec, message.header.stamp.nanosec = self._loop.stamps.of(state.time_ns)
         _fill(message.pose.position, state.position)
         q = message.pose.orientation
         q.x, q.y, q.z, q.w = state.orientation_xyzw.tolist()

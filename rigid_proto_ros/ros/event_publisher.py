@@ -21,6 +21,7 @@ from ..motion.loads import Load
 from ..simulation.commands import WrenchCommand
 from ..simulation.observer import BodySnapshot, Observer
 from . import qos
+from .pacing import Stamps
 from .robot_description import RobotDescription
 from .static_frames import StaticFrames
 
@@ -31,7 +32,14 @@ WARNING_S = 1.0
 class EventPublisher(Observer):
     """An observer that publishes; its methods run on the physics thread, and are rare."""
 
-    def __init__(self, node: Node, body_frame: str, mesh_path: Callable[[], str], static_frames: StaticFrames) -> None:
+    def __init__(
+        self,
+        node: Node,
+        body_frame: str,
+        mesh_path: Callable[[], str],
+        static_frames: StaticFrames,
+        stamps: Stamps,
+    ) -> None:
         def publisher(message_type: type, topic: str, profile: QoSProfile) -> Publisher:
             return node.create_publisher(
                 message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE
@@ -39,6 +47,7 @@ class EventPublisher(Observer):
 
         self._logger = node.get_logger()
         self._static_frames = static_frames
+        self._stamps = stamps
         self._body_frame = body_frame
         self._mesh_frame = f"{body_frame}/mesh"
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
@@ -55,7 +64,7 @@ class EventPublisher(Observer):
     def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
         """The latched inertia: COM in scaled mesh coordinates, tensor about it in mesh axes."""
         message = InertiaStamped()
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+        message.header.stamp.sec, message.header.stamp.nanosec = self._stamps.of(time_ns)
         message.header.frame_id = self._mesh_frame
         inertia, I = message.inertia, body.inertia
         inertia.m = body.mass
@@ -71,7 +80,9 @@ class EventPublisher(Observer):
         of point, axes, slot and duration stands in its event.
         """
         if self._applied.get_subscription_count():
-            self._applied.publish(applied_bytes(time_ns, self._body_frame, load, body, attitude))
+            self._applied.publish(
+                applied_bytes(time_ns + self._stamps.offset_ns, self._body_frame, load, body, attitude)
+            )
 
     def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002 (an observer gets it)
         """A warning, for what is refused when it comes and for what turns out impossible when it is to act.

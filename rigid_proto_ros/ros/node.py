@@ -25,6 +25,7 @@ from .command_intake import CommandIntake
 from .diagnostics import Diagnostics
 from .event_publisher import EventPublisher
 from .live_parameters import LiveParameters
+from .pacing import Stamps
 from .parameter_server import declare_parameters
 from .physics_thread import PhysicsThread
 from .services import Services
@@ -55,12 +56,13 @@ class RigidBodyNode(Node):
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
         frames = frame_names(scenario.parameters, self.get_name())
-        static_frames = StaticFrames(self, frames, scenario.setup.contacts)
-        events = EventPublisher(self, frames[1], self._mesh_path, static_frames)
+        stamps = Stamps(self._followed_clock(scenario))
+        static_frames = StaticFrames(self, frames, scenario.setup.contacts, stamps)
+        events = EventPublisher(self, frames[1], self._mesh_path, static_frames, stamps)
         self._watchers = Watchers(
             self.get_name(), events, make_viewer(scenario, self.get_name()), self._recording_failed
         )
-        self.states = StatePublisher(self, *frames, self._specific_force)
+        self.states = StatePublisher(self, *frames, self._specific_force, stamps)
         self.states.configure(scenario.parameters)
         self.loop = SimulationLoop(
             scenario,
@@ -68,7 +70,7 @@ class RigidBodyNode(Node):
             self.states.publish,
             self._take_commands,
             self._motion_failed,
-            self._followed_clock(scenario),
+            stamps,
             self.states.find_subscribers,
             lambda: self._watchers.are_there,
         )

@@ -35,6 +35,20 @@ MAX_LAG_NS = 250_000_000
 
 
 @dataclass
+class Stamps:
+    """What messages are stamped by. clock() gives nanoseconds of a clock that simulated time follows instead of the
+    wall's; offset_ns: how far stamps are ahead of simulated time, 0 without such a clock.
+    """
+
+    clock: Callable[[], int] | None = None
+    offset_ns: int = 0
+
+    def of(self, time_ns: int) -> tuple[int, int]:
+        """Seconds and nanoseconds that stamp a simulated time."""
+        return divmod(time_ns + self.offset_ns, 1_000_000_000)
+
+
+@dataclass
 class Timekeeping:
     """overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up."""
 
@@ -135,6 +149,11 @@ class Pace:
         self.anchored_ns = self.followed() if self.followed else -(-time.monotonic_ns() // TICK_NS) * TICK_NS
         self._last_reading_ns = self.anchored_ns
         self._anchor_simulated_ns = simulated_ns
+
+    @property
+    def offset_ns(self) -> int:
+        """How far the followed clock was ahead of simulated time at the anchor; 0 while there is none."""
+        return self.anchored_ns - self._anchor_simulated_ns if self.followed and self.anchored_ns else 0
 
     def present_ns(self, reached_ns: int, next_publication_ns: int, timekeeping: Timekeeping) -> int:
         """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted."""

@@ -120,14 +120,19 @@ class ScriptSender(Node):
             self._call(self._pause_client, SetBool.Request(data=True))
             self._call(self._reset_client, Trigger.Request())
             start_ns = 0
-        else:
-            start_ns = self._now_ns() + nanoseconds(lead_s)
+        if self.parameter("use_sim_time"):
+            # It stamps by a /clock, by another offset since the reset.
+            reports = self._reports
+            self._spin_until(lambda: self._reports >= reports + 2, f"reports of {self.target}")
+        offset_ns = int(self._counters.get("stamp_offset_ns", 0))
+        if not reset:
+            start_ns = self._now_ns() - offset_ns + nanoseconds(lead_s)
         sent = dict.fromkeys(self._topics, 0)
         horizon_s = self.parameter("schedule_horizon")
         horizon_ns = nanoseconds(DEFAULT_HORIZON_S if horizon_s is None else float(horizon_s))
         paused = reset
         number = 0
-        for message in outgoing(script, start_ns):
+        for message in outgoing(script, start_ns, offset_ns):
             if paused and message.time_ns > horizon_ns:
                 self._confirm(number)
                 self._call(self._pause_client, SetBool.Request(data=False))
@@ -199,7 +204,7 @@ class ScriptSender(Node):
             self._refusals.append(message.msg)
 
     def _now_ns(self) -> int:
-        """Simulated time of a state published from now on."""
+        """The stamp of a state published from now on."""
         stamps: list[int] = []
 
         def on_pose(message: PoseStamped) -> None:

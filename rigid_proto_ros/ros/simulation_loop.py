@@ -14,7 +14,7 @@ from ..scene.scenario import Scenario, nanoseconds
 from ..scene.scenario_run import ScenarioRun
 from ..simulation.observer import Observer
 from ..simulation.setup import Setup
-from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Timekeeping, WorkBudget, publications_until
+from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Stamps, Timekeeping, WorkBudget, publications_until
 
 ACTIVE_DRAIN_NS = 500_000
 """Between publications at most this often, while commands come in [ns of wall time]."""
@@ -39,7 +39,7 @@ class SimulationLoop(ScenarioRun):
     anybody_listens() says whether publications reach a subscriber, is_viewed() whether a recording or viewer takes the
     states. For these alone states are made in bundles, whenever commands are taken; for nobody none is made, and the
     body crosses the time between two such moments at once. on_failure(message) is called when the motion stopped in its
-    last good state. followed_clock() gives nanoseconds of a clock that simulated time follows instead of the wall's.
+    last good state. Stamps are those of a clock that is followed from the start, a reset and the end of a pause on.
     """
 
     def __init__(
@@ -49,12 +49,13 @@ class SimulationLoop(ScenarioRun):
         publish: Callable[[State], None],
         take_commands: Callable[[int, bool], bool],
         on_failure: Callable[[str], None],
-        followed_clock: Callable[[], int] | None = None,
+        stamps: Stamps | None = None,
         anybody_listens: Callable[[], bool] = lambda: True,
         is_viewed: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__(scenario, observer)
         self.timekeeping = Timekeeping(paused=scenario.parameters.start_paused)
+        self.stamps = stamps or Stamps()
         self._publish = publish
         self._take_commands = take_commands
         self._on_failure = on_failure
@@ -63,7 +64,7 @@ class SimulationLoop(ScenarioRun):
         self._is_viewed = is_viewed
         self._budget = WorkBudget()
         self._publications = Publications(scenario.parameters.publish_rate)
-        self._pace = Pace(scenario.parameters.real_time_factor, followed_clock)
+        self._pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self._steps_left = 0
         self._steps_requested = 0
         self._commands_come = False
@@ -74,7 +75,8 @@ class SimulationLoop(ScenarioRun):
         self._caught_up = True
         self._end_ns: int | None = None
         self._on_end: Callable[[], None] = lambda: None
-        self._anchor()
+        self._pace.anchor(0)
+        self._begin_anew()
 
     def end_at(self, time_ns: int, on_end: Callable[[], None]) -> None:
         """Stop when simulated time reaches ``time_ns``, and call on_end()."""
@@ -98,7 +100,8 @@ class SimulationLoop(ScenarioRun):
             self._publications.find_after(self.simulation.time_ns)
         if scenario.parameters.real_time_factor != self._pace.factor:
             self._pace.factor = scenario.parameters.real_time_factor
-            self._anchor()
+            if not self._pace.followed:
+                self._anchor()
         return setup
 
     def watch(self, observer: Observer) -> None:
@@ -117,7 +120,7 @@ class SimulationLoop(ScenarioRun):
             self._end_steps()
             self.simulation.log("pause", {"data": paused})
             self.simulation.notify_status(paused)
-            self._anchor()
+            self._anchor(stamps_stay=paused)
 
     def take_commands(self) -> None:
         """Take all commands that have arrived."""
@@ -253,6 +256,9 @@ class SimulationLoop(ScenarioRun):
     def _tick_paused(self) -> None:
         if self.stepping:
             self._step_on()
+        if self._pace.followed and not self._pace.anchored_ns:
+            # A /clock that had not begun when the pause did.
+            self._anchor()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
         self._commands_come = self._take_commands(now_ns, False)
@@ -300,9 +306,17 @@ class SimulationLoop(ScenarioRun):
 
     # Time
 
-    def _anchor(self) -> None:
+    def _anchor(self, stamps_stay: bool = False) -> None:
         self._pace.anchor(self.simulation.time_ns)
+        if not stamps_stay:
+            self._follow_stamps()
         self._begin_anew()
+
+    def _follow_stamps(self) -> None:
+        """Stamps are the followed clock's from now on; the log keeps how far they are ahead of simulated time."""
+        if self._pace.offset_ns != self.stamps.offset_ns:
+            self.stamps.offset_ns = self._pace.offset_ns
+            self.simulation.log("clock", {"offset_ns": self.stamps.offset_ns})
 
     def _begin_anew(self) -> None:
         """Everything that goes by the wall clock is due from now on."""
@@ -315,6 +329,7 @@ class SimulationLoop(ScenarioRun):
         anchored_ns = self._pace.anchored_ns
         present_ns = self._pace.present_ns(self.simulation.time_ns, self._publications.next_ns, self.timekeeping)
         if self._pace.anchored_ns != anchored_ns:
+            self._follow_stamps()
             self._begin_anew()
         return present_ns
 

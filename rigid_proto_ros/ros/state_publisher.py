@@ -29,6 +29,7 @@ from ..scene.sensor_noise import (
     sensor_noise,
 )
 from . import qos
+from .pacing import Stamps
 
 Topics = list[tuple[Publisher, Callable[[int, list[float]], Any]]]
 """A publisher, and how its message is made from time and state."""
@@ -40,8 +41,16 @@ class StatePublisher:
     specific_force() gives what an accelerometer at the chosen contact shows at the present state.
     """
 
-    def __init__(self, node: Node, world_frame: str, body_frame: str, specific_force: Callable[[], np.ndarray]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        world_frame: str,
+        body_frame: str,
+        specific_force: Callable[[], np.ndarray],
+        stamps: Stamps,
+    ) -> None:
         self._node = node
+        self._stamps = stamps
         self._specific_force = specific_force
         self._frames = world_frame, body_frame
 
@@ -105,6 +114,9 @@ class StatePublisher:
         for _, message in self._topics():
             message(state.time_ns, state.row.tolist())
 
+    def _stamp_ns(self, time_ns: int) -> int:
+        return time_ns + self._stamps.offset_ns
+
     def _with_noise(self, topic: str, time_ns: int, row: list[float]) -> list[float]:
         """The state (13,) with its noise."""
         return row if self._noise is None else self._noise.measured(topic, time_ns, row)
@@ -120,20 +132,21 @@ class StatePublisher:
 
     def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
         row = self._with_noise("pose", time_ns, row)
-        return bytes(self._pose_template.pack(time_ns, row[:7]))
+        return bytes(self._pose_template.pack(self._stamp_ns(time_ns), row[:7]))
 
     def _twist_message(self, time_ns: int, row: list[float]) -> bytes:
         row = self._with_noise("twist", time_ns, row)
-        return bytes(self._twist_template.pack(time_ns, [*row[7:10], *rotate(*row[3:7], *row[10:13])]))
+        return bytes(self._twist_template.pack(self._stamp_ns(time_ns), [*row[7:10], *rotate(*row[3:7], *row[10:13])]))
 
     def _odom_message(self, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
         row = self._with_noise("odom", time_ns, row)
-        self._odom_template.pack(time_ns, row[:7])
+        stamp_ns = self._stamp_ns(time_ns)
+        self._odom_template.pack(stamp_ns, row[:7])
         for at, covariance in self._odom_covariances(time_ns):
-            self._odom_template.pack(time_ns, covariance, at=at)
+            self._odom_template.pack(stamp_ns, covariance, at=at)
         v_body = rotate(-row[3], -row[4], -row[5], row[6], *row[7:10])
-        return bytes(self._odom_template.pack(time_ns, [*v_body, *row[10:13]], at=cdr.ODOMETRY_TWIST_AT))
+        return bytes(self._odom_template.pack(stamp_ns, [*v_body, *row[10:13]], at=cdr.ODOMETRY_TWIST_AT))
 
     def _odom_covariances(self, time_ns: int) -> list[tuple[int, list[float]]]:
         """Numbers of the doubles where the two covariances (36,) begin, and they, where they aren't what was there."""
@@ -153,7 +166,7 @@ class StatePublisher:
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
         message = Imu()
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+        message.header.stamp.sec, message.header.stamp.nanosec = self._stamps.of(time_ns)
         message.header.frame_id = self._frames[1]
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
         o.x, o.y, o.z, o.w = self._with_noise("pose", time_ns, row)[3:7]
@@ -169,7 +182,7 @@ class StatePublisher:
 
     def _transform(self, time_ns: int, row: list[float]) -> Any:
         transform = TransformStamped()
-        transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+        transform.header.stamp.sec, transform.header.stamp.nanosec = self._stamps.of(time_ns)
         transform.header.frame_id, transform.child_frame_id = self._frames
         t, r = transform.transform.translation, transform.transform.rotation
         # Where the body is drawn: without noise.

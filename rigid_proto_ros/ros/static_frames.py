@@ -19,6 +19,7 @@ from ..motion.body import Body
 from ..motion.frames import Frame, parse_frame
 from ..simulation.observer import BodySnapshot
 from . import qos
+from .pacing import Stamps
 
 MOST_LINKS = 100
 """Of a chain of frames; longer ones go in a circle."""
@@ -54,9 +55,10 @@ class _Transform(NamedTuple):
 class StaticFrames:
     """frames: what the node calls world and body. contacts: in mesh coordinates, by name."""
 
-    def __init__(self, node: Node, frames: tuple[str, str], contacts: Mapping[str, Vector]) -> None:
+    def __init__(self, node: Node, frames: tuple[str, str], contacts: Mapping[str, Vector], stamps: Stamps) -> None:
         self._world, self._body = frames
         self._contacts = contacts
+        self._stamps = stamps
         self._links: dict[str, _Transform] = {}
         self._publisher: Any = None
         try:
@@ -77,7 +79,7 @@ class StaticFrames:
         transforms = []
         for name, origin in origins.items():
             transform = TransformStamped()
-            transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(time_ns, 1_000_000_000)
+            transform.header.stamp.sec, transform.header.stamp.nanosec = self._stamps.of(time_ns)
             transform.header.frame_id, transform.child_frame_id = self._body, f"{self._body}/{name}"
             translation = transform.transform.translation
             translation.x, translation.y, translation.z = (x + 0.0 for x in origin)

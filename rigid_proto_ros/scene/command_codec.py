@@ -44,7 +44,7 @@ Changing = Callable[[Mapping], Setup]
 MESH_FRAME = "body/mesh"
 """Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
 
-MARKS = ("reset", "pause", "step", "timeout")
+MARKS = ("reset", "pause", "step", "timeout", "clock")
 """Events that stand in the log and don't act on the body."""
 
 KINDS = (
@@ -402,10 +402,11 @@ class Outgoing:
     time_ns: int
 
 
-def outgoing(script: list[ScriptCommand], start_ns: int = 0) -> Iterator[Outgoing]:
+def outgoing(script: list[ScriptCommand], start_ns: int = 0, offset_ns: int = 0) -> Iterator[Outgoing]:
     """The messages of a script in order of time: commands of one instant go as one list, so that they act in its order.
 
     What no entry can say goes after them by a message of its own, and so does all that follows it at that instant.
+    offset_ns: how far the stamps of messages are ahead of simulated time, in which entries are.
     """
     for t_ns, group in groupby(script, key=lambda command: command.t_ns):
         commands, time_ns = list(group), start_ns + t_ns
@@ -422,4 +423,8 @@ def outgoing(script: list[ScriptCommand], start_ns: int = 0) -> Iterator[Outgoin
             text = flow(entries, quoted=True)
             yield Outgoing("schedule", cdr.string(text), tuple(commands[: len(entries)]), time_ns)
         for command in commands[len(entries) :]:
-            yield Outgoing(command.topic, command.message(time_ns), (command,), time_ns)
+            yield Outgoing(command.topic, _stamped(command, time_ns, offset_ns), (command,), time_ns)
+
+
+def _stamped(command: ScriptCommand, time_ns: int, offset_ns: int) -> bytes:
+    return command.message(time_ns if command.topic == "schedule" else time_ns + offset_ns)

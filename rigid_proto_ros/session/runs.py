@@ -39,12 +39,17 @@ def session_runs(content: McapContent, path: Path, node: str = "") -> list[Recor
     prefix = _prefix(content, str(path), node)
     events = [(log, read_string(data, f"{prefix}/events")) for log, data in _messages(content, prefix, "events")]
     scenes = [(log, read_string(data, f"{prefix}/scene")) for log, data in _messages(content, prefix, "scene")]
-    states = {name: _states(content, prefix, name) for name in PROJECTIONS}
+    decoded = [decode_event(line, number) for number, (_, line) in enumerate(events, 1)]
+    clocks = [
+        (log, time_ns, content.get("offset_ns", 0))
+        for (log, _), (time_ns, kind, content) in zip(events, decoded, strict=True)
+        if kind == "clock"
+    ]
+    states = {name: _states(content, prefix, name, clocks) for name in PROJECTIONS}
     states = {name: found for name, found in states.items() if len(found[0])}
     # A topic without messages may be whole: nobody did anything. A latched one is never without.
     there = {"scene": bool(scenes), "events": f"{prefix}/events" in content.types, "pose": bool(states)}
     missing = [f"{prefix}/{name}" for name, is_there in there.items() if not is_there]
-    decoded = [decode_event(line, number) for number, (_, line) in enumerate(events, 1)]
     resets = [log for (log, _), (_, kind, _) in zip(events, decoded, strict=True) if kind == "reset"]
     if not events and states:
         resets = _log_times_of_restarts(next(iter(states.values())))
@@ -120,12 +125,26 @@ def _messages(content: McapContent, prefix: str, name: str) -> list[tuple[int, b
     return sorted(content.messages.get(f"{prefix}/{name}", []), key=lambda message: message[0])
 
 
-def _states(content: McapContent, prefix: str, name: str) -> tuple[np.ndarray, StampedRows]:
+def _states(
+    content: McapContent, prefix: str, name: str, clocks: list[tuple[int, int, int]]
+) -> tuple[np.ndarray, StampedRows]:
+    """When a topic's states were logged, and they; clocks: as ``_simulated`` takes them."""
     messages = _messages(content, prefix, name)
     read = [read_state(name, data, f"{prefix}/{name}") for _, data in messages]
     logs = np.array([log for log, _ in messages], dtype=np.int64)
     rows = np.array([row for _, row in read], dtype=float)
-    return logs, StampedRows(np.array([stamp for stamp, _ in read], dtype=np.int64), rows)
+    times = [_simulated(stamp, log, clocks) for log, (stamp, _) in zip(logs.tolist(), read, strict=True)]
+    return logs, StampedRows(np.array(times, dtype=np.int64), rows)
+
+
+def _simulated(stamp_ns: int, log: int, clocks: list[tuple[int, int, int]]) -> int:
+    """Simulated time of a stamp. clocks: when the log was told of another offset of stamps, simulated time and offset
+    then; the last one counts that may have been in force.
+    """
+    for told, time_ns, offset_ns in reversed(clocks):
+        if told < log + RESET_WINDOW_NS and stamp_ns >= time_ns + offset_ns:
+            return stamp_ns - offset_ns
+    return stamp_ns
 
 
 def _log_times_of_restarts(state: tuple[np.ndarray, StampedRows]) -> list[int]:

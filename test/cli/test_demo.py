@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-from ros_process import run
+from ros_process import SOURCE, from_source, run
 
 pytest.importorskip("rclpy")
 pytest.importorskip("rerun")
@@ -76,3 +78,15 @@ def test_an_open_mesh_is_refused_in_one_line_that_names_what_helps(ros_environme
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "mesh_repair" in line
+
+
+@pytest.mark.stress
+def test_what_the_set_up_compiles_is_all_that_the_first_flight_needs(ros_environment, tmp_path):
+    environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    for part in ("integrators", "flight"):
+        command = [sys.executable, str(SOURCE / "requirements" / "compile_kernels.py"), part]
+        subprocess.run(command, env=from_source(environment), check=True)
+    compiled = sorted((tmp_path / "kernels").rglob("*.nbc"))
+    done = run("rigid_proto", "demo", "--out", tmp_path / "out", environment=environment)
+    assert done.returncode == 0 and "compiling" not in done.stderr, done.stderr
+    assert compiled and sorted((tmp_path / "kernels").rglob("*.nbc")) == compiled

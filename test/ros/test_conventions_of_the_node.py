@@ -19,6 +19,7 @@ PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs", "Imu": "sensor_msgs"}
 KEYS = (
     *(
         "sim_time_ns",
+        "stamp_offset_ns",
         "publish_rate",
         "overruns",
         "real_time_lost_s",

@@ -13,6 +13,7 @@ from command_rig import stamp_ns, wrench_message
 from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.mesh.reading import load_mesh
+from rigid_proto_ros.ros.pacing import Stamps
 from rigid_proto_ros.scene.scenario import make_scenario
 
 SECOND = 10**9
@@ -109,7 +110,7 @@ def test_the_transform_is_the_pose(monkeypatch):
     monkeypatch.setitem(sys.modules, "tf2_msgs", SimpleNamespace(msg=messages))
     monkeypatch.setitem(sys.modules, "tf2_msgs.msg", messages)
     node = SimpleNamespace(create_publisher=publisher)
-    states = StatePublisher(node, "world", "body", lambda: np.zeros(3))
+    states = StatePublisher(node, "world", "body", lambda: np.zeros(3), Stamps())
     states.configure(Parameters(publish_tf=True))
     state = State(3 * SECOND + 7, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
     states.pack_all(state)

@@ -18,6 +18,7 @@ from geometry_msgs.msg import TransformStamped
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.loads import resolve_load
+from rigid_proto_ros.ros.pacing import Stamps
 from rigid_proto_ros.scene.command_codec import frame_names
 from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -49,7 +50,7 @@ def static(monkeypatch):
         create_subscription=lambda _type, _topic, callback, _qos: heard.append(callback),
     )
     scenario = make_scenario({"mesh": "hammer", "scale": 2.0, "contacts.face": [0.1, 0.0, 0.3]})
-    frames = StaticFrames(node, ("odom", "base_link"), scenario.setup.contacts)
+    frames = StaticFrames(node, ("odom", "base_link"), scenario.setup.contacts, Stamps())
     return frames, scenario.setup, published, lambda *links: heard[0](SimpleNamespace(transforms=list(links)))
 
 

@@ -18,8 +18,9 @@ from command_rig import RosClient
 from ros_process import READY_S, SOURCE, running_node
 
 from rigid_proto_ros.base.bundled import scene_path
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import Frame, parse_frame
-from rigid_proto_ros.ros.body_wrenches import frame_of
+from rigid_proto_ros.ros.body_wrenches import body_wrench_type, frame_of
 
 PACKAGE = SOURCE / "interfaces" / "rigid_proto_interfaces"
 BUILDER = SOURCE / "tools" / "build_interfaces.py"
@@ -106,3 +107,41 @@ def test_a_node_that_finds_the_package_takes_its_messages_as_it_takes_wrenches(r
         assert client.trigger("step")["success"]
         frames = {"world@tip;slot=left", "body@vertex/3;duration=0.5", ";impulse"}
         client.until(lambda: frames == {e["content"].get("frame_id") for e in client.events()} - {None}, "its events")
+
+
+XML = "<package><name>some_interfaces</name></package>"
+REFUSED = {
+    "no folder": ({}, "package.xml: "),
+    "broken xml": ({"package.xml": "<package"}, "package.xml: "),
+    "nothing in it": ({"package.xml": XML}, "no msg/"),
+    "a bad line": ({"package.xml": XML, "msg/Foo.msg": "float64 Bad Name = 3\n"}, "invalid"),
+    "unknown type": ({"package.xml": XML, "msg/Foo.msg": "other_msgs/Thing thing\n"}, "other_msgs"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_package_that_cannot_be_built_ends_in_one_line(tmp_path, case) -> None:
+    files, reason = REFUSED[case]
+    for name, text in files.items():
+        (tmp_path / "some" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "some" / name).write_text(text)
+    arguments = [str(tmp_path / "some"), "--out", str(tmp_path / "out")]
+    done = subprocess.run([sys.executable, str(BUILDER), *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert str(tmp_path / "some") in done.stderr and reason in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_build_that_cannot_be_loaded_is_refused_in_one_line(tmp_path, monkeypatch) -> None:
+    package = tmp_path / "rigid_proto_interfaces" / "msg"
+    package.mkdir(parents=True)
+    (package.parent / "__init__.py").touch()
+    (package / "__init__.py").write_text("class BodyWrench:\n    pass\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name in [name for name in sys.modules if name.startswith("rigid_proto_interfaces")]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(InputError, match="make interfaces") as caught:
+        body_wrench_type()
+    assert "\n" not in str(caught.value)
+    for name in [name for name in sys.modules if name.startswith("rigid_proto_interfaces")]:
+        del sys.modules[name]

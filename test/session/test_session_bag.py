@@ -7,6 +7,7 @@ import json
 import random
 import re
 import shutil
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -111,6 +112,35 @@ def test_states_of_the_two_runs_are_told_apart_by_their_stamps(flown, tmp_path):
             assert (np.diff(rows.times) >= 0).all()
             assert rows.times[-1] >= SECOND * 7 // 4
             assert rows.times[0] < SECOND // 4
+
+
+def test_states_stamped_by_a_clock_are_read_in_simulated_time(flown, tmp_path):
+    offsets = iter((1000 * SECOND, 1003 * SECOND))
+    offset_ns, messages = next(offsets), []
+    for message in flown:
+        if message.topic.endswith(("pose", "twist", "odom")):
+            sec, nanosec = divmod(stamp_of(message.data) + offset_ns, SECOND)
+            message = replace(message, data=message.data[:4] + struct.pack("<iI", sec, nanosec) + message.data[12:])
+        elif message.topic.endswith("events"):
+            begins = '"kind":"reset"' in read_string(message.data, "").replace(" ", "")
+            if begins or not any(m.topic.endswith("events") for m in messages):
+                offset_ns = next(offsets) if begins else offset_ns
+                line = json.dumps({"time_ns": 0, "kind": "clock", "content": {"offset_ns": offset_ns}})
+                early = replace(message, data=cdr.string(line), log_time=messages[0].log_time)
+                messages += [message, replace(early, log_time=message.log_time)] if begins else [early, message]
+                continue
+        messages.append(message)
+    LAYOUTS["bare"](tmp_path / "plain", flown)
+    LAYOUTS["bare"](tmp_path / "clock", messages)
+    for plain, by_clock in zip(*(read_runs(tmp_path / f"{name}.mcap") for name in ("plain", "clock")), strict=True):
+        for name, rows in plain.published.items():
+            np.testing.assert_array_equal(by_clock.published[name].times, rows.times)
+
+
+def stamp_of(data: bytes) -> int:
+    """The header's stamp [ns] in a message's bytes."""
+    sec, nanosec = struct.unpack_from("<iI", data, 4)
+    return sec * SECOND + nanosec
 
 
 def test_the_second_run_begins_with_the_scene_in_force_at_its_reset(flown, tmp_path):

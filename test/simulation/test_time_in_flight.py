@@ -202,7 +202,9 @@ def test_clock_is_published_on_request_with_the_states_stamps(rig):
 
 
 def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_environment, tmp_path):
-    """From where it is when first heard; no time is lost or overrun when it goes in leaps; set back, time goes on."""
+    """From where it is when first heard; no time is lost or overrun when it goes in leaps; set back, time goes on.
+    Stamps are its time, those of commands too.
+    """
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
         node = NodeProcess(
@@ -210,8 +212,9 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
         )
         client = RosClient(environment)
         try:
-            client.listen("pose")
+            client.listen("pose", "events")
             client.watch_diagnostics()
+            client.advertise("poke", "schedule")
             client.do("advertise", topic="/clock", type="Clock", depth=1)
 
             clock = {"ns": 0}
@@ -244,6 +247,9 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
             assert report()["sim_time_ns"] == "0"
             tick(start + 500 * MS)
             reaches(500 * MS)
+            client.publish("poke", wrench_message(start + 700 * MS, "world;impulse", (1e-3, 0.0, 0.0)))
+            client.schedule("{t: 0.8, impulse: [1.0e-3, 0, 0]}")
+            client.until(lambda: tick(clock["ns"]) and report()["commands_received"] == "2", "two commands")
             tick(start + 1234 * MS)
             reaches(1234 * MS)
             tick(start + 100 * MS)
@@ -253,7 +259,18 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
             last = report()
             assert (last["overruns"], last["real_time_lost_s"]) == ("0", "0.0")
             stamps = [stamp_ns(m) for m in client.heard("pose")]
-            assert [s for s in stamps if s] == [k * 10 * MS for k in range(1, 144)]
+            # /clock's time, set back with it; at 0 before it was heard.
+            later = start + 100 * MS - 1234 * MS
+            wanted = [start + k * 10 * MS for k in range(124)] + [later + k * 10 * MS for k in range(124, 144)]
+            assert [s for s in stamps if s not in (0, start)] == wanted[1:]
+            assert last["stamp_offset_ns"] == str(later)
+            found = [(e["kind"], e["time_ns"], e["content"].get("offset_ns")) for e in client.events()]
+            assert found == [
+                ("clock", 0, start),
+                ("poke", 700 * MS, None),
+                ("poke", 800 * MS, None),
+                ("clock", 1234 * MS, later),
+            ]
         finally:
             client.close()
             assert node.stop() == 0
