@@ -21,7 +21,7 @@ from .arguments import NODE_NAME, given_arguments, read_bodies, remapped_node_na
 from .diagnostics import Reports
 from .node import RigidBodyNode
 from .physics_thread import PhysicsThread
-from .warm_up import warm_up
+from .warm_up import IntegratorsCompiling, warm_up
 
 
 class Bodies:
@@ -53,10 +53,17 @@ class Bodies:
             rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rclpy's own error types differ between versions
             raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
-        with notify_when_compiling(_print_that_it_compiles):
+        integrators = IntegratorsCompiling()
+
+        def begin_compiling() -> None:
+            print("rigid_body_node: compiling kernels, at the first start only; about 40 s ...", file=sys.stderr)
+            integrators.begin()
+
+        with notify_when_compiling(begin_compiling):
             # What the command line gives is for all of them, and comes after the files.
             for name, values in (bodies or {NODE_NAME: {}}).items():
                 self._nodes.append(RigidBodyNode(self._physics, {**values, **given}, _make_viewer, name))
+            integrators.wait(self._nodes[0].loop.scenario.setup)
             for node in self._nodes:
                 node.states.pack_all(warm_up(node.loop.scenario.setup))
                 if self._until_s is not None:
@@ -136,10 +143,6 @@ def _make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
 def _asked_for(name: str, port: int) -> int | None:
     """None for a default port, which may move to the next free one."""
     return None if port == PARAMETERS[name].default else port
-
-
-def _print_that_it_compiles() -> None:
-    print("rigid_body_node: compiling kernels, at the first start only ...", file=sys.stderr)
 
 
 def _described(scenario: Scenario) -> str:

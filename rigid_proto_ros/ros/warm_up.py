@@ -1,13 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""Kernels compiled, or loaded from the cache, before a command waits for them."""
+"""Kernels compiled, or loaded from the cache, before a command waits for them.
+
+``python -m rigid_proto_ros.ros.warm_up`` compiles auto's integrators and ends.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 
 from ..base.errors import CommandRefused
 from ..motion.frames import parse_frame
+from ..motion.integrators import INTEGRATORS, auto
+from ..motion.integrators.stepping import method_table, provide_kernel
 from ..motion.state import State
+from ..motion.string import StringSettings
 from ..scene.scenario import Scenario
 from ..simulation.commands import Command, MoveString, WrenchCommand
 from ..simulation.setup import Setup
@@ -46,3 +60,62 @@ def warm_up_change(before: Scenario, after: Scenario) -> None:
                 warm_up(new)
             except CommandRefused:
                 pass  # what acts when the change is made decides whether it is refused, and that is counted
+
+
+def compile_flight(setup: Setup) -> None:
+    """Compile what every flight needs under any integrator: a body of this setup rests, and no integrator is called."""
+    at_rest = setup.initial.copy()
+    at_rest[7:13] = 0.0
+    resting = replace(
+        setup,
+        initial=at_rest,
+        gravity=np.zeros(3),
+        string=StringSettings(),
+        thrusters={},
+        in_flight=None,
+        gyroscopic=True,
+        integrator=INTEGRATORS["auto"],
+    )
+    Simulation(resting).advance(1_000_000)
+
+
+def compile_integrators() -> None:
+    """Compile auto's integrators but for stiff strings and damping, which the first flight with them compiles."""
+    table = method_table(auto.AUTO, 0)
+    for kind in (auto.STEADY, auto.FREE, auto.TURNING_LOADS, auto.ANY_LOADS, auto.WEAK_LOADS):
+        provide_kernel(auto.AUTO, table, kind)
+
+
+class IntegratorsCompiling:
+    """``compile_integrators`` in a process of its own. It shares few kernels with ``compile_flight`` and takes about as
+    long, so that a first start with both side by side takes little more than half as long.
+    """
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def begin(self) -> None:
+        """Start the process, where there is a second core for it."""
+        if len(os.sched_getaffinity(0)) < 2:
+            return
+        folder = str(Path(__file__).resolve().parents[2])
+        paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "rigid_proto_ros.ros.warm_up"],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,  # what it doesn't compile, this process will, and says what is wrong
+        )
+
+    def wait(self, setup: Setup) -> None:
+        """Compile what flies this setup meanwhile; returns when both are done, at once where nothing was begun."""
+        if self._process is not None:
+            compile_flight(setup)
+            self._process.wait()
+
+
+if __name__ == "__main__":
+    # Linux: SIGTERM when the thread that started it ends, so that a node that is killed leaves nothing running.
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+    compile_integrators()

@@ -17,6 +17,9 @@ SILENT_S = 2.5
 SLOW = 0.1
 """Share of a second of real time that may be lost before it is worth a word: eyes don't see less."""
 
+QUICK_START_S = 4.0
+"""[s] A node whose kernels are compiled already is there within this time."""
+
 SHOWN_S = 8.0
 """[s] That a trouble is shown: long enough to be read."""
 
@@ -29,6 +32,7 @@ class Status:
         self._last: Mapping[str, str] = {}
         self._heard_s = -1e9
         self._silent_since = ""
+        self._waits_from_s: float | None = None
         self._troubles: dict[str, float] = {}
 
     def report(self, values: Mapping[str, str], now_s: float) -> None:
@@ -52,6 +56,8 @@ class Status:
 
     def text(self, now_s: float, doing: str = "") -> str:
         """What stands on the page at ``now_s`` [s, monotonic]; doing: what the page is busy with."""
+        if not self._last:
+            return self._waiting(now_s)
         if self.silent(now_s):
             return self._gone()
         self._silent_since = ""
@@ -66,9 +72,18 @@ class Status:
         warnings = [last["warning"]] if last.get("warning") else []
         return "".join([text, *(f"  \n⚠ {said}" for said in (*warnings, *self._troubles))])
 
-    def _gone(self) -> str:
-        if not self._last and not self._silent_since:
+    def _waiting(self, now_s: float) -> str:
+        if self._waits_from_s is None:
+            self._waits_from_s = now_s
+        waited_s = now_s - self._waits_from_s
+        if waited_s < QUICK_START_S:
             return f"waiting for `{self._target}` …"
+        return (
+            f"waiting for `{self._target}` since {waited_s:.0f} s …  \n"
+            "At the first start it compiles its kernels, which takes about a minute."
+        )
+
+    def _gone(self) -> str:
         self._silent_since = self._silent_since or time.strftime("%H:%M:%S")
         return (
             f"⚠ **`{self._target}` has ended, or hangs: no message since {self._silent_since}.** The picture shows its "

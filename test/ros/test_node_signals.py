@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """SIGINT and SIGTERM end every command with status 0, a complete recording and no orphan."""
 
+import os
 import signal
 import time
 
 import pytest
 from conftest import needs_rerun
-from ros_process import RosProcess, alive, catches, descendants, running_node
+from ros_process import READY_S, RosProcess, alive, catches, descendants, running_node
 
 from rigid_proto_ros.rerun_view.reader import read_session
 
@@ -70,6 +71,14 @@ def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path
     environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     node = RosProcess("rigid_body_node", environment=environment, log=tmp_path / "node")
     node.wait_for("compiling kernels")
+    deadline = time.monotonic() + READY_S
+    while len(os.sched_getaffinity(0)) > 1 and not descendants(node.pid):
+        assert time.monotonic() < deadline, f"no process that compiles the integrators within {READY_S} s"
+        time.sleep(0.02)
+    helpers = descendants(node.pid)
     assert node.end(number, within_s=10.0) == 0, node.errors  # 59 s before
+    while any(alive(pid) for pid in helpers):
+        assert time.monotonic() < deadline, f"no end of the compiling process within {READY_S} s"
+        time.sleep(0.02)
     assert "Traceback" not in node.errors
     assert "is simulating" not in node.output + node.errors

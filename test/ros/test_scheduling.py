@@ -17,7 +17,9 @@ from rigid_proto_ros.ros import command_intake, command_queue, warm_up
 from rigid_proto_ros.ros.services import Services
 from rigid_proto_ros.ros.simulation_loop import SimulationLoop
 from rigid_proto_ros.scene import scenario
+from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation import flight_arrays
 from rigid_proto_ros.simulation.observer import Observer
 
 MS = 1_000_000
@@ -152,3 +154,13 @@ def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on
     assert rig.intake.received["schedule"] == 1
     rig.tick_until(lambda: rig.loop.scenario.parameters.mesh == "book")
     assert changed_ns == [at_ns]
+
+
+def test_the_flights_kernels_are_compiled_without_any_integrator(monkeypatch) -> None:
+    """So that at the first start another process compiles the integrators at the same time."""
+
+    def refuse(*_) -> None:
+        raise AssertionError("an integrator was compiled")
+
+    monkeypatch.setattr(flight_arrays, "provide_kernel", refuse)
+    warm_up.compile_flight(read_scene("top_on_string", {"integrator": "rk4", "linear_damping": 0.1}).setup)

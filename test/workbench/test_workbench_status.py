@@ -67,3 +67,12 @@ def test_a_node_that_is_gone_is_said_with_what_to_do_until_it_is_back() -> None:
     # Another one begins to count from 0: nothing went wrong with it.
     status.report({**CALM, "state": "paused"}, 20.0)
     assert status.text(20.0).startswith("`/rigid_body` is paused") and "⚠" not in status.text(20.0)
+
+
+def test_a_first_start_says_how_long_it_has_taken_and_what_is_done() -> None:
+    status = Status("/rigid_body")
+    status.received(0.0)  # a browser has connected; the node has said nothing yet
+    assert status.text(0.0) == "waiting for `/rigid_body` …"
+    assert "since 12 s" in status.text(12.0) and "compiles its kernels" in status.text(12.0)
+    status.report(CALM, 13.0)
+    assert "is simulating" in status.text(13.0)
