@@ -73,7 +73,7 @@ def print_report(inspection: Inspection, report: dict) -> None:
     _print_models(inspection)
     if "verification" in report:
         errors = (
-            f"{name.removesuffix('_error').replace('_', ' ')} {value:.1e}"
+            f"{name.removesuffix('_error').replace('_', ' ').replace('center', 'centre')} {value:.1e}"
             for name, value in report["verification"].items()
         )
         line(f"errors against exact rational arithmetic: {', '.join(errors)}")
@@ -86,8 +86,9 @@ def _print_models(inspection: Inspection) -> None:
         cells = [marked, f"{properties.mass:.6g}"]
         if "solid" in inspection.models and name != "solid":
             difference = inspection.difference(name)
-            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in difference.principal_moments) + " %")
-            cells.append(f"{math.degrees(difference.axes_turned):.3g}")
+            errors = shown_zero(difference.principal_moments, 1.0)
+            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in errors) + " %")
+            cells.append(f"{math.degrees(shown_zero([difference.axes_turned], 1.0)[0]):.3g}")
             offset = difference.center_of_mass_offset
             cells.append(f"{shown_zero([offset], float(np.linalg.norm(inspection.upper - inspection.lower)))[0]:.3g}")
         rows.append(tuple(cells))
@@ -200,4 +201,7 @@ def _print_expected(d: LinkDiagnosis) -> None:
         return
     center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
     line(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
-    line("  expected: ixx ixy ixz iyy iyz izz " + " ".join(f"{value:.9g}" for value in six))
+    line(
+        "  expected: ixx ixy ixz iyy iyz izz "
+        + " ".join(f"{value:.9g}" for value in shown_zero(six, max(map(abs, six))))
+    )

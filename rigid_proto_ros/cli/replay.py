@@ -122,7 +122,9 @@ def _print_how_to_view(args: argparse.Namespace) -> None:
     newest = args.record or args.repair or args.session
     if newest.endswith(".rrd"):
         print(f"  show it with: rerun {newest}")
-    elif not args.record:
+    elif args.record:
+        print(f"  recorded: {args.record}")
+    else:
         print(f"  to show it, convert it for Rerun: rigid_proto replay {newest} --record FILE.rrd")
 
 

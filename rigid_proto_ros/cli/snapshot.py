@@ -58,6 +58,7 @@ def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]
 
     with Progress("drawing") as progress:
         take_picture(recording, args.at, args.output, args.view, size, progress.fraction)
+    print(f"wrote {args.output}")
 
 
 def _drawn(args: argparse.Namespace, folder: Path) -> Path:

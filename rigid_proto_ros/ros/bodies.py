@@ -56,7 +56,7 @@ class Bodies:
         integrators = IntegratorsCompiling()
 
         def begin_compiling() -> None:
-            print("rigid_body_node: compiling kernels, at the first start only; about 40 s ...", file=sys.stderr)
+            print("rigid_body_node: compiling kernels, at the first start only; up to a minute ...", file=sys.stderr)
             integrators.begin()
 
         with notify_when_compiling(begin_compiling):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -187,7 +187,7 @@ def _expand(
         if entry["service"] != "clear_wrench":
             raise InputError(f"{where}, service", entry["service"], "clear_wrench")
         return [ScriptCommand(t_ns, "clear_wrench")]
-    _check_keys(entry, _TIMING_KEYS | _POKE_KEYS, where)
+    _check_keys(entry, _TIMING_KEYS | _POKE_KEYS, where, ENTRY_KEYS["other"] - {"script"})
     return [_poke(entry, t_ns, where)]
 
 
@@ -316,11 +316,13 @@ def _checked_frame(frame: str, where: str) -> str:
     return frame
 
 
-def _check_keys(entry: dict, known: set, where: str) -> None:
+def _check_keys(entry: dict, known: set, where: str, others: Set[str] = frozenset()) -> None:
+    """others: keys of other kinds of entries, one of which may be meant."""
     unknown = [str(key) for key in entry if key not in known]
     if unknown:
-        hint = did_you_mean(unknown[0], known)
+        hint = did_you_mean(unknown[0], known | others)
         keys = f"the keys here are {', '.join(sorted(known))}"
+        keys += f"; other entries have {', '.join(sorted(others))}" if others else ""
         raise InputError(where, f"there is no key {', '.join(unknown)}; {' '.join(filter(None, [hint, keys]))}")
 
 

@@ -191,7 +191,7 @@ class ReadoutPanel:
                 ("|L|", f"{length:.5g} {MOMENTUM_UNIT}"),
                 ("drift of L's direction", f"{angle if angle > ROUNDING else 0.0:.3g}{ANGLE_UNIT}"),
                 ("|ω|", f"{spin:.4g} {OMEGA_UNIT}"),
-                ("ω₁ ω₂ ω₃", " ".join(f"{x:.3g}" for x in w)),
+                ("ω₁ ω₂ ω₃", " ".join(f"{x:.3g}" for x in w) + f" {OMEGA_UNIT}"),
                 ("COM", " ".join(f"{x:.4g}" for x in state.position) + " m"),
                 *scales.items(),
             )

@@ -211,6 +211,14 @@ def test_the_printed_report_names_every_model_and_remark(capsys, tmp_path):
         assert words in out
 
 
+def test_what_rounding_left_is_0_in_the_text_and_kept_in_json(capsys):
+    _, out, _ = inspect(capsys, "hollow_box")
+    boxes = next(text for text in out.splitlines() if "bounding_box" in text)
+    assert boxes.split("%")[1].split() == ["0", "0"]  # axes turned, COM offset: 1.3e-15 degrees before
+    _, out, _ = inspect(capsys, "hollow_box", "--json")
+    assert max(abs(x) for row in json.loads(out)["inertia"] for x in row if abs(x) < 1e-9) > 0.0
+
+
 def test_trimesh_and_rerun_are_not_imported_for_an_obj():
     code = (
         "import sys; from rigid_proto_ros.cli.main import main; main(['inspect', 'book', '--json']); "

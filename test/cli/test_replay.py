@@ -22,6 +22,15 @@ def test_after_a_repair_it_says_how_to_see_the_new_file(ending, tmp_path, capsys
     assert "show it" in last and str(new) in last and str(old) not in last
 
 
+def test_what_was_written_is_named(tmp_path, capsys):
+    pytest.importorskip("mcap")
+    old, new = tmp_path / "old.mcap", tmp_path / "new.mcap"
+    assert main(["simulate", "t_handle", "--duration", "0.2", "--bag", str(old)]) == 0
+    capsys.readouterr()
+    assert main(["replay", str(old), "--record", str(new)]) == 0
+    assert f"recorded: {new}" in capsys.readouterr().out.splitlines()[-1]
+
+
 def test_however_many_commands_were_refused_few_are_listed(capsys):
     refusals = [(k * 1_000_000, f"command {k}") for k in range(5000)]
     replay._print_session("s.rrd", RecordedSession(refusals=refusals))
