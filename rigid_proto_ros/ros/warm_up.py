@@ -76,7 +76,11 @@ def compile_flight(setup: Setup) -> None:
         gyroscopic=True,
         integrator=INTEGRATORS["auto"],
     )
-    Simulation(resting).advance(1_000_000)
+    trial = Simulation(resting)
+    trial.advance(1_000_000)
+    # What a node publishes of a state.
+    trial.specific_force((0.0, 0.0, 0.0))
+    _ = trial.kinetic_energy, trial.angular_momentum
 
 
 def compile_integrators() -> None:
