@@ -45,7 +45,7 @@ EXAMPLES = (
     ),
     (
         "rigid_proto inspect --lump robot.urdf --joint elbow=0.5 --as-scene robot.yaml",
-        "the robot with its joints held, as one body to fly",
+        "the robot with its joints held, as a scene of one body",
     ),
 )
 

@@ -89,7 +89,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --lump: where a joint is held, in rad or m (default 0); may be repeated",
     )  # fmt: skip
     parser.add_argument(
-        "--as-scene", metavar="FILE.yaml", help="with --lump: write a scene that flies it, and its mesh"
+        "--as-scene", metavar="FILE.yaml", help="with --lump: write a scene that simulates it, and its mesh"
     )
 
 

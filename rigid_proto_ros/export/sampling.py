@@ -201,7 +201,7 @@ class Sampler:
             if not len(where):
                 break
             if len(times) + len(where) > LOOKS_MAX:
-                raise InputError("--tolerance", tolerance.position, f"a larger one: it takes over {LOOKS_MAX} looks")
+                raise InputError("--tolerance", tolerance.position, f"a larger one: it takes over {LOOKS_MAX} samples")
             found, ghosts_found = self.looks.at(middles)
             u = ((middles - times[where]) / (times[where + 1] - times[where]))[:, np.newaxis]
             errs = _errs(tolerance, rows[:, :POSE], where, u, found[:, :POSE])

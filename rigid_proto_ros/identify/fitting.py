@@ -310,7 +310,7 @@ def _solved(
     unknowns = work.unknowns if far else work.unknowns.physical
     problem = sh.Problem(segments, starts, work.values, unknowns)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
-        raise InputError("identify", "the first guess of the motion can't be flown; see --from and --to")
+        raise InputError("identify", "the first guess of the motion can't be simulated; see --from and --to")
     # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may
     # go.
     widths, away = problem.widths, np.full(len(problem.first), FIRST_STEP / np.sqrt(len(problem.first)))
@@ -357,7 +357,7 @@ def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, valu
     for segment, start in zip(segments, starts, strict=True):
         found = sh.departures(segment, start, values)
         if found is None:
-            raise InputError("identify", "the estimate can't be flown; see --from and --to")
+            raise InputError("identify", "the estimate can't be simulated; see --from and --to")
         for piece, departure in zip(segment.pieces, found, strict=True):
             parts.setdefault(id(piece.series), []).append(departure)
     return {key: np.concatenate(part) for key, part in parts.items()}
@@ -402,7 +402,7 @@ def _estimate(work: _Work, segments: list[sh.Segment], starts: np.ndarray) -> Es
         for segment, start in zip(segments, starts, strict=True):
             flown = sh.linearized(segment, start, work.values, work.unknowns.physical, wider=wider)
             if flown is None:
-                raise InputError("identify", "the estimate can't be flown; see --from and --to")
+                raise InputError("identify", "the estimate can't be simulated; see --from and --to")
             triangle = sh.compressed(*flown)
             # Rows that are left when the start has taken all that it can.
             parts.append(triangle[sh.START : -1, sh.START : -1])

@@ -168,7 +168,7 @@ def flown_poses(segment: Segment, start: np.ndarray, values: Values) -> tuple[np
     times, _ = _times(segment, values.offsets)
     samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
     if not good.all():
-        raise InputError("identify", "the estimate can't be flown; see --from and --to")
+        raise InputError("identify", "the estimate can't be simulated; see --from and --to")
     attitudes = samples[0, :, 3:7]
     return times, samples[0, :, :3] - rot.turned(attitudes, values.theta[mp.COM]), attitudes
 

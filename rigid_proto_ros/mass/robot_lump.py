@@ -57,7 +57,7 @@ def lump_robot(
     reached = [(link, pose) for link, pose in placed if pose is not None]
     if len(reached) < len(placed):
         lost = next(link.link for link, pose in placed if pose is None)
-        raise InputError("lump", f"link {lost!r} hangs on no other; accepted: one tree of links")
+        raise InputError("lump", f"link {lost!r} is connected to no other; accepted: one tree of links")
     heavy = [(link, pose) for link, pose in reached if not link.problem]
     properties = _together(heavy, path)
     check_tensor(properties.inertia, source=f"tensor of {path.name} as one body")

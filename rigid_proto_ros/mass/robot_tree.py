@@ -97,7 +97,7 @@ def _along_joints(links: list[str], joints: list[Element]) -> Iterator[tuple[Ele
     for joint in joints:
         parent, child = _child_name(joint, "parent"), _child_name(joint, "child")
         if child in children:
-            raise InputError("lump", f"link {child!r} hangs on two joints; accepted: joints that make a tree")
+            raise InputError("lump", f"link {child!r} is the child of two joints; accepted: joints that make a tree")
         children.add(child)
         below.setdefault(parent, []).append((joint, child))
     roots = [name for name in links if name not in children]
@@ -191,7 +191,7 @@ def _sdf_poses(root: Element, joints: Joints) -> dict[str, Pose]:
             waiting.remove(joint)
             parent, child = _child_name(joint, "parent"), _child_name(joint, "child")
             if child in poses:
-                raise InputError("lump", f"link {child!r} hangs on two joints; accepted: joints that make trees")
+                raise InputError("lump", f"link {child!r} is the child of two joints; accepted: joints that make trees")
             kind = _KINDS.get(joint.get("type", ""), OTHER)
             frame = zero[joint.get("name", "?")]
             direction = _sdf_axis(joint, frame, zero)

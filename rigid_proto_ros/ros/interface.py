@@ -119,8 +119,8 @@ INTERFACES = (
         PUBLISHED,
         "~/applied",
         "geometry_msgs/WrenchStamped",
-        "each wrench and poke when it took effect: about the COM, in the body's frame as that lay then; what its "
-        "sender said of point, axes, slot and duration stands in the line of the same time on `~/events`",
+        "each wrench and poke as it takes effect: about the COM, in the body's frame at that time; the line of the "
+        "same time on `~/events` has point, axes, slot and duration",
     ),
     _topic(
         PUBLISHED,

@@ -79,7 +79,7 @@ class Ghost:
     def _goes_without(self, reason: str) -> None:
         if self._shown and not self._refused:
             self._refused = True
-            self._observer.refused(self.simulation.time_ns, GHOST, f"the ghost goes on without a command: {reason}")
+            self._observer.refused(self.simulation.time_ns, GHOST, f"the ghost continues without a command: {reason}")
 
     def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
         """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one

@@ -74,7 +74,7 @@ class InitialState:
     )
     flight: str = text(
         "",
-        "What of an earlier flight goes on at time 0, to the very bits: its segment's start, loads, string, thrusters; "
+        "What continues from an earlier flight at time 0, bit for bit: its segment's start, loads, string, thrusters; "
         "written by replay --as-scene and by the page's rewind, empty for none.",
         changes=AT_RESET,
     )

@@ -116,7 +116,7 @@ def _prefix(content: McapContent, path: str, node: str) -> str:
         topics = ", ".join(sorted(content.types)[:5]) or "no topics"
         raise InputError("session", f"{path} has {topics}, and no pose, twist or odom topic of a node")
     if len(flown) > 1:
-        raise InputError("session", f"{path} has several bodies, {', '.join(flown)}; say which with --node NAME")
+        raise InputError("session", f"{path} has several bodies, {', '.join(flown)}; choose one with --node NAME")
     return flown[0]
 
 

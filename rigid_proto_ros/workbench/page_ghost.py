@@ -110,7 +110,7 @@ class PageGhost:
         try:
             run.advance(next_ns)
         except CommandRefused as refusal:
-            self._on_refusal(f"the ghost goes on without a command: {refusal}")
+            self._on_refusal(f"the ghost continues without a command: {refusal}")
             return None
         except InputError as error:
             self._on_refusal(f"the ghost ends here: {error}")

@@ -154,7 +154,7 @@ async def take_to(
                 await asked(link, "reset")
                 successful, reason = await set_parameters(link, situation.changes)
                 if not successful:
-                    raise InputError("node", reason, "parameters that it takes")
+                    raise InputError("node", reason, "parameters that it accepts")
         before_reset()
         await asked(link, "reset")
         await _send(link, situation.commands, received)

@@ -88,7 +88,7 @@ class Status:
         return (
             f"⚠ **`{self._target}` has ended, or hangs: no message since {self._silent_since}.** The picture shows its "
             "last state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in another terminal): this "
-            "page goes on by itself when it is back."
+            "page continues by itself when it is back."
         )
 
 

@@ -118,4 +118,4 @@ def test_what_a_ghost_goes_without_is_said(tmp_path, capsys):
     words = ["t_handle", "--set", "ghost.integrator=free_body", "--script", str(script), "--duration", "0.5"]
     assert main(["simulate", *words, "--bag", str(tmp_path / "x.mcap")]) == 0
     lines = [line for line in capsys.readouterr().err.splitlines() if "ghost" in line]
-    assert len(lines) == 1 and "the ghost goes on without a command" in lines[0] and "free_body" in lines[0]
+    assert len(lines) == 1 and "the ghost continues without a command" in lines[0] and "free_body" in lines[0]
