@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-from .commands import Command, WrenchCommand
+from .commands import Command, Pending, WrenchCommand
 
 MOST_NOTED = 10_000
 """Events that may wait to be chained: some megabytes."""
@@ -53,11 +54,20 @@ class EventLog:
         self.count += 1
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, acted: list[tuple[int, Command | Noted]]) -> None:
-        """Add what acted, by its times, as events whose lines nobody wants now."""
-        self._noted += acted
-        self.count += len(acted)
+    def note(self, time_ns: int, event: Command | Noted) -> None:
+        """Add an event whose line nobody wants now."""
+        self._noted.append((time_ns, event))
+        self.count += 1
         if len(self._noted) >= MOST_NOTED:
+            self._chain_noted()
+
+    def note_all(self, acted: Sequence[Pending]) -> None:
+        """Add commands that acted, likewise."""
+        noted = self._noted
+        for pending in acted:
+            noted.append((pending.time_ns, pending.command))
+        self.count += len(acted)
+        if len(noted) >= MOST_NOTED:
             self._chain_noted()
 
     def _chain_noted(self) -> None:

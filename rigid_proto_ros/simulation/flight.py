@@ -85,15 +85,22 @@ REACHED, FAILED, NO_KERNEL = range(3)
 
 
 @njit(cache=True, error_model="numpy")
+def _copy(of: np.ndarray, first: int, count: int, to: np.ndarray, at: int) -> None:
+    """Numbers from ``first`` on to ``at`` and on; numba's own way with slices looks first whether they share memory."""
+    for k in range(count):
+        to[at + k] = of[first + k]
+
+
+@njit(cache=True, error_model="numpy")
 def begin_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
     """Begin a segment at START: what acts is summed afresh, in the order in which it began, and the
     method is chosen.
     """
-    sums = f[SUMS : SUMS + LOADS_SIZE]
-    sums[:] = 0.0
+    for k in range(LOADS_SIZE):
+        f[SUMS + k] = 0.0
     for row in range(n[ACTING]):
         for k in range(LOADS_SIZE):
-            sums[k] += loads[row, SHARE + k]
+            f[SUMS + k] += loads[row, SHARE + k]
     segment_problem(f, n, f[START : START + 13], n[START_NS], f[PROBLEM : PROBLEM + pr.SIZE])
     begin_variables(f, n, methods)
 
@@ -101,7 +108,7 @@ def begin_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.n
 @njit(cache=True, error_model="numpy")
 def segment_problem(f: np.ndarray, n: np.ndarray, row: np.ndarray, time_ns: int, p: np.ndarray) -> None:
     """The problem p of a segment under SUMS and the string that begins with the state ``row``."""
-    p[:] = f[COMMON : COMMON + pr.SIZE]
+    _copy(f, COMMON, pr.SIZE, p, 0)
     pr.begin_problem(p, f[SUMS : SUMS + LOADS_SIZE], row)
     if n[TIED] != 0:
         body, string = f[BODY : BODY + of_body.BODY], f[STRING : STRING + pr.STRING]
@@ -112,7 +119,8 @@ def segment_problem(f: np.ndarray, n: np.ndarray, row: np.ndarray, time_ns: int,
 def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
     """Begin a segment whose PROBLEM is made."""
     p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
-    y[:] = 0.0
+    for k in range(STORED):
+        y[k] = 0.0
     to_variables(f[START : START + 13], p, y)
     before = n[METHOD]
     if n[CHOOSES] != 0:
@@ -123,7 +131,8 @@ def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
         # Kernels may count on zeros where they never write, and another method's were here.
         f[ROOM : ROOM + methods[n[METHOD], ROWS] * methods[n[METHOD], COLUMNS]] = 0.0
     control = f[CONTROL : CONTROL + ctl.SIZE]
-    control[:] = 0.0
+    for k in range(ctl.SIZE):
+        control[k] = 0.0
     control[ctl.ACCURACY], control[ctl.DEGREE] = f[ACCURACY], f[DEGREE]
     f[WORK], f[LOST] = 0.0, 0.0
     n[COMMITTED_NS], n[TAKEN] = n[START_NS], 0
@@ -157,13 +166,13 @@ def sample(f: np.ndarray, n: np.ndarray, methods: np.ndarray, at_ns: int, row: n
     Whether it is good.
     """
     if at_ns == n[START_NS]:
-        row[:] = f[START : START + 13]
+        _copy(f, START, 13, row, 0)
         return True
     p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
     rest_ns = at_ns - n[COMMITTED_NS]
     if rest_ns > 0:
         trial = f[TRIAL : TRIAL + STORED]
-        trial[:] = y
+        _copy(y, 0, STORED, trial, 0)
         y = trial
         control, following = f[CONTROL : CONTROL + ctl.SIZE], f[FOLLOWING : FOLLOWING + STORED]
         if not reach(methods[n[METHOD]], y, p, control, following, f[ROOM:], rest_ns):
@@ -209,7 +218,7 @@ def accelerations_now(f: np.ndarray, n: np.ndarray) -> tuple[float, ...]:
 def last_good_state(f: np.ndarray, n: np.ndarray, row: np.ndarray) -> None:
     """The state at the last committed step, into row."""
     if n[COMMITTED_NS] == n[START_NS]:
-        row[:] = f[START : START + 13]
+        _copy(f, START, 13, row, 0)
         return
     y, p = f[VARIABLES : VARIABLES + STORED], f[PROBLEM : PROBLEM + pr.SIZE]
     to_good_row(y, p, (n[COMMITTED_NS] - n[START_NS]) * 1e-9, row, MAX_SPEED)
@@ -249,7 +258,7 @@ def finish_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.
     n[EVALUATIONS_BEFORE] += evaluations_of_segment(f, n, methods)
     f[WORK_BEFORE] += f[WORK]
     f[LOST_BEFORE] += f[LOST]
-    f[START : START + 13] = f[ROW : ROW + 13]
+    _copy(f, ROW, 13, f, START)
     n[START_NS] = n[NOW_NS]
     begin_segment(f, n, loads, methods)
 
@@ -342,7 +351,9 @@ def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, ev
         n[LOAD_IDS] += 1
     load_id = n[LOAD_IDS]
     _write(n, events, APPLIED, load_id, row)
-    events[n[EVENTS] - 1, ATTITUDE:] = f[ROW + 3 : ROW + 7].view(np.int64)
+    attitude = f[ROW + 3 : ROW + 7].view(np.int64)
+    for k in range(4):
+        events[n[EVENTS] - 1, ATTITUDE + k] = attitude[k]
     if kind == CLEAR:
         end_all(n, times, events)
     elif kind == IMPULSE:

@@ -27,14 +27,15 @@ from .setup import FlightStart, Setup
 FIRST_ROWS = 8
 """Of the tables at first; they double as needed."""
 
-_TIMES = struct.Struct(f"={fl.TIMES}q")
+_TIMES_BYTES, _pack = 8 * fl.TIMES, struct.Struct(f"={fl.TIMES}q").pack_into
 _LOAD_BYTES = 8 * fl.LOAD_ROW
 
 # Behind the integers of a flight: how many doubles there are, and where the tables are and of what size.
 DOUBLES, TABLES_AT, TABLE_ROWS, METHODS_AT, METHODS = range(fl.INTEGERS, fl.INTEGERS + 5)
 INTEGERS = fl.INTEGERS + 5
 
-_REACHED = fl.REACHED  # looked up at every advance
+# Looked up at every advance.
+_REACHED, _ACTING, _DUE, _DUE_END = fl.REACHED, fl.ACTING, fl.DUE, fl.DUE_END
 
 _LINE = 8
 """Doubles of a line of the processor's cache."""
@@ -210,18 +211,21 @@ class FlightArrays:
     def put(self, due: list[Pending]) -> None:
         """Put commands into the tables, behind the loads that act, as those that act next."""
         head = self.integers
-        first = self.first_due = head[fl.ACTING]
-        last = first + len(due)
-        if last > head[TABLE_ROWS]:
-            self._make_tables(2 * last)
-        tables, pack = self._table_bytes, _TIMES.pack_into
-        at = 8 * fl.TIMES * head[TABLE_ROWS] + _LOAD_BYTES * first
-        for row, pending in enumerate(due, first):
+        first = self.first_due = head[_ACTING]
+        last, rows = first + len(due), head[TABLE_ROWS]
+        if last > rows:
+            rows = 2 * last
+            self._make_tables(rows)
+        tables = self._table_bytes
+        at = _TIMES_BYTES * rows + _LOAD_BYTES * first
+        row_at = _TIMES_BYTES * first
+        for pending in due:
             bytes_of_load = pending.row
-            pack(tables, _TIMES.size * row, pending.time_ns, pending.duration_ns, pending.kind, pending.slot, 0, 0)
+            _pack(tables, row_at, pending.time_ns, pending.duration_ns, pending.kind, pending.slot, 0, 0)
             tables[at : at + len(bytes_of_load)] = bytes_of_load
+            row_at += _TIMES_BYTES
             at += _LOAD_BYTES
-        head[fl.DUE], head[fl.DUE_END] = first, last
+        head[_DUE], head[_DUE_END] = first, last
 
     @property
     def waiting(self) -> int:

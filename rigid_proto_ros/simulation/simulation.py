@@ -110,7 +110,7 @@ class Simulation(Readings):
         if self.observer.wants_events():
             self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
         else:
-            self.events.note([(self.time_ns, Noted(kind, content))])
+            self.events.note(self.time_ns, Noted(kind, content))
 
     # The way of a command
 
@@ -236,7 +236,10 @@ class Simulation(Readings):
             for pending in due[acted:]:
                 self._push(pending)
             due = due[:acted]
-        if due or self._notifier.wants_loads or arrays.integers[_TIMEOUTS]:
+        notifier = self._notifier
+        if due and notifier.ignores_commands and not arrays.integers[_TIMEOUTS]:
+            self.events.note_all(due)
+        elif due or notifier.wants_loads or arrays.integers[_TIMEOUTS]:
             self._notify(due)
         self.time_ns = until_ns if reached else arrays.time_ns
         self.state = State(self.time_ns, arrays.row.copy())
@@ -247,7 +250,7 @@ class Simulation(Readings):
         observer, notifier = self.observer, self._notifier
         observed = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
         if not (observed or self._arrays.integers[_TIMEOUTS]):
-            self.events.note([(pending.time_ns, pending.command) for pending in due])
+            self.events.note_all(due)
             return
         first = self._arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(self._arrays.last_events()):
@@ -276,7 +279,7 @@ class Simulation(Readings):
         if self.observer.wants_events() or isinstance(command, Change):
             self.log(command.kind, command.content)
         else:
-            self.events.note([(self.time_ns, command)])
+            self.events.note(self.time_ns, command)
 
     # What happens at an event that takes more than arithmetic
 

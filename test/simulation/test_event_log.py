@@ -70,7 +70,7 @@ def test_no_line_is_written_for_nobody(monkeypatch):
 
 def noted_hash(command) -> str:
     log = EventLog()
-    log.note([(12_345, command)])
+    log.note(12_345, command)
     return log.sha256
 
 
