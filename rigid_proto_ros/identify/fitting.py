@@ -6,7 +6,7 @@ which uses all there is.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -41,6 +41,9 @@ MOST_SEGMENTS = 40
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 6
 """Of a segment in the first stage: a start has 12 numbers."""
+ENOUGH_SAMPLES = 300
+"""Of a series while the body is only approached, or ENOUGH_IN_A_RADIAN of its turn, where that is more."""
+ENOUGH_IN_A_RADIAN = 2.0
 FIRST_STEP = 1.0
 """In units of the prior: moments by a factor e."""
 LENGTHENING = 4.0
@@ -133,6 +136,7 @@ def fit_flights(
         segments = _segments(work, whole)
         return _estimate(work, segments, _solved(work, segments, known.starts, 30, 1e-7))
     starts = _approached(work, whole)
+    work.sigmas = _noise(work, _segments(work, whole), starts)
     for turn in range(4):
         segments = _segments(work, whole)
         starts = _solved(work, segments, starts, 60, 1e-7)
@@ -165,14 +169,14 @@ def _approached(work: _Work, whole: float) -> np.ndarray:
             break
         work.values, work.sigmas = balanced, sigmas
         length = min(_first_length(work.flights, angle), whole)
-        segments = _segments(work, length)
+        segments = _thin_segments(work, length)
         starts = _solved(work, segments, _local_starts(work, segments), 12, 1e-2)
         work.sigmas = _noise(work, segments, starts)
         if all(work.sigmas[key] < max(FITS * sigmas[key], least[key]) for key in sigmas):
             return _lengthened(work, segments, starts, length, whole)
     work.values, work.sigmas = values, sigmas
     length = min(_first_length(work.flights, FIRST_ANGLE), whole)
-    segments = _segments(work, length)
+    segments = _thin_segments(work, length)
     starts = _local_starts(work, segments)
     free = [k for k, segment in enumerate(segments) if not len(segment.wrenches.commands)]
     if free and len(free) < len(segments):
@@ -211,9 +215,9 @@ def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, len
     """Join segments step by step; returns starts of one segment for each flight."""
     factor = LENGTHENING
     least = _near_enough(work)
-    while length < whole:
+    while len(segments) > len(work.flights):
         values, sigmas = work.values, work.sigmas
-        longer = _segments(work, min(factor * length, whole))
+        longer = _thin_segments(work, min(factor * length, whole))
         joined = np.array([_start_of(work, segment, segments, starts) for segment in longer])
         joined = _solved(work, longer, joined, 12, 1e-2)
         work.sigmas = _noise(work, longer, joined)
@@ -233,7 +237,16 @@ def _first_length(flights: Sequence[ms.MeasuredFlight], angle: float) -> float:
     return max(turning, total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
 
 
-def _segments(work: _Work, length_s: float) -> list[sh.Segment]:
+def _thin_segments(work: _Work, length_s: float) -> list[sh.Segment]:
+    """With as many samples as an approach needs."""
+    every = {}
+    for flight in work.flights:
+        enough = max(ENOUGH_SAMPLES, round(ENOUGH_IN_A_RADIAN * high_rate(flight) * flight.duration_s))
+        every.update({id(series): max(len(series.times_ns) // enough, 1) for series in flight.series})
+    return _segments(work, length_s, lambda series: every[id(series)])
+
+
+def _segments(work: _Work, length_s: float, every: Callable[[ms.Series], int] = lambda _: 1) -> list[sh.Segment]:
     offset = any(name == "offsets" for name, _ in work.unknowns.slots)
     margin = OFFSET_MARGIN_S if offset else max(0.0, -min(work.values.offsets, default=0.0))
     return sh.cut(
@@ -243,6 +256,7 @@ def _segments(work: _Work, length_s: float) -> list[sh.Segment]:
         lambda series: work.sigmas[id(series)],
         lambda series: work.weights[id(series)],
         margin,
+        every,
     )
 
 
@@ -355,32 +369,36 @@ def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, valu
     """Departures (n, 3) of each series in its own unit, by ``id``."""
     parts: dict[int, list[np.ndarray]] = {}
     for segment, start in zip(segments, starts, strict=True):
-        found = sh.departures(segment, start, values)
-        if found is None:
-            raise InputError("identify", "the estimate can't be simulated; see --from and --to")
-        for piece, departure in zip(segment.pieces, found, strict=True):
+        for piece, departure in zip(segment.pieces, _departures(segment, start, values), strict=True):
             parts.setdefault(id(piece.series), []).append(departure)
     return {key: np.concatenate(part) for key, part in parts.items()}
+
+
+def _departures(segment: sh.Segment, start: np.ndarray, values: Values) -> list[np.ndarray]:
+    """Of a segment that can be flown."""
+    found = sh.departures(segment, start, values)
+    if found is None:
+        raise InputError("identify", "the estimate can't be simulated; see --from and --to")
+    return found
 
 
 def _noise(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> dict[int, float]:
     """Standard deviation of each series from its departures; series of one topic and quantity share it
     over all flights.
     """
-    found = residuals_by_series(segments, starts, work.values)
-    samples = sum(3 * len(part) for part in found.values())
-    left = max(1.0 - (sh.START * len(segments) + len(work.unknowns)) / samples, 0.1)
-    sums: dict[str, list[float]] = {}
-    series = [one for flight in work.flights for one in flight.series]
-    for one in series:
-        weighted = work.weights[id(one)][:, None] * found[id(one)] ** 2
-        sums.setdefault(one.name, []).append(float(weighted.sum()))
+    sums: dict[str, float] = {}
     counts: dict[str, float] = {}
-    for one in series:
-        counts[one.name] = counts.get(one.name, 0.0) + 3.0 * float(work.weights[id(one)].sum())
+    for segment, start in zip(segments, starts, strict=True):
+        for piece, departure in zip(segment.pieces, _departures(segment, start, work.values), strict=True):
+            name, weights = piece.series.name, piece.weights
+            sums[name] = sums.get(name, 0.0) + float((weights[:, None] * departure**2).sum())
+            counts[name] = counts.get(name, 0.0) + 3.0 * float(weights.sum())
+    samples = 3 * sum(segment.samples for segment in segments)
+    left = max(1.0 - (sh.START * len(segments) + len(work.unknowns)) / samples, 0.1)
     return {
-        id(one): max(float(np.sqrt(sum(sums[one.name]) / (left * counts[one.name]))), least_noise(one))
-        for one in series
+        id(one): max(math.sqrt(sums[one.name] / (left * counts[one.name])), least_noise(one))
+        for flight in work.flights
+        for one in flight.series
     }
 
 
@@ -399,8 +417,9 @@ def _estimate(work: _Work, segments: list[sh.Segment], starts: np.ndarray) -> Es
     roots: dict[float, list[np.ndarray]] = {1.0: [], WIDER: []}
     cost = 0.0
     for wider, parts in roots.items():
+        variations = sh.Variations(work.values, work.unknowns.physical, wider=wider)
         for segment, start in zip(segments, starts, strict=True):
-            flown = sh.linearized(segment, start, work.values, work.unknowns.physical, wider=wider)
+            flown = sh.linearized(segment, start, variations)
             if flown is None:
                 raise InputError("identify", "the estimate can't be simulated; see --from and --to")
             triangle = sh.compressed(*flown)

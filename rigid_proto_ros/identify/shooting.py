@@ -68,9 +68,10 @@ def cut(
     sigma: Callable[[ms.Series], float],
     weights: Callable[[ms.Series], np.ndarray],
     margin_s: float = 0.0,
+    every: Callable[[ms.Series], int] = lambda _: 1,
 ) -> list[Segment]:
     """Segments of about this length, alike within a flight; margin_s: how much earlier they start than
-    their samples.
+    their samples. every: each so-many-th sample of a series is used.
     """
     margin = round(margin_s * 1e9)
     segments = []
@@ -81,7 +82,7 @@ def cut(
         for first, last in zip(edges[:-1], edges[1:], strict=True):
             pieces = []
             for series in flight.series:
-                inside = slice(*np.searchsorted(series.times_ns, (first, last)))
+                inside = slice(*np.searchsorted(series.times_ns, (first, last)), every(series))
                 if inside.stop > inside.start:
                     times, values = series.times_ns[inside], series.values[inside]
                     topic = topics.index(series.topic)
@@ -108,9 +109,8 @@ def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
     centre of mass.
     """
     rows = np.empty((len(starts), tr.FLOWN))
-    bodies = {id(v): v.body for v in values}
     for row, v in zip(rows, values, strict=True):
-        mass = bodies[id(v)]
+        mass = v.body
         row[tr.MASS] = mass.mass
         row[tr.COM : tr.COM + 3] = mass.center_of_mass
         row[tr.INERTIA : tr.INERTIA + 9] = mass.inertia.ravel()
@@ -139,9 +139,14 @@ def _shown(
     where one failed.
     """
     times, where = _times(segment, values[0].offsets)
-    samples, good = tr.fly_rows(flown_rows(starts, values), times, segment.wrenches)
+    rows = flown_rows(starts, values)
+    # An IMU's biases and place change what it shows and not the flight.
+    others = np.any(rows != rows[0], axis=1)
+    others[0] = True
+    samples, good = tr.fly_rows(rows[others], times, segment.wrenches)
     if not good.all():
         return [], None
+    flown = np.where(others, np.cumsum(others) - 1, 0)[:, None]
     com = np.array([v.theta[mp.COM] for v in values])[:, None]
     place = np.array([v.imu_place for v in values])[:, None]
     shown = []
@@ -149,7 +154,7 @@ def _shown(
         series = piece.series
         name = "accel_bias" if series.kind == ms.ACCELERATION else "gyro_bias"
         bias = np.array([getattr(v, name) for v in values])[:, None] * (1.0 if series.is_imu else 0.0)
-        shown.append(predicted(series, samples[:, index], com, place, bias))
+        shown.append(predicted(series, samples[flown, index], com, place, bias))
     return shown, samples[0]
 
 
@@ -173,25 +178,37 @@ def flown_poses(segment: Segment, start: np.ndarray, values: Values) -> tuple[np
     return times, samples[0, :, :3] - rot.turned(attitudes, values.theta[mp.COM]), attitudes
 
 
-def _variations(
-    start: np.ndarray, values: Values, unknowns: Unknowns, steps: tuple[np.ndarray, np.ndarray], sides: Sequence[float]
-) -> tuple[np.ndarray, list[Values], list[int]]:
-    """Flights for difference quotients: the base, then those to each side of each column; starts, values,
-    and the columns.
+class Variations:
+    """Values and those beside them whose flights give difference quotients.
+
+    central: to both sides, which costs twice as much. wider: by how much the steps are longer.
     """
-    changed = np.flatnonzero(START_STEPS)
-    varied = [k for k, (name, _) in enumerate(unknowns.slots) if name != "offsets"]
-    starts = np.repeat(start[None], 1 + len(sides) * (len(changed) + len(varied)), axis=0)
-    changes = (np.diag(steps[0])[changed][:, None] * np.array(sides)[:, None]).reshape(-1, START)
-    starts[1 : 1 + len(changes)] = moved_starts(starts[: len(changes)], changes)
-    theirs = [values] * (1 + len(changes))
-    base = unknowns.read(values)
-    for k in varied:
-        for sign in sides:
-            numbers = base.copy()
-            numbers[k] += sign * steps[1][k]
-            theirs.append(unknowns.put(values, numbers))
-    return starts, theirs, [*changed.tolist(), *(START + k for k in varied)]
+
+    def __init__(self, values: Values, unknowns: Unknowns, central: bool = True, wider: float = 1.0) -> None:
+        self.values, self.unknowns = values, unknowns
+        self.sides = (1.0, -1.0) if central else (1.0,)
+        self.start_widths = wider * START_STEPS
+        self.widths = np.concatenate([self.start_widths, wider * unknowns.steps(values)])
+        turned = np.flatnonzero(START_STEPS)
+        varied = [k for k, (name, _) in enumerate(unknowns.slots) if name != "offsets"]
+        self.columns = [*turned.tolist(), *(START + k for k in varied)]
+        """Which columns of the derivatives they give, in their order."""
+        self._changes = (np.diag(self.start_widths)[turned][:, None] * np.array(self.sides)[:, None]).reshape(-1, START)
+        base = unknowns.read(values)
+        self.each = [values] * (1 + len(self._changes))
+        """Of each flight: the base, then those to each side of each column."""
+        for k in varied:
+            for sign in self.sides:
+                numbers = base.copy()
+                numbers[k] += sign * self.widths[START + k]
+                self.each.append(unknowns.put(values, numbers))
+
+    def starts(self, start: np.ndarray) -> np.ndarray:
+        """Of each flight, (n, 13)."""
+        starts = np.repeat(start[None], len(self.each), axis=0)
+        count = len(self._changes)
+        starts[1 : 1 + count] = moved_starts(starts[:count], self._changes)
+        return starts
 
 
 def _shift_columns(
@@ -217,31 +234,28 @@ def _shift_columns(
 
 
 def linearized(
-    segment: Segment, start: np.ndarray, values: Values, unknowns: Unknowns, central: bool = True, wider: float = 1.0
+    segment: Segment, start: np.ndarray, variations: Variations
 ) -> tuple[list[np.ndarray], np.ndarray] | None:
     """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 +
     unknowns).
 
-    Both in units of the standard deviations, weighted. central: difference quotients to both sides, which cost twice as
-    much. wider: by how much their steps are longer. None where a flight failed.
+    Both in units of the standard deviations, weighted. None where a flight failed.
     """
-    steps = wider * unknowns.steps(values)
-    sides = (1.0, -1.0) if central else (1.0,)
-    starts, theirs, columns = _variations(start, values, unknowns, (wider * START_STEPS, steps), sides)
-    shown, base = _shown(segment, starts, theirs)
+    values, unknowns, columns = variations.values, variations.unknowns, variations.columns
+    shown, base = _shown(segment, variations.starts(start), variations.each)
     if base is None:
         return None
     times, where = _times(segment, values.offsets)
     rate = values.damping[0] / values.body.mass
-    widths = np.concatenate([wider * START_STEPS, steps])
+    central, widths = len(variations.sides) > 1, len(variations.sides) * variations.widths
     blocks, found = [], []
     for piece, own, index in zip(segment.pieces, shown, where, strict=True):
         kind = piece.series.kind
         block = np.zeros((len(index), 3, START + len(unknowns)))
         block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate, start[3:7])
         # What a flight shows moves by minus what its departure from a nearby one says.
-        difference = departure(kind, own[2::2] if central else own[:1], own[1 :: len(sides)])
-        block[:, :, columns] = (difference / (len(sides) * widths[columns])[:, None, None]).transpose(1, 2, 0)
+        difference = departure(kind, own[2::2] if central else own[:1], own[1 :: len(variations.sides)])
+        block[:, :, columns] = (difference / widths[columns][:, None, None]).transpose(1, 2, 0)
         weight = np.sqrt(piece.weights)[:, None] / piece.sigma
         blocks.append(-block * weight[:, :, None])
         found.append(departure(kind, own[0], piece.values) * weight)
@@ -335,9 +349,10 @@ class Problem:
     def _linearized(self, numbers: np.ndarray, starts: np.ndarray) -> _Linearized:
         values, free = self.values(numbers), len(self.unknowns)
         triangles: list[np.ndarray] = []
+        variations = Variations(values, self.unknowns, central=False)
         prior = ((numbers - self.first) / self.widths, np.diag(1.0 / self.widths))
         for segment, start in zip(self.segments, starts, strict=True):
-            flown = linearized(segment, start, values, self.unknowns, central=False)
+            flown = linearized(segment, start, variations)
             if flown is None:
                 rows = len(self.segments) * (free + 1)
                 failed = np.concatenate([np.full(rows, FAILED), prior[0]])

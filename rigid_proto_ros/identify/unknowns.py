@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class Values:
     imu_place: np.ndarray
     tensor_change: np.ndarray = field(default_factory=lambda: np.zeros(6))
 
-    @property
+    @cached_property
     def body(self) -> mp.MassEstimate:
         """The body that these say."""
         body = mp.mass_of(self.theta)

@@ -75,7 +75,7 @@ class MeasuredThrow:
         topics = topics_of([self.flight])
         unknowns = make_unknowns(self.fit, topics)
         [segment] = sh.cut([self.flight], 1e9, topics, lambda s: SIGMAS[s.kind], lambda s: np.ones(len(s.times_ns)))
-        linear = sh.linearized(segment, self.start, self.truth, unknowns.physical)
+        linear = sh.linearized(segment, self.start, sh.Variations(self.truth, unknowns.physical))
         assert linear is not None
         root = sh.compressed(*linear)[sh.START : -1, sh.START : -1]
         return Estimate(self.truth, unknowns, [segment], self.start[None], {}, root, root, 0.0, 0)
@@ -166,10 +166,20 @@ def _first(first: str, truth: Values, rng: np.random.Generator) -> np.ndarray | 
     return mp.parameters_of(100.0 * mass.mass, np.zeros(3), 100.0 * turn @ mass.inertia @ turn.T)
 
 
+def has_phone(number: int) -> bool:
+    """Whether this throw of the study carries one."""
+    return number % 4 >= 2
+
+
+def throw_of_study(number: int, first: str = "ball") -> Throw:
+    """One of the study: every second one is poked, and of each two neighbouring pairs one carries a phone."""
+    return throw(number, poked=number % 2 == 0, first=first, phone=has_phone(number))
+
+
 def main(first: int, last: int, begin: str = "ball") -> None:
-    """Every second one is poked, and of each two neighbouring pairs one carries a phone."""
+    """The throws of these numbers, printed."""
     for number in range(first, last):
-        found = throw(number, poked=number % 2 == 0, first=begin, phone=number % 4 >= 2)
+        found = throw_of_study(number, begin)
         print(json.dumps({"number": number, "begin": begin, **asdict(found)}), flush=True)
 
 
