@@ -82,8 +82,9 @@ def cut(
         for first, last in zip(edges[:-1], edges[1:], strict=True):
             pieces = []
             for series in flight.series:
-                inside = slice(*np.searchsorted(series.times_ns, (first, last)), every(series))
-                if inside.stop > inside.start:
+                begun, ended = np.searchsorted(series.times_ns, (first, last))
+                inside = slice(begun, ended, every(series))
+                if ended > begun:
                     times, values = series.times_ns[inside], series.values[inside]
                     topic = topics.index(series.topic)
                     pieces.append(Piece(series, topic, times, values, sigma(series), weights(series)[inside]))

@@ -63,6 +63,18 @@ def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:
             yield chunk.entity_path.lstrip("/"), chunk.is_static, chunk.to_record_batch()
 
 
+def drawn_times(path: Path) -> tuple[int, int] | None:
+    """The first and the last simulated time [ns] at which anything is drawn, also of a recording that is no session."""
+    ends = [(int(times.min()), int(times.max())) for times in _all_times(path) if len(times)]
+    return (min(first for first, _ in ends), max(last for _, last in ends)) if ends else None
+
+
+def _all_times(path: Path) -> Iterator[np.ndarray]:
+    for _, is_static, batch in record_batches(path):
+        if not is_static and e.SIM_TIME in batch.schema.names:
+            yield _sim_times(batch)
+
+
 def _read(path: Path, session: RecordedSession) -> None:
     times, rows = [], []
     events: list[tuple[int, str]] = []

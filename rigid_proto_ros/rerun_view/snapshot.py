@@ -19,7 +19,7 @@ from ..base.files import output_file
 from ..session.recorded_session import RecordedSession
 from . import entities as e
 from .ports import LOOPBACK, any_free_port
-from .reader import read_session
+from .reader import drawn_times, read_session
 from .rrd_file import whole_part
 from .viewers import ViewerProcess, open_headless
 
@@ -58,7 +58,11 @@ def take_picture(
     session_path, picture = Path(session_path), Path(picture).absolute()
     progress(0, STAGES)
     session = read_session(session_path)
-    check_time(session, at_s)
+    if len(session.times):
+        check_time(session, at_s)
+    else:
+        # Of an estimate, say, which is no session.
+        _check_between(drawn_times(session_path) if session.complete else None, at_s)
     check_picture(picture)
     progress(1, STAGES)
     with ExitStack() as stack:
@@ -93,9 +97,13 @@ def check_picture(picture: str | Path) -> None:
 
 def check_time(session: RecordedSession, at_s: float) -> None:
     """Raise InputError unless the session has states around ``at_s``."""
-    if not len(session.times):
+    _check_between((int(session.times[0]), session.end_ns) if len(session.times) else None, at_s)
+
+
+def _check_between(ends_ns: tuple[int, int] | None, at_s: float) -> None:
+    if ends_ns is None:
         raise InputError("session", "the recording has no states")
-    begin, end = 1e-9 * int(session.times[0]), 1e-9 * session.end_ns
+    begin, end = (1e-9 * time_ns for time_ns in ends_ns)
     if not (np.isfinite(at_s) and begin <= at_s <= end):
         raise InputError("--at", at_s, f"a time within the recording, {begin:g} to {end:g} s")
 

@@ -30,6 +30,11 @@ STEPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "thrown_hammer": (("watch 0.5",), (SPIN, "reset", "watch 0.5"), ("set gravity", "watch 0.2")),
     "top_on_string": (("watch 2",), (SPIN, "reset", "watch 2"), (SPIN, "reset", "watch 1")),
     "true_or_box_tensor": (("watch 2",), ("set inertia_model", "reset", "watch 1"), ("watch 1",)),
+    "weigh_by_throwing": (
+        ("set density", "reset", "watch 2"),
+        ("poke", "watch 0.5"),
+        ("set density", "reset", "poke"),
+    ),
 }
 """By the lesson's name, one for each of its sentences."""
 

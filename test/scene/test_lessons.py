@@ -89,6 +89,21 @@ def test_thrown_hammer_keeps_to_newtons_parabola_whatever_its_spin() -> None:
     assert away.max() > 0.2
 
 
+def test_a_book_ten_times_as_heavy_tumbles_alike_and_is_pushed_to_a_tenth_of_the_speed() -> None:
+    light, heavy = (
+        fly("weigh_by_throwing", 2.0, density=700.0),
+        fly("weigh_by_throwing", 2.0, density=7000.0),
+    )
+    assert np.abs(light.rotation - heavy.rotation).max() < 1e-12  # measured 1e-14
+    light, heavy = (
+        fly("weigh_by_throwing", 4.0, script="weigh_by_throwing", density=density) for density in (700.0, 7000.0)
+    )
+    assert light.velocity[-1] == pytest.approx(10.0 * heavy.velocity[-1], abs=1e-12)
+    # 5 N for .05 s over .634 kg.
+    assert np.linalg.norm(light.velocity[-1]) == pytest.approx(0.394, abs=5e-4)
+    assert np.linalg.norm(light.spin[-1]) > 2.0 * np.linalg.norm(light.spin[0])
+
+
 def test_true_tensor_wobbles_and_turns_over_where_the_box_spins_as_on_an_axle() -> None:
     true, box = fly("true_or_box_tensor", 10.0), fly("true_or_box_tensor", 10.0, inertia_model="bounding_box")
     assert 30.0 < degrees_between(true.spin, Z).max() < 37.0  # measured 36.5

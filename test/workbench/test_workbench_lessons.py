@@ -514,6 +514,33 @@ def bracket_numbers(user: User) -> None:
     assert "0.0244 m off" in text
 
 
+DENSITY = "Density [kg/m³]"
+
+
+def book_as_heavy(user: User) -> None:
+    user.fly(2.0)
+    tumbled = user.rotation[:200]
+    user.set(DENSITY, "7000")
+    user.reset()
+    user.fly(2.0)
+    assert user.body.mass == pytest.approx(6.339, abs=1e-3)
+    assert np.abs(user.rotation[:200] - tumbled).max() < 1e-9
+
+
+def book_pushed(user: User) -> None:
+    user.push((0.07, 0.1, 0.0138), user.rotation[-1] @ np.array([0.0, 0.0, -1.0]))
+    user.remembered = float(np.linalg.norm(user.velocity))
+    assert user.remembered > 0.0
+    user.fly(1.0)
+
+
+def book_lighter(user: User) -> None:
+    user.set(DENSITY, "700")
+    user.reset()
+    user.push((0.07, 0.1, 0.0138), user.rotation[-1] @ np.array([0.0, 0.0, -1.0]))
+    assert float(np.linalg.norm(user.velocity)) == pytest.approx(10.0 * user.remembered, rel=0.05)
+
+
 STEPS: dict[str, tuple[Callable[[User], None], ...]] = {
     "ballast_stops_flip": (ballast_flips, ballast_on, ballast_off),
     "book": (book_tumbles, book_steadily, book_calm),
@@ -530,6 +557,7 @@ STEPS: dict[str, tuple[Callable[[User], None], ...]] = {
     "thrown_hammer": (hammer_paths, hammer_other_spin, hammer_weightless),
     "top_on_string": (top_walks, top_walks_faster, top_falls),
     "true_or_box_tensor": (bracket_and_ghost, bracket_as_box, bracket_numbers),
+    "weigh_by_throwing": (book_as_heavy, book_pushed, book_lighter),
 }
 """One function for each sentence."""
 
