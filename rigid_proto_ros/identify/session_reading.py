@@ -41,7 +41,7 @@ def session_flight(
     if setup.in_flight is not None and setup.in_flight.acts:
         raise InputError("session", f"{name} continues a flight whose loads still act; identify that one")
     if not setup.gyroscopic:
-        raise InputError("session", f"{name} was simulated with gyroscopic: false, which no rigid body's motion")
+        raise InputError("session", f"{name} was simulated with gyroscopic: false: no rigid body moves so")
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
     frames = frame_names(scenario.parameters, session.node_name)
     acting = _acting(session, setup, frames, name, end_ns)
