@@ -57,7 +57,7 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=float,
         metavar="T",
-        help=f"{of['tolerance']}: keys err by at most T body sizes and 100 T degrees (default 1e-3)",
+        help=f"{of['tolerance']}: key frames are off by at most T body sizes and 100 T degrees (default 1e-3)",
     )
     group.add_argument(
         "--fps",

@@ -41,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PART",
         help="the body's mesh, in axes of the tracked frame: its models are compared with the motion",
     )
-    parser.add_argument("--density", type=float, metavar="D", help="with --mesh: the mass is that of the solid [kg/m3]")
+    parser.add_argument(
+        "--density", type=float, metavar="D", help="with --mesh: the mass is that of the solid [kg/m^3]"
+    )
     parser.add_argument(
         "--against", metavar="ROBOT.urdf", help="compare its inertials with the motion (SDF and MJCF too)"
     )
@@ -49,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         frame = "[@FRAME]" if sensor in ("twist", "wrench") else "[@CHILD]" if sensor == "pose" else ""
         parser.add_argument(f"--{sensor}", metavar=f"TOPIC{frame}", help=f"the {sensor} topic of a bag")
     parser.add_argument(
-        "--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="[m/s2] (default: the scene's, or 0 0 -9.81)"
+        "--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="[m/s^2] (default: the scene's, or 0 0 -9.81)"
     )
     parser.add_argument(
         "--offset", action="append", default=[], metavar="TOPIC=S", help="seconds to add to a topic's stamps"
@@ -113,7 +115,7 @@ def _choice(args: argparse.Namespace) -> Choice:
     if not (0.0 <= args.first < args.last):
         raise InputError("--from", args.first, f"0 or more, and less than --to ({args.last:g})")
     if args.gravity is not None and not all(map(math.isfinite, args.gravity)):
-        raise InputError("--gravity", args.gravity, "three finite numbers [m/s2]")
+        raise InputError("--gravity", args.gravity, "three finite numbers [m/s^2]")
     if args.json and args.urdf:
         raise InputError("--urdf", "with --json", "one of the two")
     topics = {sensor: getattr(args, sensor) for sensor in SENSORS if getattr(args, sensor)}

@@ -12,7 +12,7 @@ from ..simulation.flight import IMPULSE, PULSE
 from .trajectories import Wrenches
 
 POSITION, ATTITUDE, VELOCITY, RATE, ACCELERATION = "position", "attitude", "velocity", "rate", "acceleration"
-UNITS = {POSITION: "m", ATTITUDE: "rad", VELOCITY: "m/s", RATE: "rad/s", ACCELERATION: "m/s2"}
+UNITS = {POSITION: "m", ATTITUDE: "rad", VELOCITY: "m/s", RATE: "rad/s", ACCELERATION: "m/s^2"}
 
 
 @dataclass(frozen=True)

@@ -188,7 +188,7 @@ def as_text(found: Identification) -> list[str]:
     for axis, one in zip("xyz", found.center_of_mass, strict=True):
         if one.value is not None:
             lines.append(f"centre of mass {axis}   {number(one)} m")
-    tensor, unit = found.inertia, " kg m2"
+    tensor, unit = found.inertia, " kg m^2"
     if any(one.value is None for one in tensor):
         tensor, unit = found.shape, " of the trace"
     for name, one in zip(TENSOR_NAMES, tensor, strict=True):

@@ -24,8 +24,8 @@ class SentLayout:
     def fit(self, recording: rr.RecordingStream, initial_view: str, subject: Subject) -> None:
         """Send what is needed for what this flight is about.
 
-        A ghost that comes or goes brings another layout; the rest of what a flight is about is that of its beginning,
-        for a viewer's own arrangement isn't to be taken away in mid-flight.
+        A run that begins with a ghost, after one without, or the other way round, brings another layout; within a run,
+        and at other resets, the layout stays, so that nothing that somebody has arranged is undone.
         """
         if self._sent is not None and subject.ghost == self._has_ghost:
             return

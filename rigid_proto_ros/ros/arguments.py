@@ -60,9 +60,7 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         metavar="SCENE",
         help="several bodies: scene files or bundled names, a node each",
     )
-    parser.add_argument(
-        "--until", type=_seconds, metavar="S", help="end, in order, when simulated time reaches this many seconds"
-    )
+    parser.add_argument("--until", type=_seconds, metavar="S", help="end when simulated time reaches this many seconds")
     completes(bodies, lambda _: scene_names())
     own, ros = _split(argv[1:])
     for word in ros:
