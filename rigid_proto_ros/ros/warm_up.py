@@ -30,16 +30,11 @@ from ..simulation.simulation import Simulation
 
 def warm_up(setup: Setup) -> State:
     """Fly this setup for a moment under a command of each kind that its integrator supports; returns the last state."""
-    force, none = (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0)
     spinning = setup.initial.copy()
     spinning[10:13] += (0.1, 0.2, 0.3)
 
-    def wrench(frame: str) -> WrenchCommand:
-        return WrenchCommand(False, parse_frame(frame), force, none, 0, frame, b"")
-
-    commands: list[Command] = [
-        wrench(f) for f in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")
-    ]
+    frames = ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse")
+    commands: list[Command] = [_small_wrench(setup, frame) for frame in frames]
     commands.append(MoveString(tuple(setup.initial[:3].tolist())))
     for command in commands:
         trial = Simulation(replace(setup, initial=spinning))
@@ -50,6 +45,10 @@ def warm_up(setup: Setup) -> State:
         for until_ns in (1_000_000, 2_000_001):
             trial.advance(until_ns)
     return trial.state
+
+
+def _small_wrench(setup: Setup, frame: str) -> WrenchCommand:
+    return WrenchCommand(False, parse_frame(frame), (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0), 0, frame, b"")
 
 
 def warm_up_change(before: Scenario, after: Scenario) -> None:
@@ -77,6 +76,8 @@ def compile_flight(setup: Setup) -> None:
         integrator=INTEGRATORS["auto"],
     )
     trial = Simulation(resting)
+    # Checked when it is taken; it doesn't come to act.
+    trial.submit(_small_wrench(setup, "world@origin"), 2_000_000)
     trial.advance(1_000_000)
     # What a node publishes of a state.
     trial.specific_force((0.0, 0.0, 0.0))
