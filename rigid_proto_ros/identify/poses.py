@@ -98,17 +98,24 @@ def _reckoning(
 
 
 def integral(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """∫ (n, 3) of vectors (n, 3) from the first time on, by trapezoids."""
-    steps = 0.5 * np.diff(seconds)[:, None] * (vectors[1:] + vectors[:-1])
-    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    """∫ (n, 3) of vectors (n, 3) from the first time on."""
+    return np.vstack([np.zeros(3), np.cumsum(_steps(seconds, vectors), axis=0)])
+
+
+def _steps(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """The integral from each time to the next (n - 1, 3), by trapezoids and what the slopes at their ends add to them:
+    velocities along the axes of a body that spins bend too much for trapezoids alone.
+    """
+    apart = np.diff(seconds)[:, None]
+    slopes = np.gradient(vectors, seconds, axis=0)
+    return 0.5 * apart * (vectors[1:] + vectors[:-1]) + apart**2 / 12.0 * (slopes[:-1] - slopes[1:])
 
 
 def _turned_by(seconds: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Attitudes (n, 4) since the first one, of rates (n, 3) in body axes: trapezoids, and what the axis itself turns
-    within a step (Bortz, IEEE Trans. Aerospace and Electronic Systems 7, 1971).
+    """Attitudes (n, 4) since the first one, of rates (n, 3) in body axes: their integrals, and what the axis itself
+    turns within a step (Bortz, IEEE Trans. Aerospace and Electronic Systems 7, 1971).
     """
-    apart = np.diff(seconds)[:, None]
-    turns = 0.5 * apart * (rates[:-1] + rates[1:]) + apart**2 / 12.0 * rot.cross(rates[:-1], rates[1:])
+    turns = _steps(seconds, rates) + np.diff(seconds)[:, None] ** 2 / 12.0 * rot.cross(rates[:-1], rates[1:])
     attitudes = np.zeros((len(seconds), 4))
     attitudes[0, 3] = 1.0
     _multiply_up(rot.exponential(turns), attitudes)
