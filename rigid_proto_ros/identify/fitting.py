@@ -16,6 +16,7 @@ from ..base.errors import InputError
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import possible_bodies as pb
+from . import rotations as rot
 from . import shooting as sh
 from .first_attitude import first_attitude
 from .local_motion import high_rate, least_noise, local_start, noise_by_differences
@@ -217,6 +218,7 @@ def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, len
     least = _near_enough(work)
     while len(segments) > len(work.flights):
         values, sigmas = work.values, work.sigmas
+        starts = _of_one_heading(work, segments, starts)
         longer = _thin_segments(work, min(factor * length, whole))
         joined = np.array([_start_of(work, segment, segments, starts) for segment in longer])
         joined = _solved(work, longer, joined, 12, 1e-2)
@@ -226,6 +228,33 @@ def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, len
             work.values, work.sigmas, factor = values, sigmas, math.sqrt(factor)
             continue
         length, segments, starts = factor * length, longer, joined
+    return starts
+
+
+def _of_one_heading(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+    """Starts (k, 13) of flights without attitudes turned about the vertical, to agree with the one upon which a load
+    acts: what such a segment shows doesn't depend on that turn unless a load in world axes acts on it, so that steps
+    let it wander.
+    """
+    starts = starts.copy()
+    for flight in work.flights:
+        reckoned = work.reckoned.get(id(flight))
+        own = [k for k, segment in enumerate(segments) if segment.flight is flight]
+        loaded = [k for k in own if len(segments[k].wrenches.commands)]
+        if reckoned is None or not loaded:
+            continue
+        seconds = np.array([1e-9 * (segments[k].begin_ns - flight.begin_ns) for k in own])
+        departures = rot.product(starts[own, 3:7], rot.inverse(reckoned.attitude_at(seconds)))
+        turns = rot.product(departures[own.index(loaded[0])], rot.inverse(departures))
+        down = np.linalg.norm(reckoned.gravity)
+        if down > 0.0:
+            # The tilt is seen in every segment: only the turn about the vertical is corrected.
+            axis = reckoned.gravity / down
+            turns[:, :3] = (turns[:, :3] @ axis)[:, None] * axis
+            sizes = np.linalg.norm(turns, axis=1, keepdims=True)
+            turns = np.where(sizes > 0.0, turns / np.maximum(sizes, 1e-300), [0.0, 0.0, 0.0, 1.0])
+        starts[own, 3:7] = rot.product(turns, starts[own, 3:7])
+        starts[own, 7:10] = rot.turned(turns, starts[own, 7:10])
     return starts
 
 
