@@ -145,7 +145,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
             title = name if len(runs) == 1 else f"{name}, run {number}"
             flight, scenario = session_flight(run, title, choice.first_s, choice.last_s)
             if choice.gravity is not None:
-                flight = replace(flight, gravity=choice.gravity, gravity_from="--gravity")
+                flight = replace(flight, gravity=choice.gravity, gravity_from="from --gravity")
             flights.append(flight)
             scenes.append(scenario)
     return flights, scenes

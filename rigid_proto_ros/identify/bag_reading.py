@@ -79,9 +79,9 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     series = [one for one in series if len(one.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
-    acting = _acting(chosen["wrench"], chosen) if "wrench" in chosen else ms.nothing_acting()
+    acting = _acting(chosen["wrench"], chosen, choice) if "wrench" in chosen else ms.nothing_acting()
     given = choice.gravity is not None
-    where = "--gravity" if given else "assumed, as no --gravity was given"
+    where = "from --gravity" if given else "assumed, as no --gravity was given"
     return ms.MeasuredFlight(str(path), tuple(series), acting, choice.gravity or EARTH, gravity_from=where)
 
 
@@ -217,6 +217,10 @@ def _within(series: ms.Series, window: tuple[int, int]) -> ms.Series:
 
 def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
     spans = {t.name: (int(t.times_ns[0]), int(t.times_ns[-1])) for k, t in chosen.items() if k != "wrench"}
+    wrench = chosen.get("wrench")
+    if wrench is not None:
+        begin, end = (int(wrench.times_ns[k]) for k in (0, -1))
+        spans[wrench.name] = (begin, end + WRENCH_TIMEOUT_NS)
     first, *others = spans.items()
     for name, (begin, end) in others:
         shift = round(1e9 * (choice.offsets.get(name, 0.0) - choice.offsets.get(first[0], 0.0)))
@@ -228,7 +232,7 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
             )
 
 
-def _acting(topic: _Topic, chosen: dict[str, _Topic]) -> ms.Acting:
+def _acting(topic: _Topic, chosen: dict[str, _Topic], choice: Choice) -> ms.Acting:
     """A wrench's messages, each held until the next; axes alone mean the origin of the tracked frame."""
     worlds, bodies = _frames(chosen)
     text = topic.frame or topic.messages[0].frame_id
@@ -246,7 +250,7 @@ def _acting(topic: _Topic, chosen: dict[str, _Topic]) -> ms.Acting:
         raise InputError("--wrench", text, "axes world or body, at com, origin or point/x,y,z")
     where = {"com": None, "origin": (0.0, 0.0, 0.0)}.get(frame.point[0], frame.point[-1])
     rows = []
-    times = topic.times_ns.tolist()
+    times = (topic.times_ns + round(1e9 * choice.offsets.get(topic.name, 0.0))).tolist()
     for number, message in enumerate(topic.messages):
         if not any(message.numbers):
             continue

@@ -13,6 +13,7 @@ from . import mass_parameters as mp
 from .comparison import Candidate, compare
 from .fitting import fit_flights, topics_of
 from .measurements import ACCELERATION, ATTITUDE, RATE, MeasuredFlight
+from .poses import FEWEST
 from .report import Identification
 from .residual_checks import check_residuals
 from .unknowns import DEFAULT_FIT, Values, make_unknowns
@@ -46,6 +47,7 @@ def identify(
     """What the flights tell of the body that flew in all of them; raises InputError."""
     known = known or Known()
     _check_axes(flights)
+    _check_counts(flights)
     topics = topics_of(flights)
     theta = _first_guess(known)
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
@@ -78,6 +80,14 @@ def _check_axes(flights: Sequence[MeasuredFlight]) -> None:
                 f"{flight.name} has rates in world axes and no attitude, so nothing says how the body's axes lie;"
                 " --pose or --odom adds one, and rates along the body's axes are TOPIC@body",
             )
+
+
+def _check_counts(flights: Sequence[MeasuredFlight]) -> None:
+    """Raises InputError where a flight has too few samples for its start and anything else."""
+    for flight in flights:
+        most = max(len(one.times_ns) for one in flight.series)
+        if most < FEWEST:
+            raise InputError("session", f"{flight.name} has {most} samples", f"at least {FEWEST} of a pose or rate")
 
 
 def _first_guess(known: Known) -> np.ndarray:

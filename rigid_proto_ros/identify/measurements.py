@@ -77,7 +77,7 @@ class MeasuredFlight:
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     linear_damping: float = 0.0
     angular_damping: float = 0.0
-    gravity_from: str = "the scene"
+    gravity_from: str = "from the scene"
 
     @property
     def begin_ns(self) -> int:

@@ -51,7 +51,7 @@ def session_flight(
         raise InputError("--from", first_s, f"a time within {name}, which ends at {1e-9 * session.end_ns:g} s")
     x, y, z = (float(value) for value in setup.gravity)
     damping = float(setup.linear_damping), float(setup.angular_damping)
-    return MeasuredFlight(name, tuple(series), acting, (x, y, z), *damping, gravity_from="the scene"), scenario
+    return MeasuredFlight(name, tuple(series), acting, (x, y, z), *damping, gravity_from="from the scene"), scenario
 
 
 def _series(session: RecordedSession) -> list[Series]:

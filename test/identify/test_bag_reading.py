@@ -194,6 +194,22 @@ def test_clocks_that_have_no_time_in_common_are_refused_unless_an_offset_is_give
     assert len(bag_flight(bag, Choice(offsets={"/twist": -100.0})).series) == 4
 
 
+def test_a_wrench_with_another_clock_is_refused_too(tmp_path: Path) -> None:
+    late = [(t, fb.wrench(t, FORCE, TORQUE, "body")) for t in range(100 * 10**9, 101 * 10**9, 10**8)]
+    bag = _poses(tmp_path, **{"/w": ("geometry_msgs/msg/WrenchStamped", late)})
+    with pytest.raises(InputError, match="clocks: /w begins"):
+        bag_flight(bag, Choice())
+    moved = bag_flight(bag, Choice(offsets={"/w": -100.0}))
+    assert moved.acting.begin_ns[0] == moved.begin_ns
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_too_few_samples_are_refused(tmp_path: Path, count: int) -> None:
+    flight = bag_flight(_poses(tmp_path, count), Choice())
+    with pytest.raises(InputError, match=f"has {count} samples"):
+        identify([flight])
+
+
 @pytest.mark.parametrize(
     ("topics", "message"),
     [
