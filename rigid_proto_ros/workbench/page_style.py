@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How the page is laid out on a narrow screen: the picture above, below it and not over it readouts and controls.
+"""How the page is laid out on a narrow screen and on paper: the picture above, below it and not over it readouts and
+controls; on paper all of them, however far they were scrolled.
 
 viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a
 long way down; it has no setting for either. A style sheet can change it, and viser passes HTML of its server's on to
@@ -21,6 +22,9 @@ _SHEET = '.mantine-Paper-root[style*="position: fixed"][style*="max-height: 60%"
 _READOUTS = '[aria-label$=" panel Readouts"]'
 _PICTURE = 'div[style*="flex-grow: 1"][style*="height: 100%"]:has(canvas)'
 
+_CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
+_SCROLLED = ".mantine-ScrollArea-viewport"
+
 STYLE = f"""<style>
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
@@ -30,6 +34,13 @@ STYLE = f"""<style>
   }}
   {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}) {{ order: -1; }}
   {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
+}}
+@media print {{
+  html, body, #root, div:has({_SCROLLED}), div:has({_CANVAS}), .mantine-ScrollArea-root, {_SCROLLED} {{
+    position: static !important; overflow: visible !important; flex: none !important;
+    height: auto !important; min-height: auto !important; max-height: none !important;
+  }}
+  .mantine-Notifications-root {{ display: none; }}
 }}
 </style>"""
 

@@ -161,6 +161,18 @@ def test_on_a_phone_the_body_is_seen_above_the_panel_and_the_readouts_are_at_its
     until(lambda: _top(time_row) < PHONE["height"], "numbers in sight")
 
 
+def test_on_paper_the_whole_panel_is_below_the_picture_however_far_it_was_scrolled(browser_page) -> None:
+    page = browser_page
+    page.set_viewport_size(DESKTOP)
+    page.emulate_media(media="print")
+    cut = "[...document.querySelectorAll('.mantine-ScrollArea-viewport')].filter(e => e.scrollHeight > e.clientHeight).length"
+    until(lambda: page.evaluate(cut) == 0, "panel without a part that is cut")
+    canvas = page.locator("canvas").first.bounding_box()
+    assert _top(page.get_by_text("Speed", exact=True).first) >= canvas["y"] + canvas["height"] - 1.0
+    page.emulate_media(media="screen")
+    until(lambda: page.evaluate(cut) > 0, "panel of the screen")
+
+
 def _top(element) -> float:
     """Where its upper edge is; infinite while the page hasn't laid it out, also in the middle of a change."""
     box = element.bounding_box() if element.count() else None
