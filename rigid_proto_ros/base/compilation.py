@@ -12,15 +12,24 @@ import functools
 import hashlib
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numba
-from numba import config
-from numba.core import event
-from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
-from numba.extending import intrinsic as numba_intrinsic
+_MEASURED = "coverage" in sys.modules
+if not _MEASURED:
+    # numba imports it wherever it is installed, a tenth of its own time; it is of use while something is measured.
+    sys.modules["coverage"] = None  # type: ignore[assignment] (what Python takes for a module that isn't there)
+try:
+    import numba
+    from numba import config
+    from numba.core import event
+    from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
+    from numba.extending import intrinsic as numba_intrinsic
+finally:
+    if not _MEASURED:
+        del sys.modules["coverage"]
 
 __all__ = ["INTERPRETED", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
 
