@@ -18,9 +18,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 _MEASURED = "coverage" in sys.modules
+_ABSENT: Any = None
+"""What Python takes for a module that isn't there."""
 if not _MEASURED:
     # numba imports it wherever it is installed, a tenth of its own time; it is of use while something is measured.
-    sys.modules["coverage"] = None  # type: ignore[assignment] (what Python takes for a module that isn't there)
+    sys.modules["coverage"] = _ABSENT
 try:
     import numba
     from numba import config

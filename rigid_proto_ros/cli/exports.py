@@ -15,7 +15,7 @@ from .options import pixels
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
-    from ..export.looks import Looks
+    from ..export.state_source import StateSource
 
 ENDINGS = {
     "csv": (".csv",),
@@ -144,7 +144,7 @@ def _parts(args: argparse.Namespace) -> list[str]:
 
 
 def write_exports(
-    args: argparse.Namespace, record: FlightRecord, looks: Looks | None, say: Callable[[str], None]
+    args: argparse.Namespace, record: FlightRecord, source: StateSource | None, say: Callable[[str], None]
 ) -> None:
     """Write what is asked for, and ``say`` a line of each file; raises InputError."""
     files = asked(args)
@@ -161,16 +161,16 @@ def write_exports(
                         table.write_parquet(files[name], columns)
                 say(f"{files[name]}: {len(record.times_ns)} states")
     if "gltf" in files or "usd" in files:
-        _write_animations(args, files, record, looks, say)
+        _write_animations(args, files, record, source, say)
     if "video" in files:
-        _write_film(args, files["video"], record, looks, say)
+        _write_film(args, files["video"], record, source, say)
 
 
 def _write_animations(
     args: argparse.Namespace,
     files: dict[str, str],
     record: FlightRecord,
-    looks: Looks | None,
+    source: StateSource | None,
     say: Callable[[str], None],
 ) -> None:
     from ..export.animation import animate
@@ -179,7 +179,7 @@ def _write_animations(
 
     parts = _parts(args)
     with Progress("choosing keys") as progress:
-        made = animate(record, looks, args.tolerance or 1e-3, args.fps, parts, progress.fraction)
+        made = animate(record, source, args.tolerance or 1e-3, args.fps, parts, progress.fraction)
     for name in ("gltf", "usd"):
         if name not in files:
             continue
@@ -194,13 +194,13 @@ def _write_animations(
 
 
 def _write_film(
-    args: argparse.Namespace, file: str, record: FlightRecord, looks: Looks | None, say: Callable[[str], None]
+    args: argparse.Namespace, file: str, record: FlightRecord, source: StateSource | None, say: Callable[[str], None]
 ) -> None:
     from ..export.film import film_motion, write_film
 
     fps = args.fps or 30.0
     begin_s, end_s = (getattr(args, option) for option in ("from", "to"))
-    motion = film_motion(record, looks, fps, begin_s, end_s)
+    motion = film_motion(record, source, fps, begin_s, end_s)
     with Progress(f"drawing {file}", unit="pictures") as progress:
         write_film(file, record, motion, fps, _film_size(args), progress.fraction)
     say(f"{file}: {len(motion.times_ns)} pictures, {fps:g} a second")

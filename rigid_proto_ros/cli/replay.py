@@ -159,7 +159,7 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
 
 def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
     from ..export.flight_record import FlightRecord
-    from ..export.looks import looks_of_session
+    from ..export.state_source import source_of_session
     from ..session.playback import play
 
     session, record, given = runs[-1], FlightRecord(), given_scene(args.scene)
@@ -167,7 +167,7 @@ def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
         play(session, record, given, progress.fraction)
     if len(runs) > 1:
         print(f"  exported is run {len(runs)}, the last")
-    write_exports(args, record, looks_of_session(session, given), lambda text: print(f"  {text}"))
+    write_exports(args, record, source_of_session(session, given), lambda text: print(f"  {text}"))
 
 
 def _print_difference(difference: Difference, session: RecordedSession) -> None:

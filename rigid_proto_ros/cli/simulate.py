@@ -108,9 +108,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print_summary(result, recordings)
     if record is not None:
-        from ..export.looks import looks_of_scene
+        from ..export.state_source import source_of_scene
 
-        write_exports(args, record, looks_of_scene(scenario, script), _warn if args.json else line)
+        write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else line)
     if floor := flight.simulation.accuracy_floor:
         _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held at the end: {floor}")
     if flight.simulation.failure:

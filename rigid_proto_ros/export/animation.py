@@ -10,8 +10,8 @@ import numpy as np
 
 from .flight_record import FlightRecord
 from .keys import PoseKeys, pose_keys
-from .looks import Looks
 from .sampling import Motion, Sampler, Tolerance, body_size
+from .state_source import StateSource
 from .string_line import StringKeys, shapes_apart, string_keys, string_shapes
 
 TIMES_CHECKED = 1000
@@ -20,7 +20,7 @@ TIMES_CHECKED = 1000
 
 @dataclass(frozen=True)
 class Animation:
-    """motion: looks at the flight; keys: of its tracks; string: None where none is tied, or none is asked for. error:
+    """motion: samples of the flight; keys: of its tracks; string: None where none is tied, or none is asked for. error:
     the worst that was measured, in [m] and [rad], of all. report: what to say of it, a line each.
     """
 
@@ -33,7 +33,7 @@ class Animation:
 
 def animate(
     record: FlightRecord,
-    looks: Looks | None,
+    source: StateSource | None,
     share: float = 1e-3,
     fps: float | None = None,
     parts: Collection[str] = (),
@@ -45,7 +45,7 @@ def animate(
     """
     size = body_size(record)
     tolerance = Tolerance.of(share, size)
-    sampler = Sampler(record, looks, tolerance, "ghost" in parts, "string" in parts)
+    sampler = Sampler(record, source, tolerance, "ghost" in parts, "string" in parts)
     motion = sampler.within(progress) if fps is None else sampler.at(sampler.evenly(fps))
     keys = [pose_keys(motion, track, tolerance if fps is None else None) for track in motion.tracks]
     string = None

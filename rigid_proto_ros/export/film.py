@@ -16,8 +16,8 @@ from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, HAND_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from .flight_record import FlightRecord
-from .looks import Looks
 from .sampling import Motion, Sampler, Tolerance, Track, body_size
+from .state_source import StateSource
 from .string_line import string_points, string_shapes
 
 VIEW = np.array([0.55, -0.8, 0.4])
@@ -86,12 +86,16 @@ def write_film(
 
 
 def film_motion(
-    record: FlightRecord, looks: Looks | None, fps: float, begin_s: float | None = None, end_s: float | None = None
+    record: FlightRecord,
+    source: StateSource | None,
+    fps: float,
+    begin_s: float | None = None,
+    end_s: float | None = None,
 ) -> Motion:
     """Body and ghost at the times of the pictures of a part of the flight, simulated time begin_s to end_s [s]. Raises
     InputError for a part that has none.
     """
-    sampler = Sampler(record, looks, Tolerance.of(1e-3, body_size(record)), ghost=True)
+    sampler = Sampler(record, source, Tolerance.of(1e-3, body_size(record)), ghost=True)
     first = max(0 if begin_s is None else round(begin_s * 1e9), sampler.start_ns)
     last = min(sampler.end_ns if end_s is None else round(end_s * 1e9), sampler.end_ns)
     if last < first:
@@ -138,10 +142,10 @@ class _Stage:
         light = pygfx.DirectionalLight("#ffffff", 2.4)
         light.local.position = tuple(VIEW + [0.5, 0.4, 1.0])
         self.scene.add(light)
-        looks = ((BODY_COLOUR, 1.0), (GHOST_COLOUR, GHOST_OPACITY))
+        styles = ((BODY_COLOUR, 1.0), (GHOST_COLOUR, GHOST_OPACITY))
         self._bodies = [
             _Drawn(self.scene, record, motion, track, colour, opacity)
-            for (colour, opacity), track in zip(looks, motion.tracks, strict=False)
+            for (colour, opacity), track in zip(styles, motion.tracks, strict=False)
         ]
         self._trail = self._line(self._places, TRAIL_COLOUR, 2.0)
         self._curves = string_points(string_shapes(record, motion.times_ns, motion.body.poses))

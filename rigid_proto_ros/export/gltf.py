@@ -189,8 +189,8 @@ def write_gltf(file: str, record: FlightRecord, made: Animation, trail: bool = F
     root = document.node("flight", None, rotation=Y_UP)
     document.gltf.nodes[root].extras = {"first_time_s": motion.times_ns[0] * 1e-9}
     surfaces = [_surface(document, mesh) for mesh in record.meshes]
-    looks = (("body", document.material("body", BODY_COLOUR)), ("ghost", -1))
-    for (name, material), track, pose in zip(looks, motion.tracks, keys, strict=False):
+    styles = (("body", document.material("body", BODY_COLOUR)), ("ghost", -1))
+    for (name, material), track, pose in zip(styles, motion.tracks, keys, strict=False):
         if name == "ghost":
             material = document.material("ghost", GHOST_COLOUR, 0.45)
         body = document.node(name, root)

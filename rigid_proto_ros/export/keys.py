@@ -11,7 +11,7 @@ from .interpolation import Keys, attitude_angles, fewest_keys, rounded
 from .sampling import Motion, Tolerance, Track, single
 
 SHARE = 0.7
-"""Of the tolerance, for keys that are left out; the rest is for what happens between two looks, and for rounding."""
+"""Of the tolerance, for keys that are left out; the rest is for what happens between two samples, and for rounding."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class PoseKeys:
 
 
 def pose_keys(motion: Motion, track: Track, tolerance: Tolerance | None) -> PoseKeys:
-    """The fewest keys within the tolerance; all looks without one. At a change of what is drawn the centre of mass
+    """The fewest keys within the tolerance; all samples without one. At a change of what is drawn the centre of mass
     may jump: from one single-precision time to the next.
     """
     poses = _without_gaps(track.poses)
@@ -46,7 +46,7 @@ def pose_keys(motion: Motion, track: Track, tolerance: Tolerance | None) -> Pose
         if number + 1 < len(spans):
             last = single(np.array([spans[number + 1].drawn.time_ns - motion.times_ns[0]]))[0]
             own[-1] = np.nextafter(np.float32(last), np.float32(-1.0))
-        # Of looks at equal times, and of those that the end was moved before, the last counts.
+        # Of samples at equal times, and of those that the end was moved before, the last counts.
         at = np.flatnonzero(np.append(np.minimum.accumulate(own[::-1])[::-1][1:] > own[:-1], True))
         own, rows = own[at], poses[span.begin : span.end][at]
         chosen = _all(own), _all(own)

@@ -17,15 +17,15 @@ from ..base.errors import InputError
 from ..rerun_view.inertia_shapes import PrincipalFrame
 from .flight_record import DrawnBody, FlightRecord
 from .interpolation import attitude_angles, blend
-from .looks import POSE, Looks
+from .state_source import POSE, StateSource
 from .string_line import shapes_apart, string_breaks, string_changes, string_shapes
 
 TURN_MAX = 0.5
-"""[rad] Between two looks at least, so that no turn is missed."""
+"""[rad] Between two samples at most, so that no turn is missed."""
 SHARE = 0.25
-"""Of the tolerance, for what happens between two looks."""
+"""Of the tolerance, for what happens between two samples."""
 PASSES = 24
-LOOKS_MAX = 4_000_000
+SAMPLES_MAX = 4_000_000
 AGREES = 0.1
 """Of the tolerance: how near the flight must come to a recorded state to be taken for the recorded one."""
 
@@ -62,7 +62,7 @@ def body_size(record: FlightRecord) -> float:
 
 @dataclass(frozen=True)
 class Span:
-    """Looks begin to end − 1, through which the body is drawn alike."""
+    """StateSource begin to end − 1, through which the body is drawn alike."""
 
     begin: int
     end: int
@@ -101,7 +101,7 @@ class Motion:
         return [self.body] if self.ghost is None else [self.body, self.ghost]
 
     def spans(self, track: Track) -> list[Span]:
-        """The looks, by how the body is drawn."""
+        """The samples, by how the body is drawn."""
         found = drawn_alike(track.bodies)
         # A state at the time of a change is the one before it.
         begins = [0, *np.searchsorted(self.times_ns, [b.time_ns for b in found[1:]], side="right").tolist()]
@@ -134,35 +134,35 @@ def single(times_ns: np.ndarray) -> np.ndarray:
 
 
 class Sampler:
-    """Looks at a flight again. looks: None for one that can't be simulated; then its recorded states are all there
+    """Samples of a flight. source: None for one that can't be simulated again; then its recorded states are all there
     is, as ``note`` says. With ``ghost`` the ghost's motion counts too, with ``string`` that of the string.
     """
 
     def __init__(
         self,
         record: FlightRecord,
-        looks: Looks | None,
+        source: StateSource | None,
         tolerance: Tolerance,
         ghost: bool = False,
         string: bool = False,
     ) -> None:
         self.record = record
-        self.looks = looks
+        self.source = source
         self.tolerance = tolerance
         self.note = ""
         self._ghost = ghost
         self._string = string
         self.start_ns, self.end_ns = int(record.times_ns[0]), int(record.times_ns[-1])
-        if looks is None:
+        if source is None:
             self.note = "the session can't be simulated again: between its states nothing is known"
         elif not self._agrees():
-            self.looks = None
+            self.source = None
             self.note = "simulated again here the motion isn't the recorded one: between its states nothing is known"
 
     def at(self, times_ns: np.ndarray) -> Motion:
         """The motion at these times (n,), ascending; between recorded states where it can't be looked at."""
-        if self.looks is not None:
-            return self._motion(times_ns, *self.looks.at(times_ns))
+        if self.source is not None:
+            return self._motion(times_ns, *self.source.at(times_ns))
         known, rows = self.record.times_ns, self.record.rows
         if len(known) == 1:
             return self._motion(known, rows, np.full((1, POSE), np.nan))
@@ -174,8 +174,8 @@ class Sampler:
     def evenly(self, fps: float) -> np.ndarray:
         """Times (n,) [ns] of pictures, with the end, and both sides of every change of what is drawn."""
         count = int(np.floor((self.end_ns - self.start_ns) * 1e-9 * fps)) + 1
-        if count > LOOKS_MAX:
-            raise InputError("--fps", fps, f"at most {LOOKS_MAX} pictures of the flight")
+        if count > SAMPLES_MAX:
+            raise InputError("--fps", fps, f"at most {SAMPLES_MAX} pictures of the flight")
         pictures = np.rint(np.arange(count) / fps * 1e9).astype(np.int64) + self.start_ns
         return np.union1d(pictures, [self.end_ns, *self._changes()]).astype(np.int64)
 
@@ -184,12 +184,12 @@ class Sampler:
         tolerance. Raises InputError where that takes too many.
         """
         tolerance = self.tolerance
-        if self.looks is None:
+        if self.source is None:
             return self.at(self.record.times_ns)
         marks = [*self.record.breaks, *string_breaks(self.record), *(t for t, _ in self.record.strings)]
         breaks = [t for t in marks if self.start_ns <= t <= self.end_ns]
         times = np.union1d(self._snapped(np.union1d(self.record.times_ns, breaks)), self._changes()).astype(np.int64)
-        rows, ghosts = self.looks.at(times)
+        rows, ghosts = self.source.at(times)
         times, rows, ghosts = self._turned(times, rows, ghosts)
         active = np.ones(len(times) - 1, dtype=bool)
         for number in range(PASSES):
@@ -200,9 +200,11 @@ class Sampler:
             where, middles = where[inside], middles[inside]
             if not len(where):
                 break
-            if len(times) + len(where) > LOOKS_MAX:
-                raise InputError("--tolerance", tolerance.position, f"a larger one: it takes over {LOOKS_MAX} samples")
-            found, ghosts_found = self.looks.at(middles)
+            if len(times) + len(where) > SAMPLES_MAX:
+                raise InputError(
+                    "--tolerance", tolerance.position, f"a larger one: it takes over {SAMPLES_MAX} samples"
+                )
+            found, ghosts_found = self.source.at(middles)
             u = ((middles - times[where]) / (times[where + 1] - times[where]))[:, np.newaxis]
             errs = _errs(tolerance, rows[:, :POSE], where, u, found[:, :POSE])
             if self._ghost:
@@ -225,14 +227,16 @@ class Sampler:
     def _turned(
         self, times: np.ndarray, rows: np.ndarray, ghosts: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """More looks where the body turns far between two."""
-        assert self.looks is not None
+        """More samples where the body turns far between two."""
+        assert self.source is not None
         spin = np.linalg.norm(rows[:, 10:13], axis=1)
         turn = np.fmax(spin[1:], spin[:-1]) * np.diff(times) * 1e-9
         parts = np.where(np.isfinite(turn), np.ceil(turn / TURN_MAX), 1.0)
-        if parts.sum() > LOOKS_MAX:
+        if parts.sum() > SAMPLES_MAX:
             raise InputError(
-                "--gltf", f"{parts.sum():.3g} looks, so fast does the body turn", f"flights of at most {LOOKS_MAX:g}"
+                "--gltf",
+                f"{parts.sum():.3g} samples, so fast does the body turn",
+                f"flights of at most {SAMPLES_MAX:g}",
             )
         counts = np.maximum(parts, 1.0).astype(int)
         if counts.max(initial=1) == 1:
@@ -241,7 +245,7 @@ class Sampler:
         within = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
         more = times[piece] + np.rint(np.diff(times)[piece] * (within / counts[piece])).astype(np.int64)
         times = np.union1d(np.where(within > 0, self._snapped(more), more), times[-1:])
-        return times, *self.looks.at(times)
+        return times, *self.source.at(times)
 
     def _snapped(self, times_ns: np.ndarray) -> np.ndarray:
         """The nearest times [ns] at which single precision has a number, within the flight."""
@@ -265,8 +269,8 @@ class Sampler:
 
     def _agrees(self) -> bool:
         """Whether the motion simulated again is the recorded one; it isn't quite on another kind of processor."""
-        assert self.looks is not None
-        rows, _ = self.looks.at(self.record.times_ns)
+        assert self.source is not None
+        rows, _ = self.source.at(self.record.times_ns)
         errs = self.tolerance.worst(*_apart(rows[:, :POSE], self.record.rows[:, :POSE]))
         return bool(np.all(errs <= AGREES))
 

@@ -99,7 +99,7 @@ def string_keys(seconds: np.ndarray, shapes: np.ndarray, tolerance: float | None
     if not tied.any():
         return None
     times = seconds.copy()
-    # Of looks at one single-precision time the first is before a change, the last after it.
+    # Of samples at one single-precision time the first is before a change, the last after it.
     alike = times[1:] == times[:-1]
     before = np.flatnonzero(np.append(alike, False) & ~np.append(False, alike))
     times[before] = np.nextafter(times[before].astype(np.float32), np.float32(-1.0))

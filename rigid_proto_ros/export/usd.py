@@ -63,8 +63,8 @@ def write_usd(
     stage.SetEndTimeCode(float(motion.seconds[-1]) * rate)
     root = UsdGeom.Xform.Define(stage, "/flight")
     stage.SetDefaultPrim(root.GetPrim())
-    looks = (("body", BODY_COLOUR, 1.0), ("ghost", GHOST_COLOUR, GHOST_OPACITY))
-    for (name, colour, opacity), track, pose in zip(looks, motion.tracks, keys, strict=False):
+    styles = (("body", BODY_COLOUR, 1.0), ("ghost", GHOST_COLOUR, GHOST_OPACITY))
+    for (name, colour, opacity), track, pose in zip(styles, motion.tracks, keys, strict=False):
         prim = UsdGeom.Xform.Define(stage, f"/flight/{name}")
         _animate(prim, pose, rate)
         _hide_while_away(prim, motion, track, rate)

@@ -12,7 +12,7 @@ import pytest
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.film import film_motion, pictures
 from rigid_proto_ros.export.flight_record import FlightRecord
-from rigid_proto_ros.export.looks import looks_of_scene
+from rigid_proto_ros.export.state_source import source_of_scene
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 
 os.environ.setdefault("XDG_RUNTIME_DIR", "/tmp")
@@ -55,7 +55,7 @@ def test_a_part_of_a_flight_is_a_film_of_its_length(ending, tmp_path, capsys):
 def drawn(scene: str, settings: dict, seconds: float, fps: float) -> np.ndarray:
     scenario, record = read_scene(scene, settings), FlightRecord()
     OfflineRun(scenario, [], record).advance(round(seconds * 1e9))
-    motion = film_motion(record, looks_of_scene(scenario, []), fps)
+    motion = film_motion(record, source_of_scene(scenario, []), fps)
     return np.array([picture[..., :3].astype(int) for picture in pictures(record, motion, SMALL)])
 
 

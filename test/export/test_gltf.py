@@ -16,7 +16,7 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.animation import animate
 from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.export.interpolation import attitude_angles, slerp
-from rigid_proto_ros.export.looks import Looks, looks_of_scene
+from rigid_proto_ros.export.state_source import StateSource, source_of_scene
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 
@@ -81,25 +81,25 @@ def _size(player: Player, name: str, t: float) -> float:
     return float(np.ptp(player.world(name, player.mesh_points(name), t), axis=0).max())
 
 
-def record_of(scene: str, settings: dict, seconds: float, ghost: bool = False) -> tuple[FlightRecord, Looks]:
+def record_of(scene: str, settings: dict, seconds: float, ghost: bool = False) -> tuple[FlightRecord, StateSource]:
     scenario = read_scene(scene, settings)
     record = FlightRecord()
     OfflineRun(scenario, [], record).advance(round(seconds * 1e9))
-    return record, looks_of_scene(scenario, [])
+    return record, source_of_scene(scenario, [])
 
 
 def test_a_fast_spin_is_not_mistaken_for_a_slow_one_between_published_states():
     # 700 rad/s published every 10 ms: more than a turn from state to state.
-    record, looks = record_of("book", {"initial.angular_velocity": [0.0, 0.0, 700.0]}, 0.2)
-    made = animate(record, looks)
+    record, source = record_of("book", {"initial.angular_velocity": [0.0, 0.0, 700.0]}, 0.2)
+    made = animate(record, source)
     assert made.error[1] < np.radians(0.1)  # measured 6e-5 degrees
     assert len(made.keys[0].attitudes.times) > 0.2 * 700 / np.pi
 
 
 @pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-5])
 def test_fewer_keys_are_enough_where_more_error_is_allowed(share):
-    record, looks = record_of("hammer", THROWN, 0.5)
-    made = animate(record, looks, share)
+    record, source = record_of("hammer", THROWN, 0.5)
+    made = animate(record, source, share)
     assert made.error[0] <= share * 0.32 and made.error[1] <= np.radians(100 * share)
     assert len(made.report) == 1
     # A parabola of 9.81 m/s²: straight pieces of h err by g h²/8.
@@ -108,8 +108,8 @@ def test_fewer_keys_are_enough_where_more_error_is_allowed(share):
 
 
 def test_even_keys_say_what_they_err():
-    record, looks = record_of("hammer", THROWN, 0.5)
-    made = animate(record, looks, fps=25.0)
+    record, source = record_of("hammer", THROWN, 0.5)
+    made = animate(record, source, fps=25.0)
     assert np.allclose(np.diff(made.keys[0].places.times)[:-1], 0.04)
     assert made.error[0] == pytest.approx(9.81 * 0.04**2 / 8, rel=0.01)
     assert "beyond the tolerance" in made.report[1]

@@ -23,7 +23,7 @@ from test_string_line import ALLOWED, TIMES, curves_of, fly_on_string
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.interpolation import attitude_angles
-from rigid_proto_ros.export.looks import looks_of_session
+from rigid_proto_ros.export.state_source import source_of_session
 from rigid_proto_ros.rerun_view.session_files import read_runs
 
 pytestmark = [pytest.mark.stress]
@@ -156,7 +156,7 @@ def test_three_js_shows_the_body_where_the_session_has_it_at_a_thousand_times(mo
     played = page.evaluate("([u, n, t]) => window.play(u, n, t)", ["/played.glb", ["body"], times.tolist()])["body"]
     played = np.array(played)
     (run,) = read_runs(session)
-    rows, _ = looks_of_session(run).at(np.rint(times * 1e9).astype(np.int64))
+    rows, _ = source_of_session(run).at(np.rint(times * 1e9).astype(np.int64))
     # y up: (x, y, z) is shown at (x, z, −y), turned by the same quarter turn.
     places = rows[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     smallest = 0.236  # [m] the hammer's diagonal; the book is larger

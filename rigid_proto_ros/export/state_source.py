@@ -19,7 +19,7 @@ POSE = 7
 """Numbers of a state row that are its pose: position and attitude xyzw."""
 
 
-class Looks(Observer):
+class StateSource(Observer):
     """A flight that can be made anew and looked at; keeps what its ghost is told to be."""
 
     def __init__(self, make: Callable[[Observer], OfflineRun | Resimulation]) -> None:
@@ -52,13 +52,13 @@ class Looks(Observer):
         return rows, ghosts
 
 
-def looks_of_scene(scenario: Scenario, script: list[ScriptCommand]) -> Looks:
-    """At the flight of a scene and its script."""
-    return Looks(lambda observer: OfflineRun(scenario, script, observer))
+def source_of_scene(scenario: Scenario, script: list[ScriptCommand]) -> StateSource:
+    """The flight of a scene and its script."""
+    return StateSource(lambda observer: OfflineRun(scenario, script, observer))
 
 
-def looks_of_session(session: RecordedSession, given: Scenario | None = None) -> Looks | None:
-    """At the flight of a session; None for one that lacks what it would take to simulate it again."""
+def source_of_session(session: RecordedSession, given: Scenario | None = None) -> StateSource | None:
+    """The flight of a session; None for one that lacks what it would take to simulate it again."""
     if given is not None or session.missing:
         return None
 
@@ -67,4 +67,4 @@ def looks_of_session(session: RecordedSession, given: Scenario | None = None) ->
         flight.begin_ghost()
         return flight
 
-    return Looks(again)
+    return StateSource(again)
