@@ -84,7 +84,7 @@ class Estimate:
 
     values: Values
     unknowns: Unknowns
-    segments: list[sh.Segment]
+    segments: list[sh.ShootingInterval]
     starts: np.ndarray
     sigmas: dict[int, float]
     root: np.ndarray
@@ -204,15 +204,17 @@ def _balanced(work: _Work) -> Values | None:
     return balanced_values(poses, work.unknowns, work.values)
 
 
-def _local_starts(work: _Work, segments: Sequence[sh.Segment]) -> np.ndarray:
+def _local_starts(work: _Work, segments: Sequence[sh.ShootingInterval]) -> np.ndarray:
     return np.array([_local_start(work, segment) for segment in segments])
 
 
-def _local_start(work: _Work, segment: sh.Segment) -> np.ndarray:
+def _local_start(work: _Work, segment: sh.ShootingInterval) -> np.ndarray:
     return local_start(segment.flight, segment.begin_ns, work.reckoned.get(id(segment.flight)))
 
 
-def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, length: float, whole: float) -> np.ndarray:
+def _lengthened(
+    work: _Work, segments: list[sh.ShootingInterval], starts: np.ndarray, length: float, whole: float
+) -> np.ndarray:
     """Join segments step by step; returns starts of one segment for each flight."""
     factor = LENGTHENING
     least = _near_enough(work)
@@ -231,7 +233,7 @@ def _lengthened(work: _Work, segments: list[sh.Segment], starts: np.ndarray, len
     return starts
 
 
-def _of_one_heading(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+def _of_one_heading(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> np.ndarray:
     """Starts (k, 13) of flights without attitudes turned about the vertical, to agree with the one upon which a load
     acts: what such a segment shows doesn't depend on that turn unless a load in world axes acts on it, so that steps
     let it wander.
@@ -266,7 +268,7 @@ def _first_length(flights: Sequence[ms.MeasuredFlight], angle: float) -> float:
     return max(turning, total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
 
 
-def _thin_segments(work: _Work, length_s: float) -> list[sh.Segment]:
+def _thin_segments(work: _Work, length_s: float) -> list[sh.ShootingInterval]:
     """With as many samples as an approach needs."""
     every = {}
     for flight in work.flights:
@@ -275,7 +277,9 @@ def _thin_segments(work: _Work, length_s: float) -> list[sh.Segment]:
     return _segments(work, length_s, lambda series: every[id(series)])
 
 
-def _segments(work: _Work, length_s: float, every: Callable[[ms.Series], int] = lambda _: 1) -> list[sh.Segment]:
+def _segments(
+    work: _Work, length_s: float, every: Callable[[ms.Series], int] = lambda _: 1
+) -> list[sh.ShootingInterval]:
     offset = any(name == "offsets" for name, _ in work.unknowns.slots)
     margin = OFFSET_MARGIN_S if offset else max(0.0, -min(work.values.offsets, default=0.0))
     return sh.cut(
@@ -289,7 +293,9 @@ def _segments(work: _Work, length_s: float, every: Callable[[ms.Series], int] = 
     )
 
 
-def _start_of(work: _Work, segment: sh.Segment, before: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+def _start_of(
+    work: _Work, segment: sh.ShootingInterval, before: Sequence[sh.ShootingInterval], starts: np.ndarray
+) -> np.ndarray:
     """The start of that of the earlier segments which begins with this one, or a guess."""
     for other, start in zip(before, starts, strict=True):
         if other.flight is segment.flight and other.begin_ns == segment.begin_ns:
@@ -297,7 +303,7 @@ def _start_of(work: _Work, segment: sh.Segment, before: Sequence[sh.Segment], st
     return _local_start(work, segment)
 
 
-def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> float:
+def _sum_of_squares(segments: Sequence[sh.ShootingInterval], starts: np.ndarray, values: Values) -> float:
     total = 0.0
     for segment, start in zip(segments, starts, strict=True):
         found = sh.departures(segment, start, values)
@@ -311,7 +317,7 @@ def _sum_of_squares(segments: Sequence[sh.Segment], starts: np.ndarray, values: 
     return total
 
 
-def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> Values:
+def _scanned(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> Values:
     """The values with mass and size of the tensor about right, where a load tells them: Gauss-Newton
     steps don't come from far.
     """
@@ -344,7 +350,12 @@ def _scanned(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) ->
 
 
 def _solved(
-    work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray, most: int, tolerance: float, far: bool = False
+    work: _Work,
+    segments: Sequence[sh.ShootingInterval],
+    starts: np.ndarray,
+    most: int,
+    tolerance: float,
+    far: bool = False,
 ) -> np.ndarray:
     """Improve ``work.values``; returns the starts that go with them.
 
@@ -379,7 +390,7 @@ def _possible(values: Values) -> Values:
     return replace(values, theta=theta, tensor_change=np.zeros(6))
 
 
-def _along_the_rim(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> np.ndarray:
+def _along_the_rim(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> np.ndarray:
     """Improve ``work.values`` among the bodies that can exist, where the best of all tensors is none of these."""
     unknowns = work.unknowns.physical
     first = unknowns.slots.index(("tensor_change", 0))
@@ -394,7 +405,9 @@ def _along_the_rim(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarr
     return starts
 
 
-def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, values: Values) -> dict[int, np.ndarray]:
+def residuals_by_series(
+    segments: Sequence[sh.ShootingInterval], starts: np.ndarray, values: Values
+) -> dict[int, np.ndarray]:
     """Departures (n, 3) of each series in its own unit, by ``id``."""
     parts: dict[int, list[np.ndarray]] = {}
     for segment, start in zip(segments, starts, strict=True):
@@ -403,7 +416,7 @@ def residuals_by_series(segments: Sequence[sh.Segment], starts: np.ndarray, valu
     return {key: np.concatenate(part) for key, part in parts.items()}
 
 
-def _departures(segment: sh.Segment, start: np.ndarray, values: Values) -> list[np.ndarray]:
+def _departures(segment: sh.ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray]:
     """Of a segment that can be flown."""
     found = sh.departures(segment, start, values)
     if found is None:
@@ -411,7 +424,7 @@ def _departures(segment: sh.Segment, start: np.ndarray, values: Values) -> list[
     return found
 
 
-def _noise(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> dict[int, float]:
+def _noise(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> dict[int, float]:
     """Standard deviation of each series from its departures; series of one topic and quantity share it
     over all flights.
     """
@@ -431,7 +444,7 @@ def _noise(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> d
     }
 
 
-def _huber_weights(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarray) -> dict[int, np.ndarray]:
+def _huber_weights(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> dict[int, np.ndarray]:
     """1, or less for samples that lie too far off; the middle size of the departures says what far is."""
     weights = {}
     for key, part in residuals_by_series(segments, starts, work.values).items():
@@ -442,7 +455,7 @@ def _huber_weights(work: _Work, segments: Sequence[sh.Segment], starts: np.ndarr
     return weights
 
 
-def _estimate(work: _Work, segments: list[sh.Segment], starts: np.ndarray) -> Estimate:
+def _estimate(work: _Work, segments: list[sh.ShootingInterval], starts: np.ndarray) -> Estimate:
     roots: dict[float, list[np.ndarray]] = {1.0: [], WIDER: []}
     cost = 0.0
     for wider, parts in roots.items():

@@ -47,7 +47,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Segment:
+class ShootingInterval:
     """flight: which one it is of. begin_ns: when it starts, no later than its first sample."""
 
     flight: ms.MeasuredFlight
@@ -69,7 +69,7 @@ def cut(
     weights: Callable[[ms.Series], np.ndarray],
     margin_s: float = 0.0,
     every: Callable[[ms.Series], int] = lambda _: 1,
-) -> list[Segment]:
+) -> list[ShootingInterval]:
     """Segments of about this length, alike within a flight; margin_s: how much earlier they start than
     their samples. every: each so-many-th sample of a series is used.
     """
@@ -90,7 +90,9 @@ def cut(
                     pieces.append(Piece(series, topic, times, values, sigma(series), weights(series)[inside]))
             if pieces:
                 begin = int(first) - margin
-                segments.append(Segment(flight, begin, tuple(pieces), flight.acting.within(begin, int(last) + margin)))
+                segments.append(
+                    ShootingInterval(flight, begin, tuple(pieces), flight.acting.within(begin, int(last) + margin))
+                )
     return segments
 
 
@@ -125,7 +127,7 @@ def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
     return rows
 
 
-def _times(segment: Segment, offsets: Sequence[float]) -> tuple[np.ndarray, list[np.ndarray]]:
+def _times(segment: ShootingInterval, offsets: Sequence[float]) -> tuple[np.ndarray, list[np.ndarray]]:
     """Times to look at, ascending from the segment's begin [ns], and for each piece which of them are its own."""
     own = [piece.times_ns - segment.begin_ns + round(offsets[piece.topic] * 1e9) for piece in segment.pieces]
     times, where = np.unique(np.maximum(np.concatenate(own), 0), return_inverse=True)
@@ -134,7 +136,7 @@ def _times(segment: Segment, offsets: Sequence[float]) -> tuple[np.ndarray, list
 
 
 def _shown(
-    segment: Segment, starts: np.ndarray, values: Sequence[Values]
+    segment: ShootingInterval, starts: np.ndarray, values: Sequence[Values]
 ) -> tuple[list[np.ndarray], np.ndarray | None]:
     """What each piece would show of each flight, (n, m, 3 or 4), and the samples of the first one; None
     where one failed.
@@ -159,7 +161,7 @@ def _shown(
     return shown, samples[0]
 
 
-def departures(segment: Segment, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
+def departures(segment: ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
     """Measured minus shown of each piece (m, 3), in its own unit; None where the flight failed."""
     shown, _ = _shown(segment, start[None], [values])
     if not shown:
@@ -167,7 +169,9 @@ def departures(segment: Segment, start: np.ndarray, values: Values) -> list[np.n
     return [departure(p.series.kind, s[0], p.values) for p, s in zip(segment.pieces, shown, strict=True)]
 
 
-def flown_poses(segment: Segment, start: np.ndarray, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def flown_poses(
+    segment: ShootingInterval, start: np.ndarray, values: Values
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,) [ns from the segment's begin] of all samples, and what the tracked frame's poses are there: positions
     (n, 3) [m] and attitudes (n, 4) xyzw; raises InputError where the flight failed.
     """
@@ -235,7 +239,7 @@ def _shift_columns(
 
 
 def linearized(
-    segment: Segment, start: np.ndarray, variations: Variations
+    segment: ShootingInterval, start: np.ndarray, variations: Variations
 ) -> tuple[list[np.ndarray], np.ndarray] | None:
     """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 +
     unknowns).
@@ -267,7 +271,7 @@ def linearized(
 
 
 def _fill_offset(
-    segment: Segment, start: np.ndarray, values: Values, topic: int, columns: Sequence[np.ndarray]
+    segment: ShootingInterval, start: np.ndarray, values: Values, topic: int, columns: Sequence[np.ndarray]
 ) -> None:
     """How what a topic shows changes with its clock, into a column (m, 3) of each piece."""
     sides = []
@@ -305,7 +309,9 @@ class Problem:
     (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative).
     """
 
-    def __init__(self, segments: Sequence[Segment], starts: np.ndarray, values: Values, unknowns: Unknowns) -> None:
+    def __init__(
+        self, segments: Sequence[ShootingInterval], starts: np.ndarray, values: Values, unknowns: Unknowns
+    ) -> None:
         self.segments, self.unknowns, self._given = segments, unknowns, values
         self.first = unknowns.read(values)
         self.widths = PRIOR_STEPS * unknowns.steps(values)
