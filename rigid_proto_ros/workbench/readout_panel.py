@@ -43,6 +43,9 @@ SAMPLE_S = 0.1
 NUMBERS_S, PLOTS_S = 0.2, 0.5
 """[s] How often numbers and plots are drawn anew."""
 
+PADDING = (10, 12, 0, 0)
+"""[pixels] Above, right, below, left of a plot: a number at the end of an axis has half of its size beyond it."""
+
 PLOT_PIXELS = 130
 
 AXES: Any = ({"label": "t [s]", "labelSize": 14, "size": 30}, {"size": AXIS_PIXELS})
@@ -89,7 +92,7 @@ class LivePlot:
             height=PLOT_PIXELS,
             # Its values are those under the pointer, "--" while there is none.
             legend={"show": len(series) > 1, "live": False},
-            padding=(4, 12, 0, 0),
+            padding=PADDING,
         )
 
     @property

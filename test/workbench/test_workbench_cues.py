@@ -16,6 +16,7 @@ pytest.importorskip("viser", reason="viser is not installed: no interactive page
 from rigid_proto_ros.rerun_view.plot_range import plot_range
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.simulation.simulation import Simulation
+from rigid_proto_ros.workbench import readout_panel
 from rigid_proto_ros.workbench.keys import KEYS
 from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text
 from rigid_proto_ros.workbench.poke_mark import PokeMark
@@ -249,3 +250,8 @@ def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_o
     assert scene.nodes["/grid/shadow"].position[2] < scene.nodes["/grid/floor"].position[2]
     view.show_ghost(None, com, ("true", "its box"))
     assert not any(label.visible for label in labels)
+
+
+def test_the_number_at_the_top_of_an_axis_is_whole() -> None:
+    digits_px = 12  # of uPlot's axes
+    assert readout_panel.PADDING[0] >= 0.5 * digits_px  # 4 cut it in half
