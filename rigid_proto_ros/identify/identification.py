@@ -106,7 +106,7 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
     if known.mass is not None:
         said.append(f"mass {known.mass:g} kg, given")
     if "gravity" not in fit:
-        said.append(f"gravity {' '.join(f'{g:g}' for g in first.gravity)} m/s^2, from {first.gravity_from}")
+        said.append(f"gravity {' '.join(f'{g:g}' for g in first.gravity)} m/s^2, {first.gravity_from}")
     if "damping" not in fit:
         said.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
     if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
