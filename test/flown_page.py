@@ -29,7 +29,7 @@ from rigid_proto_ros.scene.yaml_text import load_plain_yaml
 from rigid_proto_ros.simulation.commands import Change, WrenchCommand
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench.drawn_poses import DrawnPose
-from rigid_proto_ros.workbench.ros_link import Received
+from rigid_proto_ros.workbench.ros_link import Received, SimulatedTimes
 
 PATIENCE_S = 60.0
 PERIOD_NS = 10_000_000
@@ -43,6 +43,7 @@ class FlownLink:
 
     def __init__(self, target, deliver, on_scene, on_diagnostics) -> None:
         self.target = target
+        self.times = SimulatedTimes()
         self._deliver, self._on_scene, self._on_diagnostics = deliver, on_scene, on_diagnostics
         self._log = EventLines()
         self.scenario: Scenario = make_scenario({})

@@ -8,9 +8,10 @@ commands.
 
 from __future__ import annotations
 
+import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,10 +59,53 @@ class Received:
     events: list[str] = field(default_factory=list)
 
 
+class SimulatedTimes:
+    """Simulated time of the stamps of a node that may follow a /clock: its events and reports say how far its stamps
+    are ahead.
+    """
+
+    def __init__(self) -> None:
+        self._offsets: tuple[tuple[int, int], ...] = ()
+        self.reports = 0
+
+    @property
+    def offset_ns(self) -> int:
+        """How far stamps are ahead of simulated time now."""
+        return self._offsets[-1][1] if self._offsets else 0
+
+    def heard(self, line: str) -> None:
+        """A line of ``~/events``."""
+        if '"clock"' not in line:
+            return
+        try:
+            event = json.loads(line)
+            if event["kind"] == "clock":
+                self._add(int(event["time_ns"]), int(event["content"]["offset_ns"]))
+        except (ValueError, KeyError, TypeError):
+            pass  # whoever takes the line up says that it isn't one of the log
+
+    def reported(self, values: Mapping[str, str]) -> None:
+        """A report of /diagnostics: all that a page hears that opens after the event. An old report changes nothing."""
+        offset_ns = int(values.get("stamp_offset_ns", 0))
+        self.reports += 1
+        if all(offset_ns != known for _, known in self._offsets or ((0, 0),)):
+            self._add(0, offset_ns)
+
+    def _add(self, begin_ns: int, offset_ns: int) -> None:
+        self._offsets = (*self._offsets[-1:], (begin_ns, offset_ns))
+
+    def of(self, stamp_ns: int) -> int:
+        """The simulated time [ns]: by the last offset that may have been in force."""
+        for begin_ns, offset_ns in reversed(self._offsets):
+            if stamp_ns >= begin_ns + offset_ns:
+                return stamp_ns - offset_ns
+        return stamp_ns
+
+
 class RosLink:
     """A client of the node ``target``. deliver(function, *arguments) runs a function on the page's thread.
 
-    on_scene(text) and on_diagnostics(values) are called through it while the link is open.
+    on_scene(text) and on_diagnostics(values) are called through it while the link is open. times: of the node's stamps.
     """
 
     def __init__(
@@ -91,6 +135,7 @@ class RosLink:
         self._taken: dict[str, Subscription] = {}
         self._served: list[Subscription] = []
         self._poses: dict[int, PoseStamped] = {}
+        self.times = SimulatedTimes()
         self._last_call: Future | None = None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
@@ -176,6 +221,7 @@ class RosLink:
         for status in message.status:
             if status.name == f"{self.target}: simulation":
                 values = {v.key: v.value for v in status.values}
+                self.times.reported(values)
                 self._deliver(self._on_diagnostics, values)
 
     def take(self) -> Received:
@@ -184,14 +230,16 @@ class RosLink:
         if not taken:
             return Received()
         events = [message.data for message in _drain(taken["events"], String)]
+        for line in events:
+            self.times.heard(line)
         for pose in _drain(taken["pose"], PoseStamped):
             self._poses[_stamp_ns(pose)] = pose
         states = []
         for twist in _drain(taken["twist"], TwistStamped):
-            time_ns = _stamp_ns(twist)
-            pose = self._poses.get(time_ns)
+            stamp_ns = _stamp_ns(twist)
+            pose = self._poses.get(stamp_ns)
             if pose is not None:
-                states.append((time_ns, _row(pose, twist)))
+                states.append((self.times.of(stamp_ns), _row(pose, twist)))
         while len(self._poses) > 2 * qos.STATE.depth:
             del self._poses[next(iter(self._poses))]
         return Received(states, events)

@@ -164,7 +164,14 @@ async def take_to(
 
 async def _send(link: RosLink, commands: Sequence[ScriptCommand], received: Callable[[], int]) -> None:
     first, number, confirmed = received(), 0, 0
-    for message in outgoing(list(commands)):
+    if link.times.offset_ns:
+        # The node stamps by a /clock, by another offset since the reset: the second report from here on has it.
+        last, deadline = link.times.reports + 2, time.monotonic() + STALLED_S
+        while link.times.reports < last:
+            if time.monotonic() > deadline:
+                raise InputError("node", f"no report on /diagnostics within {STALLED_S:g} s")
+            await asyncio.sleep(0.02)
+    for message in outgoing(list(commands), offset_ns=link.times.offset_ns):
         link.send(message.topic, message.data)
         number += len(message.commands)
         if number - confirmed >= MAX_UNCONFIRMED or number == len(commands):

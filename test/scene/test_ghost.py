@@ -68,7 +68,7 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
     fly()
     fly()
     ((reason, text),) = watcher.refusals
-    assert reason == "ghost" and "the ghost goes on without" in text and "free_body" in text
+    assert reason == "ghost" and "the ghost continues without" in text and "free_body" in text
     assert not simulation.refused  # the body itself carries it
     simulation.reset()
     ghost.reset(scenario)

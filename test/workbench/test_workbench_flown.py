@@ -132,7 +132,7 @@ def test_a_command_that_the_ghosts_integrator_cannot_carry_is_said(flown: FlownP
     flown.pull(place + [0.0, 0.1, 0.0])
     flown.fly(0.1)
     said = flown.said
-    flown.until(lambda: any("ghost goes on without" in text and "free_body" in text for text in said), "word of it")
+    flown.until(lambda: any("ghost continues without" in text and "free_body" in text for text in said), "word of it")
 
 
 def slider_below(flown: FlownPage, label: str):

@@ -18,7 +18,7 @@ from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.workbench import node_control
 from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.node_control import ParameterSetter
-from rigid_proto_ros.workbench.ros_link import Received
+from rigid_proto_ros.workbench.ros_link import Received, SimulatedTimes
 
 PATIENCE_S = 60.0
 STEP_NS = 100_000_000
@@ -29,6 +29,7 @@ class StandIn:
 
     def __init__(self, target, deliver, on_scene, on_diagnostics) -> None:
         self.target = target
+        self.times = SimulatedTimes()
         self.told: list[tuple] = []
         self.taken = True
         self.values: dict = {}
@@ -235,3 +236,21 @@ def test_a_parameter_call_that_nobody_answers_is_given_up_and_the_next_one_made(
         {"mass": 4.0},
     ]
     assert len(refused) == 1 and "no answer of the node" in refused[0]
+
+
+def test_stamps_of_a_clock_are_read_as_simulated_time_whenever_the_page_opens() -> None:
+    second = 1_000_000_000
+    times = SimulatedTimes()
+    assert times.of(3 * second) == 3 * second
+    times.reported({"stamp_offset_ns": "0"})
+    assert times.offset_ns == 0
+    # A page that opens later hears it from a report, one that is open from the event; an old report comes after it.
+    times.reported({"stamp_offset_ns": str(1000 * second)})
+    assert times.of(1002 * second) == 2 * second
+    times.heard('{"time_ns": 0, "kind": "clock", "content": {"offset_ns": 1010000000000}}')
+    times.reported({"stamp_offset_ns": str(1000 * second)})
+    assert (times.of(1012 * second), times.offset_ns) == (2 * second, 1010 * second)
+    # A state of before the event that comes late.
+    assert times.of(1009 * second) == 9 * second
+    times.heard('no line of the log: "clock"')
+    assert times.offset_ns == 1010 * second
