@@ -47,9 +47,14 @@ def test_a_drag_draws_the_string_from_the_grabbed_point_and_shows_the_energy_tha
     assert stretched == pytest.approx(tied.potential_energy(own.setup.body, own.state), rel=1e-3)
     assert not flown.said
     apart = float(np.linalg.norm(hand - knot))
+
+    def shown(length: float) -> np.ndarray:
+        # Read at once: the page itself draws the string anew with the next state.
+        page.view.show_string((knot, hand), length, np.array([0.0, 0.0, -9.81]))
+        return np.asarray(page.view._string.points) * page.view.unit
+
     for length in (0.0, 3.0 * apart):
-        flown.do(lambda length=length: page.view.show_string((knot, hand), length, np.array([0.0, 0.0, -9.81])))
-        pieces = np.asarray(page.view._string.points) * page.view.unit
+        pieces = flown.do(lambda length=length: shown(length))
         drawn = float(np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum())
         assert drawn == pytest.approx(length or apart, rel=5e-3)
     flown.let_go()
