@@ -130,13 +130,7 @@ def paired(_typing_context: Any, a: Any, b: Any) -> tuple:
 @_operation_on_vectors(lambda vector, number: vector.reshape(2, -1)[number], prefer_literal=True)
 def half(_typing_context: Any, vector: Any, number: Any) -> tuple:
     """The first or second half of a vector."""
-    each = vector.count // 2
-    chosen = [number.literal_value * each + k for k in range(each)]
-
-    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
-        return _shuffled(builder, arguments[0], arguments[0], chosen)
-
-    return Doubles(each)(vector, number), code
+    return _part(vector, number, 2)
 
 
 @_operation_on_vectors(lambda vector: float(np.max(np.abs(vector))))
@@ -185,7 +179,12 @@ def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> tuple:
 @_operation_on_vectors(lambda vector, number: vector.reshape(4, -1)[number], prefer_literal=True)
 def component(_typing_context: Any, vector: Any, number: Any) -> tuple:
     """One component of a vector of four."""
-    each = vector.count // 4
+    return _part(vector, number, 4)
+
+
+def _part(vector: Any, number: Any, count: int) -> tuple:
+    """Part ``number`` of ``count`` parts of equal length."""
+    each = vector.count // count
     chosen = [number.literal_value * each + k for k in range(each)]
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:

@@ -9,7 +9,7 @@ bit.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -173,3 +173,13 @@ def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitud
 def inertia_bytes(time_ns: int, frame_id: str, mass: float, com: Iterable[float], tensor6: Iterable[float]) -> bytes:
     """A geometry_msgs/InertiaStamped; tensor6 ixx ixy ixz iyy iyz izz."""
     return cdr.stamped_doubles(time_ns, frame_id, (mass, *com, *tensor6))
+
+
+def simulated_time(stamp_ns: int, offsets: Sequence[tuple[int, int]]) -> int:
+    """Simulated time [ns] of a stamp of a node that may follow a /clock. offsets, as they were told: (simulated time
+    from which it holds, how far stamps are ahead); the last one counts that may have been in force.
+    """
+    for begin_ns, offset_ns in reversed(offsets):
+        if stamp_ns >= begin_ns + offset_ns:
+            return stamp_ns - offset_ns
+    return stamp_ns

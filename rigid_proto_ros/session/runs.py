@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
-from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_string
+from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_string, simulated_time
 from .recorded_session import RecordedSession, scene_sha256
 
 if TYPE_CHECKING:
@@ -138,13 +138,11 @@ def _states(
 
 
 def _simulated(stamp_ns: int, log: int, clocks: list[tuple[int, int, int]]) -> int:
-    """Simulated time of a stamp. clocks: when the log was told of another offset of stamps, simulated time and offset
-    then; the last one counts that may have been in force.
+    """Simulated time of a stamp. clocks: when the log was told of another offset of stamps, and that offset as
+    ``simulated_time`` has it.
     """
-    for told, time_ns, offset_ns in reversed(clocks):
-        if told < log + RESET_WINDOW_NS and stamp_ns >= time_ns + offset_ns:
-            return stamp_ns - offset_ns
-    return stamp_ns
+    told_before = [(time_ns, offset_ns) for told, time_ns, offset_ns in clocks if told < log + RESET_WINDOW_NS]
+    return simulated_time(stamp_ns, told_before)
 
 
 def _log_times_of_restarts(state: tuple[np.ndarray, StampedRows]) -> list[int]:

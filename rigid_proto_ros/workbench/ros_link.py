@@ -33,6 +33,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
 from ..messages import cdr
+from ..messages.session_messages import simulated_time
 from ..ros import qos
 from ..ros.command_queue import Unserved
 from ..ros.parameter_server import ros_parameter
@@ -95,11 +96,8 @@ class SimulatedTimes:
         self._offsets = (*self._offsets[-1:], (begin_ns, offset_ns))
 
     def of(self, stamp_ns: int) -> int:
-        """The simulated time [ns]: by the last offset that may have been in force."""
-        for begin_ns, offset_ns in reversed(self._offsets):
-            if stamp_ns >= begin_ns + offset_ns:
-                return stamp_ns - offset_ns
-        return stamp_ns
+        """The simulated time [ns]."""
+        return simulated_time(stamp_ns, self._offsets)
 
 
 class RosLink:
