@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Kernels compiled, or loaded from the cache, before a command waits for them.
 
-``python -m rigid_proto_ros.ros.warm_up`` compiles auto's integrators and ends.
+``python -m rigid_proto_ros.ros.warm_up PID`` compiles auto's integrators and ends, at the latest when its parent, the
+process PID, does.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ class IntegratorsCompiling:
         folder = str(Path(__file__).resolve().parents[2])
         paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "rigid_proto_ros.ros.warm_up"],
+            [sys.executable, "-m", "rigid_proto_ros.ros.warm_up", str(os.getpid())],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -123,4 +124,6 @@ class IntegratorsCompiling:
 if __name__ == "__main__":
     # Linux: SIGTERM when the thread that started it ends, so that a node that is killed leaves nothing running.
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-    compile_integrators()
+    # A node that ended while this module was imported sends none.
+    if os.getppid() == int(sys.argv[1]):
+        compile_integrators()

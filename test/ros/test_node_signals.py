@@ -77,8 +77,10 @@ def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path
         time.sleep(0.02)
     helpers = descendants(node.pid)
     assert node.end(number, within_s=10.0) == 0, node.errors  # 59 s before
+    # Also where it had not come further than its imports; compiling all takes longer than this.
+    deadline = time.monotonic() + 15.0
     while any(alive(pid) for pid in helpers):
-        assert time.monotonic() < deadline, f"no end of the compiling process within {READY_S} s"
+        assert time.monotonic() < deadline, "the compiling process outlives its node"
         time.sleep(0.02)
     assert "Traceback" not in node.errors
     assert "is simulating" not in node.output + node.errors
