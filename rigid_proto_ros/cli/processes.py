@@ -3,16 +3,14 @@
 
 from __future__ import annotations
 
-import ctypes
 import importlib.util
 import json
-import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
+from ..base.child_processes import end_with_this_thread, with_this_package
 from ..base.errors import InputError, is_missing
 
 _MODULES = {
@@ -44,11 +42,6 @@ def text_parameter(name: str, text: str) -> list[str]:
     return ["-p", f"{name}:={json.dumps(text, ensure_ascii=False)}"]
 
 
-def _end_with_parent() -> None:
-    # Linux: SIGTERM when the parent dies, so that kill -9 of the command leaves no orphan.
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-
-
 class Processes:
     """Starts processes and ends them all on leaving, also when the command itself is ended by a signal."""
 
@@ -69,10 +62,9 @@ class Processes:
         """Start a process in a session of its own: a Ctrl-C at the terminal reaches this command alone,
         which ends them.
         """
-        folder = str(Path(__file__).resolve().parents[2])
-        paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-        process = subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent, env=environment)
+        process = subprocess.Popen(
+            command, start_new_session=True, preexec_fn=end_with_this_thread(), env=with_this_package()
+        )
         self._running.append(process)
         return process
 

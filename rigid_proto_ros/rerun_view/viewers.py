@@ -3,25 +3,20 @@
 
 from __future__ import annotations
 
-import ctypes
 import importlib.util
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
+from ..base.child_processes import end_with_this_thread
 from ..base.errors import is_missing
 from .ports import LOOPBACK, any_free_port
 
 STOP_TIMEOUT_S = 1.0
-
-PR_SET_PDEATHSIG = 1
-"""From linux/prctl.h."""
 
 
 def viewer_program() -> str | None:
@@ -39,18 +34,6 @@ def has_display() -> bool:
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _end_with_parent() -> Callable[[], None] | None:
-    """What the child does first, so that it ends with this process even when that is killed; Linux can, others can't.
-
-    The kernel counts the end of the starting thread as the parent's end, so only the main thread asks for it.
-    """
-    if not sys.platform.startswith("linux") or threading.current_thread() is not threading.main_thread():
-        return None
-    # Loaded before the fork: between fork and exec nothing may be imported.
-    prctl = ctypes.CDLL(None).prctl
-    return lambda: prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
 class ViewerProcess:
     """A viewer that was started here, and that ends with ``stop``."""
 
@@ -58,6 +41,7 @@ class ViewerProcess:
         program = viewer_program()
         if program is None:
             raise FileNotFoundError(is_missing("rerun-sdk", "rerun"))
+        in_main_thread = threading.current_thread() is threading.main_thread()
         # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture.
         environment = {**os.environ, "RERUN_APP_ONLY": "true"}
         self.process = subprocess.Popen(
@@ -66,7 +50,7 @@ class ViewerProcess:
             stdout=log,
             stderr=log,
             env=environment,
-            preexec_fn=_end_with_parent(),
+            preexec_fn=end_with_this_thread() if in_main_thread else None,  # another one may end before the viewer
         )
 
     @property

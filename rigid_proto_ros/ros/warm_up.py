@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Kernels compiled, or loaded from the cache, before a command waits for them.
 
-``python -m rigid_proto_ros.ros.warm_up PID`` compiles auto's integrators and ends, at the latest when its parent, the
-process PID, does.
+``python -m rigid_proto_ros.ros.warm_up`` compiles auto's integrators and ends.
 """
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from ..base.child_processes import end_with_this_thread, with_this_package
 from ..base.errors import CommandRefused
 from ..motion.frames import parse_frame
 from ..motion.integrators import INTEGRATORS, auto
@@ -104,11 +101,10 @@ class IntegratorsCompiling:
         """Start the process, where there is a second core for it."""
         if len(os.sched_getaffinity(0)) < 2:
             return
-        folder = str(Path(__file__).resolve().parents[2])
-        paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "rigid_proto_ros.ros.warm_up", str(os.getpid())],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            [sys.executable, "-m", "rigid_proto_ros.ros.warm_up"],
+            env=with_this_package(),
+            preexec_fn=end_with_this_thread(),  # which waits for it below
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,  # what it doesn't compile, this process will, and says what is wrong
@@ -122,8 +118,4 @@ class IntegratorsCompiling:
 
 
 if __name__ == "__main__":
-    # Linux: SIGTERM when the thread that started it ends, so that a node that is killed leaves nothing running.
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-    # A node that ended while this module was imported sends none.
-    if os.getppid() == int(sys.argv[1]):
-        compile_integrators()
+    compile_integrators()
