@@ -167,7 +167,7 @@ def _report(session: Path) -> int:
         size = float((state.angular_momentum(inertia) ** 2).sum()) ** 0.5
         print(
             f"   {name:5s} at {state.time_ns / 1e9:7.3f} s: position ({x[0]:.4g}, {x[1]:.4g}, {x[2]:.4g}) m, "
-            f"ω ({w[0]:.4g}, {w[1]:.4g}, {w[2]:.4g}) rad/s, |L| {size:.6g} kg m^2/s"
+            f"ω ({w[0]:.4g}, {w[1]:.4g}, {w[2]:.4g}) rad/s, |L| {size:.6g} kg m²/s"
         )
     print(f"\n{session} is the recorded session. Show it with:\n   .venv/bin/rerun {session}")
     print(f"Simulate it again and compare every state bit for bit:\n   .venv/bin/rigid_proto replay {session} --verify")

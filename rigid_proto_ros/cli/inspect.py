@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     completes(mesh, lambda _: body_names())
     parser.add_argument(
         "--density", type=number_or_link, action="append", metavar="D",
-        help=f"kg/m^3 (default {DENSITY:g}); with --compare LINK=D is one link's, and may be repeated",
+        help=f"kg/m³ (default {DENSITY:g}); with --compare LINK=D is one link's, and may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--mass", type=number_or_link, action="append", metavar="M",

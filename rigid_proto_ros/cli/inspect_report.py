@@ -47,18 +47,18 @@ def print_report(inspection: Inspection, report: dict) -> None:
     size = inspection.upper - inspection.lower
     rows: list[tuple[Text, ...]] = [("size", _row(size), "m")]
     if report["volume"] is not None:
-        rows.append(("volume", f"{report['volume']: .9g}", "m^3"))
+        rows.append(("volume", f"{report['volume']: .9g}", "m³"))
     if report["area"] is not None:
-        rows.append(("area", f"{report['area']: .9g}", "m^2"))
-    density = "" if report["density"] is None else f" ({report['density']:.6g} kg/m^3)"
+        rows.append(("area", f"{report['area']: .9g}", "m²"))
+    density = "" if report["density"] is None else f" ({report['density']:.6g} kg/m³)"
     rows.append(("mass", f"{chosen.mass: .9g}", f"kg{density}"))
     diagonal = float(np.linalg.norm(size))
     rows.append(("centre of mass", _row(shown_zero(chosen.center_of_mass, diagonal)), "m"))
     rows += _tensor_rows(chosen.inertia)
     moments, axes = principal_axes(chosen.inertia)
-    rows.append(("principal moments", _row(moments), "kg m^2"))
+    rows.append(("principal moments", _row(moments), "kg m²"))
     rows += [
-        (f"principal axis {k + 1}", _row(shown_zero(axes[:, k], 1.0)), f"of {moment:.6g} kg m^2")
+        (f"principal axis {k + 1}", _row(shown_zero(axes[:, k], 1.0)), f"of {moment:.6g} kg m²")
         for k, moment in enumerate(moments)
     ]
     rows.append(("box of equal inertia", _row(report["equimomental_box"]), "m, sides"))
@@ -178,7 +178,7 @@ def print_lump(whole: Lump, written: tuple[str, ...]) -> None:
     rows: list[tuple[Text, ...]] = [("links", f" {len(whole.links)}", ""), ("mass", f"{properties.mass: .9g}", "kg")]
     rows.append(("centre of mass", _row(properties.center_of_mass), "m"))
     rows += _tensor_rows(properties.inertia)
-    rows.append(("principal moments", _row(moments), "kg m^2"))
+    rows.append(("principal moments", _row(moments), "kg m²"))
     rows += [(f"principal axis {k + 1}", _row(shown_zero(axes[:, k], 1.0)), "") for k in range(3)]
     table(rows)
     if whole.massless:
@@ -191,7 +191,7 @@ def print_lump(whole: Lump, written: tuple[str, ...]) -> None:
 
 
 def _tensor_rows(inertia: np.ndarray) -> list[tuple[Text, ...]]:
-    labels = [("inertia", "kg m^2, about the centre of mass"), ("", ""), ("", "")]
+    labels = [("inertia", "kg m², about the centre of mass"), ("", ""), ("", "")]
     largest = float(np.abs(inertia).max())
     return [(label, _row(shown_zero(row, largest)), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
 

@@ -168,7 +168,7 @@ def _print_summary(result: dict, recordings: list[str]) -> None:
         ("ω (world)", vector("angular_velocity"), "rad/s"),
         ("kinetic energy", f" {result['kinetic_energy']:.9g}", "J"),
         ("potential energy", f" {result['potential_energy']:.9g}", "J"),
-        ("L (world)", vector("angular_momentum"), "kg m^2/s"),
+        ("L (world)", vector("angular_momentum"), "kg m²/s"),
         ("integrator", f" {result['integrator']}, {result['steps']} steps"),
         ("state hash", f" {result['state_hash']}"),
     ]

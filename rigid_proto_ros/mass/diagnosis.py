@@ -160,7 +160,7 @@ def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by:
         causes += explain_center(link.center_of_mass, parts, truth) or ("COM: no usual cause fits",)
     if mass_error is not None and mass_error > options.tolerance + min(link.mass_step / link.mass, MAX_ROUNDING):
         causes.append(f"mass: {wanted:.6g} kg expected")
-    note = f"density {link.mass / volume:.4g} kg/m^3"
+    note = f"density {link.mass / volume:.4g} kg/m³"
     if not 1.0 <= link.mass / volume <= 25000.0:
         note += ", which no solid has: units of the mesh or of the mass?"
     expected = truth

@@ -19,18 +19,18 @@ LIMIT = 1e-3
 _INCH = 1.0 / 0.0254
 _POUND = 1.0 / 0.45359237
 _FACTORS = {
-    1e6: "tensor in kg mm^2 (lengths in mm)",
-    1e4: "tensor in kg cm^2 (lengths in cm)",
-    1e3: "tensor in g m^2",
-    1e9: "tensor in g mm^2",
-    1e7: "tensor in g cm^2",
-    1e-3: "tensor in t m^2",
+    1e6: "tensor in kg mm² (lengths in mm)",
+    1e4: "tensor in kg cm² (lengths in cm)",
+    1e3: "tensor in g m²",
+    1e9: "tensor in g mm²",
+    1e7: "tensor in g cm²",
+    1e-3: "tensor in t m²",
     1e-6: "lengths divided by 1000 twice",
     1e-4: "lengths divided by 100 twice",
-    _INCH**2: "tensor in kg in^2 (lengths in inches)",
+    _INCH**2: "tensor in kg in² (lengths in inches)",
     1.0 / _INCH**2: "lengths taken for inches",
     _POUND: "mass in pounds",
-    _POUND * _INCH**2: "tensor in lb in^2",
+    _POUND * _INCH**2: "tensor in lb in²",
 }
 _WEIGHT = np.array([1.0, 2.0, 2.0, 1.0, 2.0, 1.0])  # how often each of the six entries stands in the matrix
 

@@ -47,7 +47,7 @@ class ExplicitInertia:
     tensor: Tensor = numbers(
         (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
         "Tensor of the explicit model about its centre of mass: ixx ixy ixz iyy iyz izz.",
-        "kg m2",
+        "kg m²",
     )
 
 
@@ -210,7 +210,7 @@ class Parameters:
         upper=HUGE,
     )
     density: float = number(
-        1000.0, "Density of the solid; setting it sets mass to 0.", "kg/m3", lower=0.0, upper=HUGE, above=True
+        1000.0, "Density of the solid; setting it sets mass to 0.", "kg/m³", lower=0.0, upper=HUGE, above=True
     )
     inertia_model: str = text(
         "solid",
@@ -225,7 +225,7 @@ class Parameters:
     )
     explicit_inertia: ExplicitInertia = ExplicitInertia()
     gyroscopic: bool = switch(True, "Keep the term ω × Iω; without it the motion isn't that of a rigid body.")
-    gravity: Vector = numbers(ZERO, "Acceleration of gravity, world axes.", "m/s2")
+    gravity: Vector = numbers(ZERO, "Acceleration of gravity, world axes.", "m/s²")
     linear_damping: float = number(
         0.0, "Damping force at the centre of mass per velocity.", "N s/m", lower=0.0, upper=HUGE
     )

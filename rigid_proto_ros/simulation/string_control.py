@@ -144,6 +144,6 @@ def _checked(tied: Tied, body: Body, state: State) -> Tied:
             "magnitude",
             "string target",
             tied.target.tolist(),
-            f"a target that pulls with at most {MAX_ACCELERATION:g} m/s2",
+            f"a target that pulls with at most {MAX_ACCELERATION:g} m/s²",
         )
     return tied
