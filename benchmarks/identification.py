@@ -62,7 +62,10 @@ class Rollouts:
         self.loads = [
             (round(1e-9 * begin / STEP), round(1e-9 * end / STEP), load)
             for begin, end, load in zip(
-                flight.acting.begin_ns.tolist(), flight.acting.end_ns.tolist(), flight.acting.loads, strict=True
+                flight.load_history.begin_ns.tolist(),
+                flight.load_history.end_ns.tolist(),
+                flight.load_history.loads,
+                strict=True,
             )
         ]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto identify``: mass properties from recorded motion, and first what the motion can tell of them."""
+"""``rigid_proto identify``: mass properties from recorded motion, and first what of them it identifies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..mass.from_mesh import MeshBody
 
 EXAMPLES = (
-    ("rigid_proto identify out/flight.mcap", "what a recorded flight tells of the body, and what it can't"),
+    ("rigid_proto identify out/flight.mcap", "what a recorded flight identifies of the body, and what it doesn't"),
     ("rigid_proto identify throws/*.mcap --mass 1.2 --urdf", "several throws of a weighed body, as a URDF <inertial>"),
     ("rigid_proto identify throw.mcap --mesh hammer", "is it solid, a shell, or as its bounding box says?"),
     (
@@ -41,9 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PART",
         help="the body's mesh, in axes of the tracked frame: its models are compared with the motion",
     )
-    parser.add_argument(
-        "--density", type=float, metavar="D", help="with --mesh: the mass is that of the solid [kg/m^3]"
-    )
+    parser.add_argument("--density", type=float, metavar="D", help="with --mesh: the mass is that of the solid [kg/m³]")
     parser.add_argument(
         "--against", metavar="ROBOT.urdf", help="compare its inertials with the motion (SDF and MJCF too)"
     )
@@ -51,24 +49,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         frame = "[@FRAME]" if sensor in ("twist", "wrench") else "[@CHILD]" if sensor == "pose" else ""
         parser.add_argument(f"--{sensor}", metavar=f"TOPIC{frame}", help=f"the {sensor} topic of a bag")
     parser.add_argument(
-        "--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="[m/s^2] (default: the scene's, or 0 0 -9.81)"
+        "--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="[m/s²] (default: the scene's, or 0 0 -9.81)"
     )
     parser.add_argument(
         "--offset", action="append", default=[], metavar="TOPIC=S", help="seconds to add to a topic's stamps"
     )
     parser.add_argument(
-        "--from", type=float, default=0.0, dest="first", metavar="S", help="use what was recorded from this time on [s]"
+        "--from", type=float, default=0.0, dest="first", metavar="S", help="use samples from this time on [s]"
     )
     parser.add_argument(
-        "--to", type=float, default=math.inf, dest="last", metavar="S", help="use what was recorded up to this time [s]"
+        "--to", type=float, default=math.inf, dest="last", metavar="S", help="use samples up to this time [s]"
     )
     parser.add_argument(
         "--fit",
         default="mass,com,inertia",
         metavar="LIST",
-        help="what to estimate, also damping, gravity, offset, gyro_bias, accel_bias, imu_place",
+        help="what to estimate: mass,com,inertia (default), damping, gravity, offset, gyro_bias, accel_bias, imu_place",
     )
-    parser.add_argument("--robust", action="store_true", help="give samples that lie far off less weight")
+    parser.add_argument("--robust", action="store_true", help="give outliers less weight")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--urdf", action="store_true", help="print a URDF <inertial>")
     parser.add_argument(
@@ -79,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, estimate, and say it."""
+    """Read, estimate, and print it."""
     try:
         from ..identify.identification import identify
         from ..identify.report import as_json, as_text, as_urdf
@@ -111,11 +109,11 @@ def _choice(args: argparse.Namespace) -> Choice:
         if value is not None and not (0.0 < value < math.inf):
             raise InputError(name, value, "a finite number above 0")
     if args.density is not None and (args.mesh is None or args.mass is not None):
-        raise InputError("--density", args.density, "it with --mesh, and no --mass")
+        raise InputError("--density", args.density, "--mesh beside it, and no --mass")
     if not (0.0 <= args.first < args.last):
         raise InputError("--from", args.first, f"0 or more, and less than --to ({args.last:g})")
     if args.gravity is not None and not all(map(math.isfinite, args.gravity)):
-        raise InputError("--gravity", args.gravity, "three finite numbers [m/s^2]")
+        raise InputError("--gravity", args.gravity, "three finite numbers [m/s²]")
     if args.json and args.urdf:
         raise InputError("--urdf", "with --json", "one of the two")
     topics = {sensor: getattr(args, sensor) for sensor in SENSORS if getattr(args, sensor)}

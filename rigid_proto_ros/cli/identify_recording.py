@@ -49,7 +49,7 @@ def _found_tensor(found: Identification) -> list[DrawnTensor]:
     if any(one.value is None for one in found.shape):
         return []
     is_whole = found.mass.value is not None and all(one.value is not None for one in found.inertia)
-    label = "found" if is_whole else "found: its shape, the size isn't told"
+    label = "found" if is_whole else "found: its shape; the size isn't identified"
     return [DrawnTensor(label, body.mass, body.center_of_mass, body.inertia)]
 
 

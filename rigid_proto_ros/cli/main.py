@@ -21,7 +21,7 @@ COMMANDS = {
     "simulate": "simulate a scene without ROS, as fast as possible",
     "sweep": "simulate many variations of a scene into one table",
     "replay": "show, verify, convert, publish or branch a recorded session",
-    "identify": "mass properties from recorded motion, and what the motion can tell of them",
+    "identify": "mass properties from recorded motion, and which of them it identifies",
     "snapshot": "a picture of a recorded session, without a display",
     "demo": "start the node, send scripted pokes, record, and end",
     "up": "start the node with a live view, until Ctrl-C",

@@ -17,7 +17,7 @@ from ..motion.loads import Load
 from ..session.bag import read_bag
 from ..session.mcap_reading import McapContent
 from . import measurements as ms
-from .session_reading import as_acting
+from .session_reading import load_history
 
 WRENCH_TIMEOUT_NS = 1_500_000_000
 """A wrench holds until the next message, and at most as long as the node's own default."""
@@ -79,10 +79,10 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     series = [one for one in series if len(one.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
-    acting = _acting(chosen["wrench"], chosen, choice) if "wrench" in chosen else ms.nothing_acting()
+    loads = _load_history(chosen["wrench"], chosen, choice) if "wrench" in chosen else ms.no_loads()
     given = choice.gravity is not None
     where = "from --gravity" if given else "assumed, as no --gravity was given"
-    return ms.MeasuredFlight(str(path), tuple(series), acting, choice.gravity or EARTH, gravity_from=where)
+    return ms.MeasuredFlight(str(path), tuple(series), loads, choice.gravity or EARTH, gravity_from=where)
 
 
 def _chosen(content: McapContent, given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
@@ -232,7 +232,7 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
             )
 
 
-def _acting(topic: _Topic, chosen: dict[str, _Topic], choice: Choice) -> ms.Acting:
+def _load_history(topic: _Topic, chosen: dict[str, _Topic], choice: Choice) -> ms.LoadHistory:
     """A wrench's messages, each held until the next; axes alone mean the origin of the tracked frame."""
     worlds, bodies = _frames(chosen)
     text = topic.frame or topic.messages[0].frame_id
@@ -258,7 +258,7 @@ def _acting(topic: _Topic, chosen: dict[str, _Topic], choice: Choice) -> ms.Acti
         force, torque = vector(message.numbers[:3]), vector(message.numbers[3:])
         until = min(until, times[number] + WRENCH_TIMEOUT_NS)
         rows.append((times[number], until, Load(frame.axes, where, force, torque).row))
-    return as_acting(rows)
+    return load_history(rows)
 
 
 def given_offsets(words: Sequence[str]) -> dict[str, float]:

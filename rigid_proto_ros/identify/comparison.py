@@ -29,9 +29,9 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """log_likelihood: of the candidate less that of the free fit, at most 0. freedoms: of the numbers that it fixes and
-    the motion tells.
+class ModelComparison:
+    """log_likelihood: of the candidate less that of the free fit, at most 0. freedoms: how many numbers it fixes that
+    are identified otherwise.
 
     probability: of a true tensor fitting so badly. weight: the candidate's share of likelihood among all candidates.
     """
@@ -54,10 +54,10 @@ def compare(
     estimate: Estimate,
     candidates: Mapping[str, Candidate],
     fit: Sequence[str],
-    told: int,
-) -> list[Judged]:
-    """The most likely first. fit: the groups that the free fit had; told: how many of its mass parameters
-    the motion tells.
+    identified: int,
+) -> list[ModelComparison]:
+    """The most likely first. fit: the groups that the free fit had; identified: how many of its mass
+    parameters are identified.
     """
     fixed = {True: [g for g in fit if g not in ("inertia", "mass")], False: [g for g in fit if g != "inertia"]}
     found = []
@@ -70,11 +70,11 @@ def compare(
             unknowns = make_unknowns(fixed[candidate.fixes_mass], topics_of(flights))
             cost = fit_flights(flights, unknowns, values, known=estimate).cost
         except InputError as error:
-            found.append(Judged(name, -np.inf, 0, 0.0, 0.0, str(error)))
+            found.append(ModelComparison(name, -np.inf, 0, 0.0, 0.0, str(error)))
             continue
-        fewer = max(1, min(told, len(estimate.unknowns.theta_columns)) - len(unknowns.theta_columns))
+        fewer = max(1, min(identified, len(estimate.unknowns.theta_columns)) - len(unknowns.theta_columns))
         gain = max(cost - estimate.cost, 0.0)
-        found.append(Judged(name, -0.5 * gain, fewer, float(chi2.sf(gain, fewer)), 0.0))
+        found.append(ModelComparison(name, -0.5 * gain, fewer, float(chi2.sf(gain, fewer)), 0.0))
     best = max((one.log_likelihood for one in found), default=0.0)
     weights = [float(np.exp(one.log_likelihood - best)) if np.isfinite(best) else 0.0 for one in found]
     total = sum(weights) or 1.0

@@ -56,7 +56,7 @@ MOST_WORSE = 2
 GROWN = 1.5
 """Departures of longer segments so many times those of shorter ones are no noise."""
 HUBER = 1.5
-"""Robust fits: departures beyond so many standard deviations count by their size alone (95 % efficient at
+"""Robust fits: residuals beyond so many standard deviations count by their size alone (95 % efficient at
 1.345, Huber 1981).
 """
 OFFSET_MARGIN_S = 0.05
@@ -246,8 +246,8 @@ def _of_one_heading(work: _Work, segments: Sequence[sh.ShootingInterval], starts
         if reckoned is None or not loaded:
             continue
         seconds = np.array([1e-9 * (segments[k].begin_ns - flight.begin_ns) for k in own])
-        departures = rot.product(starts[own, 3:7], rot.inverse(reckoned.attitude_at(seconds)))
-        turns = rot.product(departures[own.index(loaded[0])], rot.inverse(departures))
+        corrections = rot.product(starts[own, 3:7], rot.inverse(reckoned.attitude_at(seconds)))
+        turns = rot.product(corrections[own.index(loaded[0])], rot.inverse(corrections))
         down = np.linalg.norm(reckoned.gravity)
         if down > 0.0:
             # The tilt is seen in every segment: only the turn about the vertical is corrected.
@@ -306,13 +306,13 @@ def _start_of(
 def _sum_of_squares(segments: Sequence[sh.ShootingInterval], starts: np.ndarray, values: Values) -> float:
     total = 0.0
     for segment, start in zip(segments, starts, strict=True):
-        found = sh.departures(segment, start, values)
+        found = sh.segment_residuals(segment, start, values)
         if found is None:
             return np.inf
-        for piece, departure in zip(segment.pieces, found, strict=True):
+        for piece, residual in zip(segment.pieces, found, strict=True):
             # Few samples that nothing could bring near must not hide what the others say, nor a noise of nothing all of
             # them.
-            scaled = departure / max(piece.sigma, COARSE * _spread(piece.series))
+            scaled = residual / max(piece.sigma, COARSE * _spread(piece.series))
             total += float(np.sum(np.log1p(scaled * scaled)))
     return total
 
@@ -411,29 +411,29 @@ def residuals_by_series(
     """Departures (n, 3) of each series in its own unit, by ``id``."""
     parts: dict[int, list[np.ndarray]] = {}
     for segment, start in zip(segments, starts, strict=True):
-        for piece, departure in zip(segment.pieces, _departures(segment, start, values), strict=True):
-            parts.setdefault(id(piece.series), []).append(departure)
+        for piece, residual in zip(segment.pieces, _residuals(segment, start, values), strict=True):
+            parts.setdefault(id(piece.series), []).append(residual)
     return {key: np.concatenate(part) for key, part in parts.items()}
 
 
-def _departures(segment: sh.ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray]:
+def _residuals(segment: sh.ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray]:
     """Of a segment that can be flown."""
-    found = sh.departures(segment, start, values)
+    found = sh.segment_residuals(segment, start, values)
     if found is None:
         raise InputError("identify", "the estimate can't be simulated; see --from and --to")
     return found
 
 
 def _noise(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> dict[int, float]:
-    """Standard deviation of each series from its departures; series of one topic and quantity share it
+    """Standard deviation of each series from its residuals; series of one topic and quantity share it
     over all flights.
     """
     sums: dict[str, float] = {}
     counts: dict[str, float] = {}
     for segment, start in zip(segments, starts, strict=True):
-        for piece, departure in zip(segment.pieces, _departures(segment, start, work.values), strict=True):
+        for piece, residual in zip(segment.pieces, _residuals(segment, start, work.values), strict=True):
             name, weights = piece.series.name, piece.weights
-            sums[name] = sums.get(name, 0.0) + float((weights[:, None] * departure**2).sum())
+            sums[name] = sums.get(name, 0.0) + float((weights[:, None] * residual**2).sum())
             counts[name] = counts.get(name, 0.0) + 3.0 * float(weights.sum())
     samples = 3 * sum(segment.samples for segment in segments)
     left = max(1.0 - (sh.START * len(segments) + len(work.unknowns)) / samples, 0.1)
@@ -445,7 +445,7 @@ def _noise(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndar
 
 
 def _huber_weights(work: _Work, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> dict[int, np.ndarray]:
-    """1, or less for samples that lie too far off; the middle size of the departures says what far is."""
+    """1, or less for samples that lie too far off; too far is relative to the median size of the residuals."""
     weights = {}
     for key, part in residuals_by_series(segments, starts, work.values).items():
         size = np.linalg.norm(part, axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From measured flights to everything that is to be said of the body."""
+"""From measured flights to the body's mass properties."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .poses import FEWEST
 from .report import Identification
 from .residual_checks import check_residuals
 from .unknowns import DEFAULT_FIT, Values, make_unknowns
-from .verdict import Visibility
+from .verdict import Identifiability
 
 GUESSED_RADIUS = 0.1
 """Of the ball that stands for a body of which nothing is known [m]."""
@@ -44,7 +44,7 @@ def identify(
     candidates: Mapping[str, Candidate] | None = None,
     robust: bool = False,
 ) -> Identification:
-    """What the flights tell of the body that flew in all of them; raises InputError."""
+    """Mass properties of the body that flew in all of these flights; raises InputError."""
     known = known or Known()
     _check_axes(flights)
     _check_counts(flights)
@@ -58,16 +58,18 @@ def identify(
     values = Values(theta, damping, np.array(first.gravity, float), offsets, zero, zero, zero)
     unknowns = make_unknowns(fit, topics)
     estimate = fit_flights(flights, unknowns, values, robust)
-    visibility = Visibility(estimate, known.length)
+    identifiability = Identifiability(estimate, known.length)
     compared = []
     if candidates:
-        compared = compare(flights, estimate, candidates, fit, visibility.told(len(unknowns.theta_columns)))
+        compared = compare(
+            flights, estimate, candidates, fit, identifiability.count_identified(len(unknowns.theta_columns))
+        )
     given = {"mass": known.mass is not None or known.theta is not None}
     guessed = frozenset(
         name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.theta is not None)
     )
     checks = check_residuals(flights, estimate)
-    return Identification(flights, estimate, visibility, checks, compared, _assumed(flights, known, fit), guessed)
+    return Identification(flights, estimate, identifiability, checks, compared, _assumed(flights, known, fit), guessed)
 
 
 def _check_axes(flights: Sequence[MeasuredFlight]) -> None:
@@ -102,13 +104,13 @@ def _first_guess(known: Known) -> np.ndarray:
 def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]) -> list[str]:
     """What was taken as given, in words."""
     first = flights[0]
-    said = []
+    lines = []
     if known.mass is not None:
-        said.append(f"mass {known.mass:g} kg, given")
+        lines.append(f"mass {known.mass:g} kg, given")
     if "gravity" not in fit:
-        said.append(f"gravity {' '.join(f'{g:g}' for g in first.gravity)} m/s^2, {first.gravity_from}")
+        lines.append(f"gravity {' '.join(f'{g:g}' for g in first.gravity)} m/s², {first.gravity_from}")
     if "damping" not in fit:
-        said.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
+        lines.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
     if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
-        said.append("the IMU stands at the tracked frame's origin, its axes those of the frame")
-    return said
+        lines.append("the IMU stands at the tracked frame's origin, its axes those of the frame")
+    return lines

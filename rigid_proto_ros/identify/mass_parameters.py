@@ -35,7 +35,7 @@ STEP = 2e-6
 little above rounding.
 """
 
-SEEN = (
+COORDINATES = (
     *("mass", "size of the tensor", "ratio of the largest moment to the others", "ratio of the two smaller moments"),
     *("turn of axes 2 and 3", "turn of axes 1 and 3", "turn of axes 1 and 2"),
     *("centre of mass along x", "centre of mass along y", "centre of mass along z"),

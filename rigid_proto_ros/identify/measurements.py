@@ -12,7 +12,7 @@ from ..simulation.flight import IMPULSE, PULSE
 from .trajectories import Wrenches
 
 POSITION, ATTITUDE, VELOCITY, RATE, ACCELERATION = "position", "attitude", "velocity", "rate", "acceleration"
-UNITS = {POSITION: "m", ATTITUDE: "rad", VELOCITY: "m/s", RATE: "rad/s", ACCELERATION: "m/s^2"}
+UNITS = {POSITION: "m", ATTITUDE: "rad", VELOCITY: "m/s", RATE: "rad/s", ACCELERATION: "m/s²"}
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Acting:
+class LoadHistory:
     """Loads that acted: begin_ns (c,), end_ns (c,), the same for an impulse, and loads (c, LOAD), points
     in the tracked frame.
     """
@@ -58,9 +58,9 @@ class Acting:
         return Wrenches(np.ascontiguousarray(commands, np.int64), np.ascontiguousarray(self.loads[acts][order]))
 
 
-def nothing_acting() -> Acting:
+def no_loads() -> LoadHistory:
     """Of a free flight."""
-    return Acting(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, LOAD)))
+    return LoadHistory(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, LOAD)))
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class MeasuredFlight:
 
     name: str
     series: tuple[Series, ...]
-    acting: Acting = field(default_factory=nothing_acting)
+    load_history: LoadHistory = field(default_factory=no_loads)
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     linear_damping: float = 0.0
     angular_damping: float = 0.0

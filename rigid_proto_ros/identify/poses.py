@@ -90,11 +90,11 @@ def _reckoning(
         return lambda q: integral(seconds, rot.turned(q, vectors) if velocity.in_body else vectors), 1.0
     vectors = vectors - values.accel_bias
 
-    def from_felt(q: np.ndarray) -> np.ndarray:
+    def from_specific_force(q: np.ndarray) -> np.ndarray:
         moved = integral(seconds, integral(seconds, rot.turned(q, vectors)))
         return moved - rot.turned(q, values.imu_place)
 
-    return from_felt, 0.0
+    return from_specific_force, 0.0
 
 
 def integral(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -48,8 +48,8 @@ class Pushes:
 
 def pushes_of(poses: Poses) -> Pushes:
     """Of the flight's loads, turned by its attitudes."""
-    acting, begin_ns = poses.flight.acting, poses.flight.begin_ns
-    begin, end = (1e-9 * (edge - begin_ns) for edge in (acting.begin_ns, acting.end_ns))
+    history, begin_ns = poses.flight.load_history, poses.flight.begin_ns
+    begin, end = (1e-9 * (edge - begin_ns) for edge in (history.begin_ns, history.end_ns))
     apart = float(np.median(np.diff(poses.seconds)))
     counts = np.clip(np.ceil(POINTS * (end - begin) / apart), POINTS, MOST_POINTS).astype(int)
     counts[begin == end] = 1
@@ -59,7 +59,7 @@ def pushes_of(poses: Poses) -> Pushes:
     seconds = begin[which] + (end - begin)[which] * (number + 0.5) / counts[which]
     order = np.argsort(seconds, kind="stable")
     which, seconds, length = which[order], seconds[order], length[order, None]
-    rows, attitudes = acting.loads[which], poses.attitude_at(seconds)
+    rows, attitudes = history.loads[which], poses.attitude_at(seconds)
     in_body = rows[:, ld.LOAD_AXES] != ld.WORLD_AXES
     force, torque = (
         np.where(in_body[:, None], rot.turned(attitudes, vectors), vectors)

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What ``rigid_proto identify`` says: the verdict, then the numbers that the motion tells, with their
-standard deviations.
-"""
+"""What ``rigid_proto identify`` prints: the verdict, then the identified numbers with their standard deviations."""
 
 from __future__ import annotations
 
@@ -15,53 +13,53 @@ from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
 from . import mass_parameters as mp
-from .comparison import Judged
+from .comparison import ModelComparison
 from .fitting import Estimate
 from .measurements import MeasuredFlight
 from .residual_checks import ResidualCheck, remarks
 from .unknowns import Values
-from .verdict import Hidden, Quantity, Visibility, summary
+from .verdict import Identifiability, Quantity, Unidentified, summary
 
-MISFIT = "the fit leaves more than noise, so its numbers may be farther off than their standard deviations say"
+MISFIT = "the residuals are larger than the noise, so the numbers may be farther off than their standard deviations say"
 TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(frozen=True)
 class Identification:
-    """Everything that is to be said."""
+    """The estimate, what of it is identified, and the checks of its residuals."""
 
     flights: Sequence[MeasuredFlight]
     estimate: Estimate
-    visibility: Visibility
+    identifiability: Identifiability
     checks: Sequence[ResidualCheck]
-    compared: Sequence[Judged]
+    compared: Sequence[ModelComparison]
     assumed: Sequence[str]
     guessed: frozenset[str] = frozenset()
     """Of ``mass``, ``com`` and ``inertia`` what was neither asked for nor given: it has no number."""
 
     @property
-    def hidden(self) -> list[Hidden]:
-        """What the motion can't tell."""
-        return self.visibility.hidden
+    def unidentified(self) -> list[Unidentified]:
+        """What the motion doesn't identify."""
+        return self.identifiability.unidentified
 
     @property
-    def seen(self) -> list[str]:
-        """What it tells, in words."""
+    def identified(self) -> list[str]:
+        """What it identifies, in words."""
         words = {"mass": [self.mass], "centre of mass": self.center_of_mass, "tensor": self.inertia}
-        told = [name for name, parts in words.items() if all(part.value is not None for part in parts)]
-        if "tensor" not in told and all(part.value is not None for part in self.shape):
-            told.append("shape of the tensor")
-        return told
+        found = [name for name, parts in words.items() if all(part.value is not None for part in parts)]
+        if "tensor" not in found and all(part.value is not None for part in self.shape):
+            found.append("shape of the tensor")
+        return found
 
     @property
     def verdict(self) -> str:
-        """What this motion can tell, in a sentence; and first of all whether the model fits it."""
-        said = summary(self.hidden, self.seen)
-        return said if self.fits else f"{MISFIT}; {said}"
+        """What is identified, in a sentence, after the warning that the model doesn't fit, if it doesn't."""
+        text = summary(self.unidentified, self.identified)
+        return text if self.fits else f"{MISFIT}; {text}"
 
     @property
     def fits(self) -> bool:
-        """Whether what the fit leaves is noise: else its numbers may be far off, whatever their standard deviations."""
+        """Whether the residuals are noise: else the numbers may be far off, whatever their standard deviations."""
         return all(check.is_noise for check in self.checks)
 
     @property
@@ -94,13 +92,13 @@ class Identification:
         """Whatever else was asked for, by name."""
         unknowns = self.estimate.unknowns
         return {
-            unknowns.names[k]: self.visibility.quantity(_reader(name, index))
+            unknowns.names[k]: self.identifiability.quantity(_reader(name, index))
             for k, (name, index) in enumerate(unknowns.slots)
             if name != "theta"
         }
 
     def _of(self, read: Callable[[mp.MassEstimate], float]) -> Quantity:
-        return self.visibility.quantity(lambda values: read(values.body))
+        return self.identifiability.quantity(lambda values: read(values.body))
 
     def _each(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int, group: str) -> list[Quantity]:
         if group in self.guessed:
@@ -127,11 +125,11 @@ def _reader(name: str, index: int) -> Callable[[Values], float]:
 
 
 def as_json(found: Identification) -> dict:
-    """The command's JSON object; what the motion can't tell is null."""
+    """The command's JSON object; what isn't identified is null."""
     return {
         "verdict": found.verdict,
         "fits": found.fits,
-        "hidden": [{"what": one.what, "remedy": one.remedy} for one in found.hidden],
+        "hidden": [{"what": one.what, "remedy": one.remedy} for one in found.unidentified],
         "mass": _pair(found.mass),
         "center_of_mass": _pairs(found.center_of_mass),
         "inertia": dict(zip(TENSOR_NAMES, map(_pair, found.inertia), strict=True)),
@@ -181,14 +179,14 @@ def _pairs(quantities: Sequence[Quantity]) -> list:
 def as_text(found: Identification) -> list[str]:
     """Lines for a terminal."""
     lines = [found.verdict]
-    lines += [f"  {one.what}: {one.remedy} would show it" for one in found.hidden]
+    lines += [f"  {one.what}: needs {one.remedy}" for one in found.unidentified]
     lines += [f"  {text}" for text in found.assumed]
     if found.mass.value is not None:
         lines.append(f"mass               {number(found.mass)} kg")
     for axis, one in zip("xyz", found.center_of_mass, strict=True):
         if one.value is not None:
             lines.append(f"centre of mass {axis}   {number(one)} m")
-    tensor, unit = found.inertia, " kg m^2"
+    tensor, unit = found.inertia, " kg m²"
     if any(one.value is None for one in tensor):
         tensor, unit = found.shape, " of the trace"
     for name, one in zip(TENSOR_NAMES, tensor, strict=True):
@@ -201,11 +199,11 @@ def as_text(found: Identification) -> list[str]:
     lines += found.remarks
     for one in found.compared:
         if one.problem:
-            said = one.problem
+            text = one.problem
         else:
-            said = "contradicted by the motion" if one.is_contradicted else "agrees with the motion"
-            said += f" (log likelihood {one.log_likelihood:.4g} below the free fit's, p = {one.probability:.2g})"
-        lines.append(f"{one.name:<18} {said}")
+            text = "contradicted by the motion" if one.is_contradicted else "agrees with the motion"
+            text += f" (log likelihood {one.log_likelihood:.4g} relative to the free fit, p = {one.probability:.2g})"
+        lines.append(f"{one.name:<18} {text}")
     return lines
 
 
@@ -213,7 +211,7 @@ def number(quantity: Quantity) -> str:
     """Value ± standard deviation, with two digits of the latter."""
     value, sd = quantity.value, quantity.sd
     if value is None or sd is None:
-        return "not told"
+        return "not identified"
     if not 0.0 < sd < np.inf:
         return f"{value:.9g}"
     power = int(np.floor(np.log10(max(abs(value), sd))))
@@ -225,10 +223,10 @@ def number(quantity: Quantity) -> str:
 
 
 def as_urdf(found: Identification) -> str:
-    """A URDF <inertial>; raises InputError where the motion doesn't tell all of it."""
+    """A URDF <inertial>; raises InputError where not all of it is identified."""
     parts = [found.mass, *found.center_of_mass, *found.inertia]
     if any(part.value is None for part in parts):
-        raise InputError("--urdf", f"{found.verdict}, and a URDF needs all of mass, centre of mass and tensor")
+        raise InputError("--urdf", f"{found.verdict}; a URDF needs mass, centre of mass and tensor")
     body = found.estimate.mass
     written = urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia))
     return written if found.fits else f"<!-- {MISFIT} -->\n{written}"

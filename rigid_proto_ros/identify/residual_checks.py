@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether what the model leaves unexplained is noise: its size, its whiteness, samples far off, and where
-it is worst.
-"""
+"""Whether the residuals are noise: their size and whiteness, outliers, and where in the flight they are largest."""
 
 from __future__ import annotations
 
@@ -24,13 +22,13 @@ FAR = 5.0
 million numbers.
 """
 WINDOWS = 10
-"""Parts of a flight in which the departures are compared."""
+"""Parts of a flight whose residuals are compared."""
 WORSE = 3.0
 """So many times the mean square of the other parts is something that happened then."""
 NEGLIGIBLE = 1e-7
 """Of the largest value of a series: what is left of a simulated flight is rounding and no error of the model."""
 TOO_LARGE = 1.5
-"""Departures so many times the noise between neighbouring samples are no noise."""
+"""Residuals so many times the noise between neighbouring samples are no noise."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class ResidualCheck:
 
     @property
     def is_noise(self) -> bool:
-        """Whether the departures are no larger than noise."""
+        """Whether the residuals are no larger than noise."""
         return self.is_white or self.noise <= TOO_LARGE * self.by_differences
 
 
@@ -72,14 +70,14 @@ def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> li
     ]
 
 
-def _check(flight: MeasuredFlight, series: Series, departures: np.ndarray, noise: float) -> ResidualCheck:
-    scaled = departures / noise
+def _check(flight: MeasuredFlight, series: Series, residuals: np.ndarray, noise: float) -> ResidualCheck:
+    scaled = residuals / noise
     seconds = 1e-9 * (series.times_ns - flight.begin_ns)
     return ResidualCheck(
         flight.name,
         series.name,
         UNITS[series.kind],
-        len(departures),
+        len(residuals),
         noise,
         max(noise_by_differences(series), NEGLIGIBLE * float(np.abs(series.values).max())),
         _whiteness(scaled),
@@ -116,26 +114,24 @@ def _worst(scaled: np.ndarray, seconds: np.ndarray) -> float | None:
 
 
 def remarks(checks: Sequence[ResidualCheck]) -> list[str]:
-    """What is to be said of them, in sentences; empty when all is noise."""
-    said = []
+    """What they show, in sentences; empty when all is noise."""
+    found = []
     for check in checks:
         where = f"{check.series} of {check.flight}"
         if check.outliers:
             many = f"{check.outliers} of {check.samples} samples lie" if check.outliers > 1 else "one sample lies"
-            said.append(f"{where}: {many} more than {FAR:g} standard deviations off; --robust gives such less weight")
+            found.append(f"{where}: {many} more than {FAR:g} standard deviations off; --robust gives them less weight")
         if check.is_noise:
             continue
         if check.worst_s is not None:
-            said.append(
-                f"{where}: the model is wrong about {check.worst_s:.3g} s after the start of the flight:"
-                " a contact, or a wrench that isn't in the bag; --from and --to leave it out"
+            found.append(
+                f"{where}: the model doesn't fit about {check.worst_s:.3g} s after the start of the flight:"
+                " a contact, or a wrench that isn't in the bag; --from and --to exclude it"
             )
         else:
-            said.append(
-                f"{where}: the model leaves {check.noise:.3g} {check.unit} where neighbouring samples differ by"
-                f" {check.by_differences:.3g}, and not as noise: a fluid's drag (--fit damping),"
-                " gravity (--fit gravity), clocks"
-                " (--fit offset), or a wrench that isn't in the bag; the standard deviations"
-                " are too small"
+            found.append(
+                f"{where}: the residuals of {check.noise:.3g} {check.unit} aren't white noise, and neighbouring samples"
+                f" differ by {check.by_differences:.3g} only: drag (--fit damping), gravity (--fit gravity), clocks"
+                " (--fit offset), or a wrench that isn't in the bag; the standard deviations are too small"
             )
-    return said
+    return found

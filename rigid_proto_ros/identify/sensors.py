@@ -34,7 +34,7 @@ def predicted(
     return force + rot.cross(angular, arm) + rot.cross(w, rot.cross(w, arm)) + bias
 
 
-def departure(kind: str, shown: np.ndarray, measured: np.ndarray) -> np.ndarray:
+def deviation(kind: str, shown: np.ndarray, measured: np.ndarray) -> np.ndarray:
     """Measured minus shown (..., m, 3); of attitudes the rotation vector between them, in the body's axes."""
     if kind == ms.ATTITUDE:
         return rot.logarithm(rot.product(rot.inverse(shown), measured))

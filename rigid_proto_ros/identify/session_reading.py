@@ -16,7 +16,7 @@ from ..session.replay import session_scenario
 from ..session.runs import decode_event
 from ..simulation.commands import ClearWrench, WrenchCommand
 from ..simulation.setup import Setup
-from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, Acting, MeasuredFlight, Series
+from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, LoadHistory, MeasuredFlight, Series
 
 
 def is_own_session(session: RecordedSession) -> bool:
@@ -44,14 +44,14 @@ def session_flight(
         raise InputError("session", f"{name} was simulated with gyroscopic: false: no rigid body moves so")
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
     frames = frame_names(scenario.parameters, session.node_name)
-    acting = _acting(session, setup, frames, name, end_ns)
+    loads = _load_history(session, setup, frames, name, end_ns)
     series = [_cut(one, round(first_s * 1e9), end_ns) for one in _series(session)]
     series = [one for one in series if len(one.times_ns)]
     if not series:
         raise InputError("--from", first_s, f"a time within {name}, which ends at {1e-9 * session.end_ns:g} s")
     x, y, z = (float(value) for value in setup.gravity)
     damping = float(setup.linear_damping), float(setup.angular_damping)
-    return MeasuredFlight(name, tuple(series), acting, (x, y, z), *damping, gravity_from="from the scene"), scenario
+    return MeasuredFlight(name, tuple(series), loads, (x, y, z), *damping, gravity_from="from the scene"), scenario
 
 
 def _series(session: RecordedSession) -> list[Series]:
@@ -80,7 +80,9 @@ def _cut(series: Series, first_ns: int, last_ns: int) -> Series:
     return Series(series.topic, series.kind, times, values, series.in_body, series.is_imu)
 
 
-def _acting(session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int) -> Acting:
+def _load_history(
+    session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int
+) -> LoadHistory:
     """Loads of the event log up to a time, as intervals."""
     rows: list[tuple[int, int, np.ndarray]] = []
     held: dict[int, tuple[int, np.ndarray]] = {}
@@ -113,13 +115,13 @@ def _acting(session: RecordedSession, setup: Setup, frames: tuple[str, str], nam
             rows.append((time_ns, time_ns + duration, row))
     for wrench in held.values():
         _let_go(rows, wrench, end_ns, setup)
-    return as_acting(rows)
+    return load_history(rows)
 
 
-def as_acting(rows: Sequence[tuple[int, int, np.ndarray]]) -> Acting:
+def load_history(rows: Sequence[tuple[int, int, np.ndarray]]) -> LoadHistory:
     """Of (begin, end, load)."""
     begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
-    return Acting(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
+    return LoadHistory(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
 
 
 def _let_go(rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray], time_ns: int, setup: Setup) -> None:

@@ -19,7 +19,7 @@ from . import mass_parameters as mp
 from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
-from .sensors import departure, predicted
+from .sensors import deviation, predicted
 from .triangles import upper_triangle
 from .unknowns import Unknowns, Values
 
@@ -90,9 +90,8 @@ def cut(
                     pieces.append(Piece(series, topic, times, values, sigma(series), weights(series)[inside]))
             if pieces:
                 begin = int(first) - margin
-                segments.append(
-                    ShootingInterval(flight, begin, tuple(pieces), flight.acting.within(begin, int(last) + margin))
-                )
+                loads = flight.load_history.within(begin, int(last) + margin)
+                segments.append(ShootingInterval(flight, begin, tuple(pieces), loads))
     return segments
 
 
@@ -161,12 +160,12 @@ def _shown(
     return shown, samples[0]
 
 
-def departures(segment: ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
+def segment_residuals(segment: ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
     """Measured minus shown of each piece (m, 3), in its own unit; None where the flight failed."""
     shown, _ = _shown(segment, start[None], [values])
     if not shown:
         return None
-    return [departure(p.series.kind, s[0], p.values) for p, s in zip(segment.pieces, shown, strict=True)]
+    return [deviation(p.series.kind, s[0], p.values) for p, s in zip(segment.pieces, shown, strict=True)]
 
 
 def flown_poses(
@@ -258,12 +257,12 @@ def linearized(
         kind = piece.series.kind
         block = np.zeros((len(index), 3, START + len(unknowns)))
         block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate, start[3:7])
-        # What a flight shows moves by minus what its departure from a nearby one says.
-        difference = departure(kind, own[2::2] if central else own[:1], own[1 :: len(variations.sides)])
+        # The derivative of what a flight shows is minus that of its deviation from a nearby flight.
+        difference = deviation(kind, own[2::2] if central else own[:1], own[1 :: len(variations.sides)])
         block[:, :, columns] = (difference / widths[columns][:, None, None]).transpose(1, 2, 0)
         weight = np.sqrt(piece.weights)[:, None] / piece.sigma
         blocks.append(-block * weight[:, :, None])
-        found.append(departure(kind, own[0], piece.values) * weight)
+        found.append(deviation(kind, own[0], piece.values) * weight)
     for k, (name, topic) in enumerate(unknowns.slots):
         if name == "offsets":
             _fill_offset(segment, start, values, topic, [block[:, :, START + k] for block in blocks])
@@ -282,7 +281,7 @@ def _fill_offset(
         sides.append(_shown(segment, start[None], [moved])[0])
     for number, (piece, column) in enumerate(zip(segment.pieces, columns, strict=True)):
         if piece.topic == topic:
-            change = departure(piece.series.kind, sides[1][number][0], sides[0][number][0])
+            change = deviation(piece.series.kind, sides[1][number][0], sides[0][number][0])
             weight = np.sqrt(piece.weights)[:, None] / piece.sigma
             column[:] = -weight * change / (2.0 * OFFSET_STEP_S)
             # Where a load begins or ends an accelerometer's curve jumps, and says nothing about its slope.

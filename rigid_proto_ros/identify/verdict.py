@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a motion can tell of a body, before any number: the directions in which its Fisher information is
-nothing, in physical words.
-"""
+"""What a motion identifies of a body: the directions in which its Fisher information vanishes, in physical words."""
 
 from __future__ import annotations
 
@@ -17,20 +15,20 @@ from .fitting import Estimate
 from .unknowns import Unknowns, Values
 
 MOST_RELATIVE = 0.5
-"""A standard deviation of more than half of what is looked for says nothing: neither the number nor its
+"""A standard deviation of more than half of the quantity itself says nothing: neither the number nor its
 error is printed.
 """
 LEAST_SHARE = 1e-3
-"""A quantity that changes by more than this part of itself along a direction that can't be seen can't be
-seen either.
+"""A quantity that changes by more than this part of itself along a direction that isn't identified isn't
+identified either.
 """
 ROUNDING = 0.5
 """Where longer difference quotients leave less than this part of the information, by its root, it is rounding."""
 NAMED = 0.98
-"""Part of a named direction's square that must lie among those that can't be seen."""
+"""Part of a named direction's square that must lie among those that aren't identified."""
 
 DOUBTED = 0.01
-"""Standard deviations above this are tried out: a spin whose wobble is only noise seems to tell what it doesn't."""
+"""Standard deviations above this are tried out: a spin whose wobble is only noise seems to identify too much."""
 TRIED = 4.0
 """So many standard deviations away the fit is tried again, with other starts."""
 LEAST_RISE = 4.0
@@ -44,14 +42,14 @@ _REMEDIES = {
     "mass, tensor and damping by one factor": f"{POKE}, or --mass",
 }
 UNITS = {"damping": 1.0, "gravity": 1.0, "offsets": 0.01, "gyro_bias": 0.1, "accel_bias": 1.0, "imu_place": 0.1}
-"""Of what a standard deviation is to be small for it to be seen: N s/m and N m s by the body's own, m/s²,
+"""Of what a standard deviation is to be small for it to be identified: N s/m and N m s by the body's own, m/s²,
 s, rad/s, m/s², m.
 """
 
 
 @dataclass(frozen=True)
-class Hidden:
-    """A direction that can't be seen: what it is, and what would make it visible."""
+class Unidentified:
+    """A direction that isn't identified: what it is, and what would identify it."""
 
     what: str
     remedy: str
@@ -59,15 +57,15 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with its standard deviation; both None where the motion can't tell it."""
+    """A number with its standard deviation; both None where it isn't identified."""
 
     value: float | None
     sd: float | None
 
 
-class Visibility:
-    """Which directions of the unknowns a flight tells, in coordinates in which 1 is much:
-    (``mass_parameters.SEEN``, then the others).
+class Identifiability:
+    """Which directions of the unknowns the flights identify, in coordinates in which 1 is a large change:
+    (``mass_parameters.COORDINATES``, then the others).
     """
 
     def __init__(self, estimate: Estimate, length: float) -> None:
@@ -82,9 +80,9 @@ class Visibility:
         _, self.roots, directions = np.linalg.svd(root, full_matrices=False)
         self._directions = directions.T
         wide = np.linalg.norm(estimate.root_wide @ back @ self._directions, axis=0)
-        self._hidden = (self.roots < 1.0 / MOST_RELATIVE) | (wide < ROUNDING * self.roots)
-        for k in np.flatnonzero(~self._hidden & (self.sds > DOUBTED)):
-            self._hidden[k] = not _withstands(estimate, back @ self._directions[:, k], float(self.sds[k]))
+        self._unidentified = (self.roots < 1.0 / MOST_RELATIVE) | (wide < ROUNDING * self.roots)
+        for k in np.flatnonzero(~self._unidentified & (self.sds > DOUBTED)):
+            self._unidentified[k] = not _is_confirmed(estimate, back @ self._directions[:, k], float(self.sds[k]))
 
     @property
     def sds(self) -> np.ndarray:
@@ -92,19 +90,19 @@ class Visibility:
         return 1.0 / np.maximum(self.roots, 1e-300)
 
     @cached_property
-    def hidden(self) -> list[Hidden]:
-        """The directions that can't be seen, named."""
-        space = self._directions[:, self._hidden]
-        found: list[Hidden] = []
+    def unidentified(self) -> list[Unidentified]:
+        """The directions that aren't identified, named."""
+        space = self._directions[:, self._unidentified]
+        found: list[Unidentified] = []
         for what, vector in self._named():
             if space.shape[1] and np.sum((space.T @ vector) ** 2) > NAMED:
-                found.append(Hidden(what, self._remedy(what)))
+                found.append(Unidentified(what, self._remedy(what)))
                 # What is left of the space is at right angles to it.
                 space = space - np.outer(vector, vector @ space)
                 space = _orthonormal(space)
         for direction in space.T:
             largest = [self.names[k] for k in np.argsort(-np.abs(direction))[:3] if abs(direction[k]) > 0.2]
-            found.append(Hidden(f"a mixture of {', '.join(largest)}", f"{TUMBLE}, {POKE}"))
+            found.append(Unidentified(f"a mixture of {', '.join(largest)}", f"{TUMBLE}, {POKE}"))
         return found
 
     def _named(self) -> list[tuple[str, np.ndarray]]:
@@ -118,9 +116,9 @@ class Visibility:
         return named
 
     def _com_along_axes(self) -> list[tuple[str, np.ndarray]]:
-        if mp.SEEN[-1] not in self.names:
+        if mp.COORDINATES[-1] not in self.names:
             return []
-        first = self.names.index(mp.SEEN[7])
+        first = self.names.index(mp.COORDINATES[7])
         _, axes = mp.principal(self.values.theta)
         named = []
         for k in range(3):
@@ -133,18 +131,18 @@ class Visibility:
         if what in _REMEDIES:
             return _REMEDIES[what]
         if what.startswith("centre of mass"):
-            return "a spin about an axis across it"
+            return "a spin about an axis at right angles to it"
         if what.startswith(("ratio", "turn")):
             return TUMBLE
         return "a longer flight, or a given value"
 
-    def told(self, count: int) -> int:
-        """How many of the directions among the first ``count`` coordinates can be seen."""
-        return count - int(np.linalg.matrix_rank(self._directions[:count, self._hidden], tol=0.5))
+    def count_identified(self, count: int) -> int:
+        """How many of the directions among the first ``count`` coordinates are identified."""
+        return count - int(np.linalg.matrix_rank(self._directions[:count, self._unidentified], tol=0.5))
 
     def quantity(self, of: Callable[[Values], float]) -> Quantity:
-        """A function of the estimate with its standard deviation, or nothing where a direction that can't
-        be seen changes it.
+        """A function of the estimate with its standard deviation, or nothing where a direction that isn't
+        identified changes it.
         """
         base, steps = self.unknowns.read(self.values), self.unknowns.steps(self.values)
         gradient = np.empty(len(base))
@@ -157,13 +155,13 @@ class Visibility:
             gradient[k] = (sides[0] - sides[1]) / (2.0 * step)
         along = self._directions.T @ np.linalg.solve(self._to_physical.T, gradient)
         size = float(np.linalg.norm(along))
-        if np.any(np.abs(along[self._hidden]) > LEAST_SHARE * size):
+        if np.any(np.abs(along[self._unidentified]) > LEAST_SHARE * size):
             return Quantity(None, None)
-        seen = ~self._hidden
-        return Quantity(float(of(self.values)), float(np.linalg.norm(along[seen] / self.roots[seen])))
+        good = ~self._unidentified
+        return Quantity(float(of(self.values)), float(np.linalg.norm(along[good] / self.roots[good])))
 
 
-def _withstands(estimate: Estimate, direction: np.ndarray, sd: float) -> bool:
+def _is_confirmed(estimate: Estimate, direction: np.ndarray, sd: float) -> bool:
     """Whether the flights contradict a body far away along a direction of the physical unknowns, whatever
     their starts were.
     """
@@ -184,17 +182,17 @@ def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[lis
     for k, (name, index) in enumerate(unknowns.slots):
         matrix[k, k] = 1.0
         if name == "theta" and index == mp.MASS:
-            names.append(mp.SEEN[mp.MASS])
+            names.append(mp.COORDINATES[mp.MASS])
             # The tensor for each kg stays: so its size grows with the mass.
             matrix[k, k] = 2.0
             for other, slot in enumerate(unknowns.slots):
                 if slot == ("tensor_change", 0):
                     matrix[other, k] = 2.0
         elif name == "theta":
-            names.append(mp.SEEN[index])
+            names.append(mp.COORDINATES[index])
             matrix[k, k] = 1.0 / length
         elif name == "tensor_change":
-            names.append(mp.SEEN[1 + index])
+            names.append(mp.COORDINATES[1 + index])
         else:
             unit = UNITS[name]
             if name == "damping":
@@ -210,9 +208,9 @@ def _orthonormal(space: np.ndarray) -> np.ndarray:
     return left[:, sizes > 0.5]
 
 
-def summary(hidden: Sequence[Hidden], seen: Sequence[str]) -> str:
+def summary(unidentified: Sequence[Unidentified], identified: Sequence[str]) -> str:
     """The verdict in a sentence or two."""
-    if not hidden:
-        return "this motion tells all that was asked for"
-    told = f"this motion tells {', '.join(seen)}; " if seen else "this motion tells nothing of what was asked for; "
-    return told + "it can't tell " + ", ".join(one.what for one in hidden)
+    if not unidentified:
+        return "everything that was asked for is identified from this motion"
+    found = ", ".join(identified) or "nothing that was asked for"
+    return f"identified from this motion: {found}; not identified: {', '.join(one.what for one in unidentified)}"

@@ -60,7 +60,7 @@ def test_a_recording_for_rerun_is_a_session_too(flight: tuple, capsys: pytest.Ca
 def test_before_the_poke_its_mass_is_no_number(flight: tuple, capsys: pytest.CaptureFixture) -> None:
     found = _json(capsys, str(flight[0]), "--to", "0.5")
     assert found["mass"] is None
-    assert "it can't tell mass" in found["verdict"]
+    assert "not identified: mass" in found["verdict"]
 
 
 def test_the_solid_agrees_and_the_box_is_contradicted(flight: tuple, capsys: pytest.CaptureFixture) -> None:

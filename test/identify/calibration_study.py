@@ -23,7 +23,7 @@ from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight
 from rigid_proto_ros.identify.report import Identification
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, Values, make_unknowns
-from rigid_proto_ros.identify.verdict import Quantity, Visibility
+from rigid_proto_ros.identify.verdict import Identifiability, Quantity
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.tensor import six_from_tensor
 
@@ -101,7 +101,7 @@ def measured_throw(number: int, poked: bool, seconds: float = 2.0, phone: bool =
     if poked:
         mass = mp.mass_of(truth.theta).mass
         point = tuple((truth.theta[mp.COM] + 0.6 * size * _direction(rng)).tolist())
-        load = mf.acting((0.4 * seconds, 0.05, "world", point, 20.0 * mass * _direction(rng), (0.0, 0.0, 0.0)))
+        load = mf.load_history((0.4 * seconds, 0.05, "world", point, 20.0 * mass * _direction(rng), (0.0, 0.0, 0.0)))
     if not phone:
         return MeasuredThrow(number, name, truth, size, start, mf.mocap(truth, start, rng, seconds, load=load))
     offset, biases = 0.013, (0.02, 0.1)
@@ -125,7 +125,7 @@ def throw(number: int, poked: bool, first: str = "ball", phone: bool = False) ->
 
 def _against_bound(found: Identification, made: MeasuredThrow) -> dict[str, float]:
     ideal = made.bound()
-    bound = Identification([made.flight], ideal, Visibility(ideal, made.size), [], [], [])
+    bound = Identification([made.flight], ideal, Identifiability(ideal, made.size), [], [], [])
     names, told, true = _numbers(found, made.truth)
     sds = _numbers(bound, made.truth)[1]
     return {

@@ -26,7 +26,7 @@ PHONE = (0.005, 0.05)
 
 
 def physical_change(theta: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How far another body is from this one (10,), in the order of ``SEEN``.
+    """How far another body is from this one (10,), in the order of ``COORDINATES``.
 
     The mass by its logarithm, the tensor's difference in this one's principal axes, each entry by the root of its two
     moments, the COM in metres. Unlike angles of axes these stay regular where two moments agree.
@@ -46,20 +46,20 @@ def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0), t
     return Values(theta, np.array(damping, float), np.array(gravity, float), (0.0,) * topics, zero, zero, zero)
 
 
-def acting(*pokes) -> ms.Acting:
+def load_history(*pokes) -> ms.LoadHistory:
     """Loads from (begin [s], duration [s] or 0 for an impulse, axes, point in the tracked frame or None,
     force, torque).
     """
     begin = np.array([round(p[0] * 1e9) for p in pokes], np.int64)
     end = begin + np.array([round(p[1] * 1e9) for p in pokes], np.int64)
     loads = [Load(axes, point, tuple(force), tuple(torque)).row for _, _, axes, point, force, torque in pokes]
-    return ms.Acting(begin, end, np.array(loads))
+    return ms.LoadHistory(begin, end, np.array(loads))
 
 
 def flown(values, start, times_s, load=None):
     """Samples (m, SAMPLE) of a flight from the tracked frame's start (13,) at time 0."""
     times_ns = np.round(np.asarray(times_s) * 1e9).astype(np.int64)
-    wrenches = (load or ms.nothing_acting()).within(0, int(times_ns[-1]) + 1)
+    wrenches = (load or ms.no_loads()).within(0, int(times_ns[-1]) + 1)
     samples, good = tr.fly_rows(sh.flown_rows(np.asarray(start, float)[None], [values]), times_ns, wrenches)
     assert good.all()
     return times_ns, samples[0]
@@ -74,7 +74,7 @@ def mocap(
     position = samples[:, :3] - rot.turned(samples[:, 3:7], com) + noise[0] * rng.standard_normal((len(times), 3))
     attitude = rot.product(samples[:, 3:7], rot.exponential(noise[1] * rng.standard_normal((len(times), 3))))
     series = (ms.Series(topic, ms.POSITION, times, position), ms.Series(topic, ms.ATTITUDE, times, attitude))
-    return ms.MeasuredFlight("flight", series, load or ms.nothing_acting(), tuple(values.gravity))
+    return ms.MeasuredFlight("flight", series, load or ms.no_loads(), tuple(values.gravity))
 
 
 def tumbling(rate=(0.4, 6.0, 0.3), velocity=(0.3, -0.2, 3.0)) -> np.ndarray:
@@ -84,7 +84,7 @@ def tumbling(rate=(0.4, 6.0, 0.3), velocity=(0.3, -0.2, 3.0)) -> np.ndarray:
 
 def without_loads(flight: ms.MeasuredFlight) -> ms.MeasuredFlight:
     """The same as if nobody had recorded what acted."""
-    return ms.MeasuredFlight(flight.name, flight.series, ms.nothing_acting(), flight.gravity)
+    return ms.MeasuredFlight(flight.name, flight.series, ms.no_loads(), flight.gravity)
 
 
 def with_imu(
@@ -105,4 +105,4 @@ def with_imu(
         ms.Series("/imu", ms.RATE, stamps, rate, in_body=True, is_imu=True),
         ms.Series("/imu", ms.ACCELERATION, stamps, felt, in_body=True, is_imu=True),
     )
-    return ms.MeasuredFlight("flight", (*flight.series, *imu), flight.acting, flight.gravity)
+    return ms.MeasuredFlight("flight", (*flight.series, *imu), flight.load_history, flight.gravity)

@@ -42,7 +42,7 @@ def _thruster(rng: np.random.Generator, topic_frame: str) -> tuple[list, object]
     messages = [(t, fb.wrench(t, FORCE, TORQUE, topic_frame)) for t in times_ns[:-1]]
     messages.append((times_ns[-1], fb.wrench(times_ns[-1], (0, 0, 0), (0, 0, 0), topic_frame)))
     begin, end = 1e-9 * times_ns[0], 1e-9 * times_ns[-1]
-    return messages, mf.acting((begin, end - begin, "body", (0.0, 0.0, 0.0), FORCE, TORQUE))
+    return messages, mf.load_history((begin, end - begin, "body", (0.0, 0.0, 0.0), FORCE, TORQUE))
 
 
 def test_odometry_with_gaps_and_jitter_beside_a_thruster_gives_the_body(tmp_path: Path) -> None:
@@ -200,7 +200,7 @@ def test_a_wrench_with_another_clock_is_refused_too(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="clocks: /w begins"):
         bag_flight(bag, Choice())
     moved = bag_flight(bag, Choice(offsets={"/w": -100.0}))
-    assert moved.acting.begin_ns[0] == moved.begin_ns
+    assert moved.load_history.begin_ns[0] == moved.begin_ns
 
 
 @pytest.mark.parametrize("count", [1, 3])

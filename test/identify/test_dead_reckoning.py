@@ -26,7 +26,7 @@ def _twists(axes: str, seed: int, seconds: float = 2.0, noise: float = 0.01, in_
     """Velocities and rates alone, of a flight from any attitude with one poke along the given axes; and its start."""
     rng = np.random.default_rng(seed)
     force = 10.0 * study._direction(rng)
-    load = mf.acting((0.4 * seconds, 0.05, axes, (0.05, 0.02, 0.0), force, (0.0, 0.0, 0.01)))
+    load = mf.load_history((0.4 * seconds, 0.05, axes, (0.05, 0.02, 0.0), force, (0.0, 0.0, 0.01)))
     start = mf.tumbling(rng.uniform(3.0, 8.0) * study._direction(rng), rng.normal(0.0, 2.0, 3))
     q = rng.standard_normal(4)
     start[3:7] = q / np.linalg.norm(q)
@@ -57,7 +57,7 @@ def test_twists_in_body_axes_without_an_attitude_give_the_body(
     axes: str, seed: int, seconds: float, noise: float
 ) -> None:
     found = identify([_twists(axes, seed, seconds, noise)[0]])
-    assert not found.hidden
+    assert not found.unidentified
     assert not found.remarks
     assert np.mean(study.normalised_errors(found, TRUTH) ** 2) < 5.0  # ten numbers that hang together
 
@@ -83,10 +83,10 @@ def test_reckoned_paths_of_a_fast_tumble_are_as_good_as_its_noise() -> None:
 def test_a_fit_that_leaves_more_than_noise_says_so_before_any_number() -> None:
     flight, _ = _twists("body", 0)
     # Half a gravity more than was said, of which nothing is known: a wrong model.
-    wrong = ms.MeasuredFlight("flight", flight.series, flight.acting, (0.0, 0.0, -4.9))
+    wrong = ms.MeasuredFlight("flight", flight.series, flight.load_history, (0.0, 0.0, -4.9))
     found = identify([wrong])
     assert as_json(found)["fits"] is False
-    assert as_text(found)[0].startswith("the fit leaves more than noise")
+    assert as_text(found)[0].startswith("the residuals are larger than the noise")
 
 
 def test_twists_in_world_axes_without_an_attitude_are_refused_as_nobody_knows_the_bodys_axes() -> None:

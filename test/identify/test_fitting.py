@@ -27,7 +27,7 @@ def _body(damping=(0.0, 0.0), topics: int = 1):
 def test_derivatives_agree_with_extrapolated_differences() -> None:
     truth = _body((0.05, 1e-4), 2)
     rng = np.random.default_rng(1)
-    flight = mf.with_imu(truth, mf.tumbling(), rng, 1.0, mf.acting((0.5013, *POKE[1:])))
+    flight = mf.with_imu(truth, mf.tumbling(), rng, 1.0, mf.load_history((0.5013, *POKE[1:])))
     topics = ["/mocap/pose", "/imu"]
     [segment] = sh.cut([flight], 9.0, topics, lambda _: 1.0, lambda s: np.ones(len(s.times_ns)))
     start = mf.tumbling()
@@ -43,7 +43,7 @@ def test_derivatives_agree_with_extrapolated_differences() -> None:
             moved = numbers.copy()
             moved[k - sh.START] += h
             other = unknowns.put(truth, moved)
-        found = sh.departures(segment, sh.moved_starts(start[None], change[None])[0], other)
+        found = sh.segment_residuals(segment, sh.moved_starts(start[None], change[None])[0], other)
         return np.concatenate([part.ravel() for part in found])
 
     for k in range(jacobian.shape[1]):
@@ -56,9 +56,9 @@ def test_derivatives_agree_with_extrapolated_differences() -> None:
 
 def test_a_poked_throw_tells_all_ten_parameters() -> None:
     truth = _body()
-    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(2), 3.0, load=mf.acting(POKE))
+    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(2), 3.0, load=mf.load_history(POKE))
     found = identify([flight])
-    assert not found.hidden
+    assert not found.unidentified
     errors = study.normalised_errors(found, truth)
     assert len(errors) == 10
     assert np.mean(errors**2) < 2.5  # 0.9; of ten such numbers one in a hundred passes 2.3
@@ -70,15 +70,15 @@ def test_a_poked_throw_tells_all_ten_parameters() -> None:
 def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
     truth = _body()
     poke = (8.0, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.0, 0.3), (0.0, 0.0, 0.0))
-    found = identify([mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 10.0, load=mf.acting(poke))])
-    assert not found.hidden
+    found = identify([mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 10.0, load=mf.load_history(poke))])
+    assert not found.unidentified
     assert abs(found.mass.value - 0.5) < 4.0 * found.mass.sd  # 1.2
     assert np.mean(study.normalised_errors(found, truth) ** 2) < 2.5  # 0.25
 
 
 def test_the_balance_of_momentum_needs_no_guess_of_the_body() -> None:
     truth = _body((0.05, 0.0))
-    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 3.0, load=mf.acting(POKE))
+    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 3.0, load=mf.load_history(POKE))
     poses = poses_of(flight, {"/mocap/pose": 0.0}, truth)
     assert poses is not None
     guess = mf.values_of(70.0, (1.0, 0.0, 0.0), np.eye(3), study.EARTH, (0.05, 0.0))
@@ -93,7 +93,7 @@ def test_a_sheet_of_no_thickness_ends_on_the_rim_of_what_can_exist() -> None:
     truth = mf.values_of(0.5, (0.01, -0.02, 0.03), np.diag([1.0, 2.0, 3.0]) * 1e-3, study.EARTH)
     ends = []
     for seed in range(3):
-        flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(seed), 1.0, load=mf.acting(POKE))
+        flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(seed), 1.0, load=mf.load_history(POKE))
         found = identify([flight])
         ends.append(np.linalg.eigvalsh(second_moments(found.estimate.mass.inertia))[0] / 3e-3)
         assert ends[-1] > -1e-12
@@ -147,7 +147,7 @@ def test_wrong_starts_converge() -> None:
 def test_outliers_are_said_and_robust_fits_withstand_them() -> None:
     truth = _body()
     rng = np.random.default_rng(4)
-    flight = mf.mocap(truth, mf.tumbling(), rng, 3.0, load=mf.acting(POKE))
+    flight = mf.mocap(truth, mf.tumbling(), rng, 3.0, load=mf.load_history(POKE))
     position = flight.series[0].values
     position[rng.choice(len(position), 12, replace=False)] += rng.normal(0.0, 0.05, (12, 3))
     plain, robust = identify([flight]), identify([flight], robust=True)
@@ -158,7 +158,7 @@ def test_outliers_are_said_and_robust_fits_withstand_them() -> None:
 
 def test_a_poke_that_is_not_in_the_recording_is_said() -> None:
     truth = _body()
-    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(5), 3.0, load=mf.acting(POKE))
+    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(5), 3.0, load=mf.load_history(POKE))
     found = identify([mf.without_loads(flight)], known=Known(theta=truth.theta))
     assert any("wrong" in remark or "isn't in the bag" in remark for remark in found.remarks)
 
@@ -166,7 +166,7 @@ def test_a_poke_that_is_not_in_the_recording_is_said() -> None:
 @pytest.mark.stress
 def test_drag_that_is_not_in_the_model_is_said_and_found_when_asked_for() -> None:
     truth = _body((0.2, 2e-3))
-    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(6), 3.0, load=mf.acting(POKE))
+    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(6), 3.0, load=mf.load_history(POKE))
     without = identify([flight])
     assert any("drag" in remark for remark in without.remarks)
     found = identify([flight], fit=("mass", "com", "inertia", "damping"))

@@ -22,7 +22,7 @@ def _identified(rate, load=None, known=None, seed=1, noise=mf.MOCAP):
 
 
 def _what(found) -> set[str]:
-    return {one.what for one in found.hidden}
+    return {one.what for one in found.unidentified}
 
 
 @pytest.mark.parametrize("noise", [mf.MOCAP, (1e-9, 1e-9)])
@@ -32,13 +32,13 @@ def test_a_free_tumble_tells_the_shape_of_the_tensor_and_not_its_size(noise) -> 
     assert found.mass.value is None
     assert all(one.value is None for one in found.inertia)
     assert all(one.value is not None for one in (*found.shape, *found.center_of_mass))
-    assert "poke" in next(one.remedy for one in found.hidden if one.what == "size of the tensor")
+    assert "poke" in next(one.remedy for one in found.unidentified if one.what == "size of the tensor")
 
 
 def test_a_flight_without_spin_tells_nothing_of_the_body() -> None:
     found = _identified((0.0, 0.0, 0.0))
-    assert len(found.hidden) == 10
-    assert found.verdict.startswith("this motion tells nothing")
+    assert len(found.unidentified) == 10
+    assert found.verdict.startswith("identified from this motion: nothing")
     assert not any("±" in line for line in as_text(found))
 
 
@@ -68,7 +68,7 @@ def test_what_is_neither_asked_for_nor_given_is_no_number() -> None:
 
 
 def test_a_known_poke_fixes_all() -> None:
-    assert not _identified((0.4, 6.0, 0.3), mf.acting(POKE)).hidden
+    assert not _identified((0.4, 6.0, 0.3), mf.load_history(POKE)).unidentified
 
 
 def test_what_cannot_be_seen_is_null_and_no_urdf() -> None:
@@ -78,7 +78,7 @@ def test_what_cannot_be_seen_is_null_and_no_urdf() -> None:
     assert values["inertia"]["ixx"] is None
     assert values["principal_moments"] == [None] * 3
     assert values["inertia_over_trace"]["ixx"]["value"] == pytest.approx(2.0 / 9.0, abs=0.01)
-    with pytest.raises(InputError, match="can't tell mass"):
+    with pytest.raises(InputError, match="not identified: mass"):
         as_urdf(found)
 
 
