@@ -13,6 +13,7 @@ import numpy as np
 import rclpy
 from nav_msgs.msg import Odometry
 from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -40,14 +41,17 @@ class Controller(Node):
     """Answers states of a rigid_body node with what the thrusters are to push with."""
 
     def __init__(self, target: str) -> None:
-        super().__init__("detumble")
+        super().__init__("detumble", start_parameter_services=False)
+        # One that stays: rclpy's own functions would give the node to an executor and take it away at every call.
+        self.calls = SingleThreadedExecutor()
+        self.calls.add_node(self)
         self.state: Odometry | None = None
         self.create_subscription(Odometry, f"{target}/odom", self.on_state, 10)
         self.thrusters = self.create_publisher(Float64MultiArray, f"{target}/thrusters", 10)
         self.reset, self.step = (self.create_client(Trigger, f"{target}/{name}") for name in ("reset", "step"))
         self.pause = self.create_client(SetBool, f"{target}/pause")
         while not self.thrusters.get_subscription_count():
-            rclpy.spin_once(self, timeout_sec=0.1)
+            self.calls.spin_once(timeout_sec=0.1)
 
     def on_state(self, state: Odometry) -> None:
         """Keep the newest state."""
@@ -63,7 +67,8 @@ class Controller(Node):
         """Call a service and wait for its answer."""
         client.wait_for_service()
         future = client.call_async(request)
-        rclpy.spin_until_future_complete(self, future)
+        while not future.done():
+            self.calls.spin_once()
         if not future.result().success:
             raise SystemExit(f"{client.srv_name}: {future.result().message}")
 
@@ -76,7 +81,7 @@ class Controller(Node):
         self.call(self.pause, SetBool.Request(data=True))
         self.call(self.reset, Trigger.Request())
         while self.seconds != 0.0:
-            rclpy.spin_once(self)
+            self.calls.spin_once()
         if not lockstep:
             self.call(self.pause, SetBool.Request(data=False))
         while (answered_s := self.seconds) < until_s:
@@ -84,7 +89,7 @@ class Controller(Node):
             if lockstep:
                 self.call(self.step, Trigger.Request())
             while self.seconds <= answered_s:  # while paused the present state comes again ten times a second
-                rclpy.spin_once(self)
+                self.calls.spin_once()
 
 
 def main() -> None:

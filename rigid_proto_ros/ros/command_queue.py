@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A command topic whose messages the physics thread takes from the middleware's queue itself, and what was lost on the
-way.
+"""A command topic whose messages the physics thread takes from the middleware's queue itself, what was lost on the way,
+and a service whose requests it takes likewise.
 
 A message taken like this costs a third of one that an executor hands to a callback, and is taken at the moment that the
 motion needs it. rclpy has no public way for it, so this one file uses what its own executors use: ``take_message`` of a
@@ -106,6 +106,34 @@ class CommandQueue:
 
 def _ignore(message: object) -> None:
     """Called by nobody."""
+
+
+Request = tuple[Any, Any]
+"""A request as the middleware gives it: the message, and what says whose it is."""
+
+
+class RequestQueue:
+    """The requests to a service below the node's name, taken and answered outside any executor."""
+
+    def __init__(self, node: Node, service_type: Any, name: str, group: CallbackGroup) -> None:
+        self._request_type = service_type.Request
+        self._service = node.create_service(service_type, f"~/{name}", _ignore_request, callback_group=group)
+
+    def take(self) -> Request | None:
+        """The next request, or None."""
+        handle = self._service.handle
+        with handle:
+            request, header = handle.service_take_request(self._request_type)
+        return None if header is None else (request, header)
+
+    def answer(self, request: Request, response: Any) -> None:
+        """Answer one that was taken."""
+        self._service.send_response(response, request[1])
+
+
+def _ignore_request(request: object, response: Any) -> Any:  # noqa: ARG001 (rclpy calls it so)
+    """Called by nobody."""
+    return response
 
 
 class SequenceGaps:

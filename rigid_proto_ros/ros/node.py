@@ -22,6 +22,7 @@ from ..simulation.observer import Observer
 from ..simulation.setup import Setup
 from .arguments import NODE_NAME
 from .command_intake import CommandIntake
+from .command_queue import Unserved
 from .diagnostics import Diagnostics
 from .event_publisher import EventPublisher
 from .live_parameters import LiveParameters
@@ -33,6 +34,7 @@ from .simulation_interfaces import offer_simulation_interfaces
 from .simulation_loop import SimulationLoop
 from .state_publisher import StatePublisher
 from .static_frames import StaticFrames
+from .step_service import StepService
 from .watchers import Watchers
 
 
@@ -82,6 +84,7 @@ class RigidBodyNode(Node):
         self._watchers.record_to(self._watchers.open_recorder(scenario))
         self.loop.watch(self._watchers.observer)
         Services(self.loop, self.call, self.intake).offer(self)
+        self.loop.serve_steps = StepService(self, self.loop, self.intake, Unserved()).serve
         offer_simulation_interfaces(self, self.loop, self.call)
         self.diagnostics = Diagnostics(self, self.loop, self.intake, self._watchers)
         notify_start(self._watchers.observer, scenario)

@@ -10,7 +10,7 @@ import gc
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from typing import Any
 
@@ -119,15 +119,27 @@ class PhysicsThread:
 
 
 def step_over(call: Call, loop: SimulationLoop, periods: int = 1) -> int:
-    """While paused, advance over so many publications, by ``call`` to the thread; returns the time reached [ns].
+    """Do ``advance_by`` by ``call`` to the thread; returns the time reached [ns]."""
+    steps = advance_by(loop, periods)
+    while not call(lambda: next(steps, True)):
+        pass
+    return loop.simulation.time_ns
+
+
+def advance_by(loop: SimulationLoop, periods: int) -> Iterator[None]:
+    """While paused, advance over so many publications, on the physics thread; yields while its ticks make them.
 
     Raises InputError when that takes longer than STEP_PATIENCE_S; the step goes on by itself then.
     """
     end = time.monotonic() + STEP_PATIENCE_S
-    reached = call(lambda: loop.step(periods))
-    while not reached:
+    begun = False
+    # One after another: a step that somebody else has begun is made first.
+    while loop.stepping or not begun:
         if time.monotonic() > end:
             accepted = f"publication periods that are simulated in {STEP_PATIENCE_S:g} s; it goes on"
             raise InputError("step", f"{loop.simulation.time_ns / 1e9:.9g} s reached", accepted)
-        reached = call(lambda: not loop.stepping)
-    return loop.simulation.time_ns
+        if not loop.stepping:
+            begun = True
+            if loop.step(periods):
+                return
+        yield

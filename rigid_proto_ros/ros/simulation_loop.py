@@ -34,7 +34,8 @@ FOLLOW_NS = 1_000_000
 
 class SimulationLoop(ScenarioRun):
     """publish(state) is called for every publication; take_commands(wall_ns, all_topics) at every tick, to submit what
-    has arrived, on quiet topics too if ``all_topics``; it says whether commands come in these seconds.
+    has arrived, on quiet topics too if ``all_topics``; it says whether commands come in these seconds. Who offers steps
+    sets serve_steps(wall_ns): it answers requests for them, and says whether more are to be expected soon.
 
     anybody_listens() says whether publications reach a subscriber, is_viewed() whether a recording or viewer takes the
     states. For these alone states are made in bundles, whenever commands are taken; for nobody none is made, and the
@@ -58,6 +59,7 @@ class SimulationLoop(ScenarioRun):
         self.stamps = stamps or Stamps()
         self._publish = publish
         self._take_commands = take_commands
+        self.serve_steps: Callable[[int], bool] = lambda _: False
         self._on_failure = on_failure
         self._anybody_listens = anybody_listens
         self._has_subscribers = self._has_listeners = True
@@ -67,7 +69,7 @@ class SimulationLoop(ScenarioRun):
         self._pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self._steps_left = 0
         self._steps_requested = 0
-        self._commands_come = False
+        self._commands_come = self._steps_expected = False
         self._present_ns = 0
         self._last_drain_ns = 0
         self._paused_publication_ns = 0
@@ -216,6 +218,7 @@ class SimulationLoop(ScenarioRun):
         if wall_ns >= self._next_listener_check_ns:
             self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
+            self.serve_steps(wall_ns)
         present_ns = self._simulated_present_ns()
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
@@ -265,6 +268,7 @@ class SimulationLoop(ScenarioRun):
         if self._steps_requested and not self.stepping:
             self._steps_requested -= 1
             self.step(self.periods_of_a_step)
+        self._steps_expected = self.serve_steps(now_ns)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._check_listeners()
@@ -343,7 +347,7 @@ class SimulationLoop(ScenarioRun):
         if self._pace.followed:
             return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
         if self.timekeeping.paused:
-            waits = self._commands_come and self.scenario.parameters.lockstep
+            waits = self._steps_expected or (self._commands_come and self.scenario.parameters.lockstep)
             return self._last_drain_ns + LOCKSTEP_NS if waits else latest_ns
         if factor == 0.0:
             return 0

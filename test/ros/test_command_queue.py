@@ -13,9 +13,13 @@ pytest.importorskip("rclpy")
 import rclpy
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import QoSSubscriptionEventType
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter_service import ParameterService
 from rclpy.subscription import Subscription
+from ros_process import READY_S
+
+from rigid_proto_ros.ros.command_queue import RequestQueue, Unserved
 
 SAYS = "this release of rclpy differs from 7.1.6 in what rigid_proto_ros uses beyond the public interface: "
 
@@ -59,6 +63,32 @@ def test_messages_and_events_can_be_taken_from_a_subscription_without_an_executo
         data, information = taken
         assert bytes(data).endswith(b"hello\0"), f"{SAYS}Subscription.handle.take_message"
         assert information["publication_sequence_number"] == 1, f"{SAYS}publication_sequence_number"
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def test_requests_can_be_taken_from_a_service_without_an_executor(ros_domain_id):
+    from std_srvs.srv import Trigger
+
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros_domain_id)
+    node = rclpy.create_node("asked", context=context)
+    try:
+        queue = RequestQueue(node, Trigger, "do", Unserved())
+        assert queue.take() is None
+        client = node.create_client(Trigger, "~/do")
+        while not client.service_is_ready():
+            time.sleep(0.001)
+        future = client.call_async(Trigger.Request())
+        while (request := queue.take()) is None:
+            time.sleep(0.001)
+        assert isinstance(request[0], Trigger.Request), f"{SAYS}Service.handle.service_take_request"
+        queue.answer(request, Trigger.Response(success=True, message="done"))
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        executor.spin_until_future_complete(future, READY_S)
+        assert future.result().message == "done", f"{SAYS}Service.send_response"
     finally:
         node.destroy_node()
         rclpy.try_shutdown(context=context)

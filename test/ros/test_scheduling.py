@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections import deque
@@ -14,8 +15,11 @@ pytest.importorskip("rclpy")
 
 from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.ros import command_intake, command_queue, warm_up
+from rigid_proto_ros.ros.pacing import WorkBudget
+from rigid_proto_ros.ros.physics_thread import advance_by
 from rigid_proto_ros.ros.services import Services
 from rigid_proto_ros.ros.simulation_loop import SimulationLoop
+from rigid_proto_ros.ros.step_service import step
 from rigid_proto_ros.scene import scenario
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -129,7 +133,7 @@ def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_b
     assert compiled_by == [("schedule", "rk4")]
 
 
-@pytest.mark.parametrize("service", ["_pause", "_step"])
+@pytest.mark.parametrize("service", ["pause", "step"])
 def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on(monkeypatch, service) -> None:
     rig = Rig(monkeypatch)
     load = scenario.mesh_body
@@ -150,10 +154,28 @@ def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on
     services._pause(SimpleNamespace(data=True))
     at_ns = rig.loop.simulation.time_ns
     rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
-    getattr(services, service)(SimpleNamespace(data=False))
+    if service == "pause":
+        services._pause(SimpleNamespace(data=False))
+    else:
+        for _ in step(rig.loop, rig.intake):
+            rig.loop.tick()
     assert rig.intake.received["schedule"] == 1
     rig.tick_until(lambda: rig.loop.scenario.parameters.mesh == "book")
     assert changed_ns == [at_ns]
+
+
+def test_a_step_asked_for_while_another_is_made_follows_it(monkeypatch) -> None:
+    rig = Rig(monkeypatch)
+    rig.loop.pause(True)
+    reached_ns = rig.loop.simulation.time_ns
+    advance, calls = WorkBudget.advance, itertools.count()
+    # As where a tick's time is over before the step is made.
+    monkeypatch.setattr(WorkBudget, "advance", lambda *given: next(calls) % 3 != 0 and advance(*given))
+    waiting = [advance_by(rig.loop, 5), advance_by(rig.loop, 7)]
+    while waiting:
+        waiting = [steps for steps in waiting if next(steps, True) is None]
+        rig.loop.tick()
+    assert rig.loop.simulation.time_ns == reached_ns + 12 * MS
 
 
 def test_the_flights_kernels_are_compiled_without_any_integrator(monkeypatch) -> None:
