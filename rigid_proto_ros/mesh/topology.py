@@ -78,6 +78,20 @@ def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray
 
 
 @njit(cache=True, nogil=True)
+def joined_alike(edges: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """For each triangle (m,) the first one of those joined to it through triangles of its ``label`` (m,) ≥ 0 across
+    edges (e, 6), as a topology has them, that two share and both wind alike."""
+    parent = np.arange(len(label))
+    for e in range(len(edges)):
+        s, t = edges[e, 4], edges[e, 5]
+        if edges[e, 2] == 1 and edges[e, 3] == 1 and label[s] >= 0 and label[s] == label[t]:
+            _join(parent, s, t)
+    for i in range(len(parent)):
+        parent[i] = _root(parent, i)
+    return parent
+
+
+@njit(cache=True, nogil=True)
 def _half_edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """The triangles' sides by their lower vertex: those of vertex v are keys[starts[v]:starts[v + 1]].
 
@@ -270,27 +284,37 @@ def _even_permutation(corners: np.ndarray) -> np.ndarray:
 def _component_sums(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, reference: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    volume = np.zeros(count)
-    area = np.zeros((count, 3))
-    lower = np.full((count, 3), np.inf)
-    upper = np.full((count, 3), -np.inf)
-    p = np.empty((3, 3))
-    for t in range(triangles.shape[0]):
-        c = component[t]
-        for i in range(3):
-            for k in range(3):
-                value = vertices[triangles[t, i], k]
-                lower[c, k] = min(lower[c, k], value)
-                upper[c, k] = max(upper[c, k], value)
-                p[i, k] = value - reference[k]
-        ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-        wx, wy, wz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        volume[c] += (p[0, 0] * nx + p[0, 1] * ny + p[0, 2] * nz) / 6.0
-        area[c, 0] += 0.5 * nx
-        area[c, 1] += 0.5 * ny
-        area[c, 2] += 0.5 * nz
-    return volume, area, lower, upper
+    """Sums of each component: those of the one at hand are kept out of memory, which costs more than the arithmetic."""
+    sums = np.zeros((count, 4))
+    lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    x, y, z = reference[0], reference[1], reference[2]
+    first = 0
+    while first < len(triangles):
+        c = component[first]
+        volume, area_x, area_y, area_z = sums[c, 0], sums[c, 1], sums[c, 2], sums[c, 3]
+        low_x, low_y, low_z = lower[c, 0], lower[c, 1], lower[c, 2]
+        high_x, high_y, high_z = upper[c, 0], upper[c, 1], upper[c, 2]
+        t = first
+        while t < len(triangles) and component[t] == c:
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            ax, ay, az = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+            bx, by, bz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
+            cx, cy, cz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
+            low_x, high_x = min(low_x, ax, bx, cx), max(high_x, ax, bx, cx)
+            low_y, high_y = min(low_y, ay, by, cy), max(high_y, ay, by, cy)
+            low_z, high_z = min(low_z, az, bz, cz), max(high_z, az, bz, cz)
+            ax, ay, az = ax - x, ay - y, az - z
+            ux, uy, uz = (bx - x) - ax, (by - y) - ay, (bz - z) - az
+            wx, wy, wz = (cx - x) - ax, (cy - y) - ay, (cz - z) - az
+            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+            volume += (ax * nx + ay * ny + az * nz) / 6.0
+            area_x, area_y, area_z = area_x + 0.5 * nx, area_y + 0.5 * ny, area_z + 0.5 * nz
+            t += 1
+        sums[c, 0], sums[c, 1], sums[c, 2], sums[c, 3] = volume, area_x, area_y, area_z
+        lower[c, 0], lower[c, 1], lower[c, 2] = low_x, low_y, low_z
+        upper[c, 0], upper[c, 1], upper[c, 2] = high_x, high_y, high_z
+        first = t
+    return sums[:, 0].copy(), sums[:, 1:].copy(), lower, upper
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ LEAF = 4
 CELLS_BITS = 11
 """Bits of a centre's place along each axis."""
 CELLS = 1 << CELLS_BITS
+FEW = 50_000
+"""Triangles up to which a third of the places' bits isn't needed."""
 
 
 @njit(cache=True, nogil=True)
@@ -60,14 +62,18 @@ def _curve_places(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarra
 
 @njit(cache=True, nogil=True)
 def along_curve(places: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The numbers ``chosen`` (k,) by their places (k,) along the curve, sorted digit by digit; uses up ``places``."""
-    counts = np.zeros((3, CELLS), np.int64)
+    """The numbers ``chosen`` (k,) by their places (k,) along the curve, sorted digit by digit; uses up ``places``.
+
+    Of few triangles the last digit is left out: they are further apart than it tells.
+    """
+    least = 1 if len(places) <= FEW else 0
+    counts = np.zeros((3, CELLS), np.int32)
     for i in range(len(places)):
-        for digit in range(3):
+        for digit in range(least, 3):
             counts[digit, (places[i] >> (CELLS_BITS * digit)) & (CELLS - 1)] += 1
     order, sorted_places = chosen.astype(np.int64), np.empty_like(places)
     other = np.empty_like(order)
-    for digit in range(3):
+    for digit in range(least, 3):
         start = 0
         for cell in range(CELLS):
             start, counts[digit, cell] = start + counts[digit, cell], start

@@ -5,8 +5,12 @@ from fractions import Fraction
 from itertools import combinations
 
 import numpy as np
+import pytest
+from mass_solids import box, sphere
 
 from rigid_proto_ros.mesh.crossing import crossing_components, self_crossings
+from rigid_proto_ros.mesh.patches import surface_patches
+from rigid_proto_ros.mesh.topology import mesh_topology
 from rigid_proto_ros.mesh.tree import triangle_tree
 
 
@@ -23,8 +27,8 @@ def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
     def pierces(a, b, t):
         if volume(*t, a) * volume(*t, b) >= 0:
             return False
-        sides = [volume(a, b, t[k], t[(k + 1) % 3]) > 0 for k in range(3)]
-        return all(sides) or not any(sides)
+        sides = [volume(a, b, t[k], t[(k + 1) % 3]) for k in range(3)]
+        return min(sides) > 0 or max(sides) < 0
 
     return any(pierces(s[k], s[(k + 1) % 3], t) for s, t in ((p, q), (q, p)) for k in range(3))
 
@@ -98,3 +102,63 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
             if node == 0:
                 break
             node = (node - 1) // 2
+
+
+def test_patches_leave_no_crossing_out():
+    """Spheres and boxes bent through themselves, with faces turned and cut out: as many crossings with patches as
+    without, and patches cover most of what isn't bent much."""
+    random = np.random.default_rng(11)
+    crossings, covered = [], []
+    for number in range(60):
+        vertices, triangles = box(cells=6) if number % 3 else sphere(16)
+        bend = 10.0 ** random.uniform(-2.0, 1.0)
+        waves = random.normal(size=(3, 3))
+        vertices = vertices + bend * np.sin(vertices @ waves + random.uniform(0.0, 6.0, 3))
+        triangles = triangles[random.uniform(size=len(triangles)) < 1.0 - 0.02 * (number % 2)]
+        turned = random.uniform(size=len(triangles)) < 0.02 * (number % 4 == 3)
+        triangles[turned] = triangles[turned][:, ::-1]
+        topology = mesh_topology(vertices, triangles)
+        patch = surface_patches(vertices, topology.corners, topology.edges)
+        component = np.zeros(len(triangles), np.int64)
+        found = self_crossings(vertices, topology.corners, component, topology.edges)
+        assert found == self_crossings(vertices, topology.corners, component), number
+        crossings.append(found)
+        covered.append(np.mean(patch >= 0))
+    assert sum(found > 0 for found in crossings) > 15 and sum(found == 0 for found in crossings) > 15
+    assert np.max(covered) == 1.0 and np.median(covered) > 0.7
+
+
+@pytest.mark.parametrize("turns", [0.9, 1.6])
+def test_a_spiral_ramp_that_lies_over_itself_is_no_patch(turns):
+    """All of it faces up; only one that stays below a full turn covers each point once. A needle through both floors of
+    the higher one is found."""
+    steps = 80
+    angle = np.linspace(0.0, 2.0 * np.pi * turns, steps + 1)
+    rim = np.column_stack([np.cos(angle), np.sin(angle), 0.02 * angle])
+    ramp = np.vstack([0.5 * rim * [1.0, 1.0, 2.0], rim])
+    k = np.arange(steps)
+    low, high = np.column_stack([k, steps + 1 + k, steps + 2 + k]), np.column_stack([k, steps + 2 + k, k + 1])
+    needle = np.array([[0.75, 0.01, -1.0], [0.75, 0.02, -1.0], [0.75, 0.015, 1.0]])
+    points, triangles = np.vstack([ramp, needle]), np.vstack([low, high, 2 * steps + 2 + np.arange(3)[None]])
+    topology = mesh_topology(points, triangles)
+    patch = surface_patches(points, topology.corners, topology.edges)
+    assert np.all(patch[:-1] >= 0) == (turns < 1.0) and patch[-1] < 0
+    component = np.zeros(len(triangles), np.int64)
+    assert self_crossings(points, topology.corners, component, topology.edges) == (1 if turns < 1.0 else 2)
+
+
+def test_a_wall_that_dips_into_a_flat_floor_by_little_is_found_and_one_that_stands_on_it_is_not():
+    """Two patches whose boxes touch in the floor's plane aren't compared; any depth makes them meet."""
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(5.0), np.arange(5.0)))
+    cell = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
+    sheet = np.vstack([np.column_stack([cell, cell + 1, cell + 6]), np.column_stack([cell, cell + 6, cell + 5])])
+    floor = np.column_stack([x, y, np.zeros(25)])
+    for depth in (0.0, 1e-7):
+        wall = np.column_stack([np.full(25, 1.7), 0.4 * y + 0.25, 0.5 * x - depth])
+        points, triangles = np.vstack([floor, wall]), np.vstack([sheet, sheet + 25])
+        topology = mesh_topology(points, triangles)
+        assert set(surface_patches(points, topology.corners, topology.edges).tolist()) == {0, 1}
+        component = np.zeros(len(triangles), np.int64)
+        pairs = sum(exactly_cross(points[one], points[other]) for one, other in combinations(triangles, 2))
+        assert self_crossings(points, topology.corners, component, topology.edges) == pairs
+        assert (pairs > 0) == (depth > 0.0)
