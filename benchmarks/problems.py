@@ -109,18 +109,21 @@ def rotation(q) -> np.ndarray:
 
 TURN = rotation((0.2, -0.4, 0.4, 0.8))
 
-# Sums are written out: BLAS would round them by processor, and a cached reference belongs to one set of bits.
+# Sums are written out: BLAS rounds them by processor and sum() by Python's version (it compensates from 3.12 on), and a
+# cached reference belongs to one set of bits.
+
+
+def _dot(a, b) -> float:
+    return float(a[0]) * float(b[0]) + float(a[1]) * float(b[1]) + float(a[2]) * float(b[2])
 
 
 def _times(matrix, vector) -> list[float]:
-    return [sum(float(row[k]) * float(vector[k]) for k in range(3)) for row in matrix]
+    return [_dot(row, vector) for row in matrix]
 
 
 def _turned(moments) -> np.ndarray:
     """R diag(moments) Rᵀ, symmetric to the last bit."""
-    return np.array(
-        [[sum(float(TURN[i, k] * TURN[j, k]) * moments[k] for k in range(3)) for j in range(3)] for i in range(3)]
-    )
+    return np.array([[_dot(TURN[i] * TURN[j], moments) for j in range(3)] for i in range(3)])
 
 
 def _cross(a, b) -> list[float]:
@@ -184,9 +187,9 @@ def effective_mass(mass: float, inertia, arm, direction) -> float:
         _cross(inertia[2], inertia[0]),
         _cross(inertia[0], inertia[1]),
     ]
-    determinant = sum(float(inertia[0][k]) * adjugate[0][k] for k in range(3))
-    turned = [sum(adjugate[j][i] * turn[j] for j in range(3)) / determinant for i in range(3)]
-    return 1.0 / (1.0 / mass + sum(t * c for t, c in zip(turn, turned, strict=True)))
+    determinant = _dot(inertia[0], adjugate[0])
+    turned = [_dot(column, turn) / determinant for column in zip(*adjugate, strict=True)]
+    return 1.0 / (1.0 / mass + _dot(turn, turned))
 
 
 def string_problem(frequency: float, damping_ratio: float, bilateral: bool, duration: float = 1.0) -> Problem:

@@ -42,7 +42,7 @@ def main(scenario: str) -> None:
     executor.add_node(node)
     listener = rclpy.create_node("listener")
     if scenario == "described":
-        print(json.dumps(descriptions(node, thread, executor, listener, counts)))
+        print(json.dumps(descriptions(node, thread, executor, listener, counts)), flush=True)
         os._exit(0)
     publisher = listener.create_publisher(WrenchStamped, "/rigid_body/wrench", QoSProfile(depth=100))
     if scenario == "listened_to":

@@ -51,7 +51,8 @@ def commands() -> Iterator[str]:
             for line in re.findall(r"^  (\S+)", found, re.MULTILINE):
                 yield f"argument {command} {line}"
         for option in OPTION.findall(text):
-            yield f"option {command} {option}"
+            # The value after the last name alone, as Python 3.13 and later write it.
+            yield f"option {command} {re.sub(r' [^ ,-]+, -', ', -', option)}"
 
 
 def declared_parameters() -> Iterator[str]:

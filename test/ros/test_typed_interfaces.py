@@ -119,6 +119,7 @@ REFUSED = {
 }
 
 
+@needs_compiler
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_package_that_cannot_be_built_ends_in_one_line(tmp_path, case) -> None:
     files, reason = REFUSED[case]
