@@ -131,6 +131,6 @@ def _in_package(name: str, package: str, inside: str, search: Search) -> Path:
         if missing is None and folder.is_dir():
             missing = folder / inside
     if missing is not None:
-        raise MeshError("mesh", f"there is no file {str(missing)!r} in the package")
+        raise MeshError("mesh", f"there is no file {str(missing)!r} in the package of {name!r}")
     where = f", and none above {str(search.near)!r}; --package-path DIR says where it is" if search.near else ""
     raise MeshError("mesh", f"the package {package!r} of {name!r} was not found{where}")
