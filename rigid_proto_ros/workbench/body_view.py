@@ -29,6 +29,9 @@ SEE_THROUGH = 0.45
 LOOK_AGAIN_S = 0.25
 """[s] Between two looks of the browsers at whether the pointer is still on a body that moves."""
 
+LAST_LOOK_S = 2.0 * LOOK_AGAIN_S
+"""[s] After a movement there is another look: the one before it may have come before the body was drawn at its place."""
+
 Wxyz = tuple[float, float, float, float]
 
 
@@ -81,6 +84,7 @@ class BodyView:
         self._middle = np.zeros(3)
         self._name_points: tuple[tuple[Any, ...], np.ndarray] = ((), np.zeros((2, 3)))
         self._look_due_s, self._look_odd = 0.0, False
+        self._look_until_s, self._last_pose = 0.0, np.zeros(7)
         self._frame = scene.add_frame("/body", show_axes=False)
         self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
         self._names = [
@@ -165,10 +169,14 @@ class BodyView:
             self._drawn_mesh.visible = not seen_through
 
     def look_again(self, now_s: float) -> None:
-        """Have the browsers look whether the pointer is still on the body. They do so where the pointer moves, and when
-        something about the node changes: so its colour does, by less than can be seen.
+        """Have the browsers look whether the pointer is still on a body that moves. They do so where the pointer moves,
+        and when something about the node changes: so its colour does, by less than can be seen. Each such change has
+        them draw for a quarter of a second, so that there is none while the body is at rest.
         """
-        if self.mesh is not None and now_s >= self._look_due_s:
+        pose = np.concatenate([self._frame.position, self._frame.wxyz])
+        if not np.array_equal(pose, self._last_pose):
+            self._last_pose, self._look_until_s = pose, now_s + LAST_LOOK_S
+        if self.mesh is not None and self._look_due_s <= now_s <= self._look_until_s:
             self._look_due_s = now_s + LOOK_AGAIN_S
             red, green, blue = BODY_COLOUR
             self._look_odd = not self._look_odd

@@ -254,3 +254,22 @@ def test_stamps_of_a_clock_are_read_as_simulated_time_whenever_the_page_opens() 
     assert times.of(1009 * second) == 9 * second
     times.heard('no line of the log: "clock"')
     assert times.offset_ns == 1010 * second
+
+
+def test_browsers_look_where_the_pointer_is_while_the_body_moves_and_not_while_it_rests(desk: Desk) -> None:
+    """Whatever changes in its picture has a browser draw for a quarter of a second; at rest it should do nothing."""
+    first_s = 1e9  # later than any look of the page itself
+
+    def looks() -> list[tuple[int, ...]]:
+        view, colours = desk.page.view, []
+        for k, x in enumerate([*np.zeros(20), *np.linspace(0.1, 1.0, 20), *np.ones(20)]):
+            view.place(np.array([x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), first_s + 0.25 * k)
+            view.body.look_again(first_s + 0.25 * k)
+            colours.append(tuple(view.body.mesh.color))
+        return colours
+
+    with bare_page(desk.server.get_port()):
+        desk.fly()
+        colours = desk.do(looks)
+    assert len(set(colours[4:20])) == len(set(colours[44:])) == 1
+    assert all(a != b for a, b in zip(colours[20:42], colours[21:42], strict=False))
