@@ -17,10 +17,10 @@ from command_rig import RosClient
 from ros_process import RosProcess, descendants
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
-    *("--webgl-antialiasing-mode=none", "--disable-gpu-compositing"),
-]
+SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
+FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
+"""For tests: without a graphics card, smooth edges and a page that WebGL puts together double the cost of a picture."""
+
 PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from conftest import held_domain
 from playwright.sync_api import sync_playwright
-from workbench_page import CHROMIUM, FLAGS, Bench, Page
+from workbench_page import CHROMIUM, SOFTWARE_GL, Bench, Page
 
 from rigid_proto_ros.rerun_view.ports import any_free_port
 from rigid_proto_ros.scene.lessons import lessons
@@ -34,7 +34,7 @@ def main() -> None:
         started_s = time.monotonic()
         bench = Bench(environment, Path(folder), any_free_port(), "t_handle")
         try:
-            browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            browser = driver.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_GL)
             page = Page(browser, bench.address, SIZE)
             if args.compare:
                 draw_comparison(page, args.compare, started_s)

@@ -30,7 +30,7 @@ LOOK_AGAIN_S = 0.25
 """[s] Between two looks of the browsers at whether the pointer is still on a body that moves."""
 
 LAST_LOOK_S = 2.0 * LOOK_AGAIN_S
-"""[s] After a movement there is another look: the one before it may have come before the body was drawn at its place."""
+"""[s] Looks go on for so long after a movement: the one before may have come before the body was drawn at its place."""
 
 Wxyz = tuple[float, float, float, float]
 
