@@ -35,6 +35,7 @@ from result_table import ResultTable
 from rigid_proto_ros import __version__
 from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import measurements as ms
+from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.local_motion import local_start
 from rigid_proto_ros.identify.sensors import departure

@@ -18,6 +18,7 @@ from ..base.rotation import quaternion_from_matrix
 from . import rotations as rot
 from .poses import Poses, integral
 from .pushes import pushes_of
+from .triangles import upper_triangle
 from .unknowns import Values
 
 SHOWN = 0.1
@@ -50,11 +51,11 @@ def first_attitude(poses: Poses, values: Values, damped: bool) -> np.ndarray:
     widths = np.linalg.norm(matrix, axis=0)
     widths[widths == 0.0] = 1.0
     scaled = matrix / widths
-    left, sizes, axes = np.linalg.svd(scaled, full_matrices=False)
+    triangle = upper_triangle(np.column_stack([scaled, poses.positions.ravel()]).T)
+    left, sizes, axes = np.linalg.svd(triangle[:-1, :-1])
     inverse = np.where(sizes > 1e-9 * sizes[0], 1.0 / np.maximum(sizes, 1e-300), 0.0)
-    right = poses.positions.ravel()
-    found = axes.T @ (inverse * (left.T @ right))
-    noise = float(np.linalg.norm(scaled @ found - right)) / np.sqrt(len(right))
+    found = axes.T @ (inverse * (left.T @ triangle[:-1, -1]))
+    noise = float(np.linalg.norm(triangle[:, :-1] @ found - triangle[:, -1])) / np.sqrt(len(scaled))
     sds = noise * np.linalg.norm(axes.T * inverse, axis=1) / widths
     found = found / widths
     known = np.zeros((3, 3))

@@ -365,22 +365,48 @@ def _solved(
     problem = sh.Problem(segments, starts, work.values, unknowns)
     if np.max(np.abs(problem.residuals(problem.first))) >= sh.FAILED:
         raise InputError("identify", "the first guess of the motion can't be simulated; see --from and --to")
-    # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may
-    # go.
-    widths, away = problem.widths, np.full(len(problem.first), FIRST_STEP / np.sqrt(len(problem.first)))
-    found = least_squares(
-        lambda z: problem.residuals(problem.first + widths * (z - away)),
-        away,
-        lambda z: problem.jacobian(problem.first + widths * (z - away)) * widths,
-        max_nfev=most,
-        ftol=tolerance,
-    )
-    work.evaluations += int(found.nfev)
-    numbers = problem.first + widths * (found.x - away)
+    numbers = _least_squares(problem, most, tolerance)
+    work.evaluations += problem.evaluations
     work.values, starts = _possible(problem.values(numbers)), problem.starts(numbers)
     if tolerance > ROUGH or pb.is_possible(problem.values(numbers).body.inertia):
         return starts
     return _along_the_rim(work, segments, starts)
+
+
+class _LastStepError(Exception):
+    """Ends SciPy's search where the next step changes hardly anything any more; numbers: where it leads."""
+
+    def __init__(self, numbers: np.ndarray) -> None:
+        super().__init__("the search has ended")
+        self.numbers = numbers
+
+
+def _least_squares(problem: sh.Problem, most: int, tolerance: float) -> np.ndarray:
+    """The best unknowns, by SciPy, until a step promises less than this part of the squares: it is taken unseen."""
+    # In units of the prior, and away from 0: SciPy takes the length of the first numbers for how far a first step may
+    # go.
+    widths, away = problem.widths, np.full(len(problem.first), FIRST_STEP / np.sqrt(len(problem.first)))
+
+    def jacobian(z: np.ndarray) -> np.ndarray:
+        numbers = problem.first + widths * (z - away)
+        matrix, right = problem.jacobian(numbers) * widths, problem.residuals(numbers)
+        # Of all steps the best one takes from the residuals what isn't below the triangle.
+        step, gain = -np.linalg.solve(matrix[:-1], right[:-1]), float(right[:-1] @ right[:-1])
+        if gain < max(SMALL_STEP**2, tolerance * float(right @ right)):
+            raise _LastStepError(numbers + widths * step)
+        return matrix
+
+    try:
+        found = least_squares(
+            lambda z: problem.residuals(problem.first + widths * (z - away)),
+            away,
+            jacobian,
+            max_nfev=most,
+            ftol=tolerance,
+        )
+    except _LastStepError as end:
+        return end.numbers
+    return problem.first + widths * (found.x - away)
 
 
 def _possible(values: Values) -> Values:
@@ -464,9 +490,9 @@ def _estimate(work: _Work, segments: list[sh.ShootingInterval], starts: np.ndarr
             flown = sh.linearized(segment, start, variations)
             if flown is None:
                 raise InputError("identify", "the estimate can't be simulated; see --from and --to")
-            triangle = sh.compressed(*flown)
+            triangle = sh.compressed(flown)
             # Rows that are left when the start has taken all that it can.
             parts.append(triangle[sh.START : -1, sh.START : -1])
-            cost += float(sum((part**2).sum() for part in flown[0])) if wider == 1.0 else 0.0
+            cost += float(flown[-1] @ flown[-1]) if wider == 1.0 else 0.0
     near, far = (np.concatenate(parts) for parts in roots.values())
     return Estimate(work.values, work.unknowns, segments, starts, work.sigmas, near, far, cost, work.evaluations)

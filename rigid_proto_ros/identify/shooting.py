@@ -9,19 +9,23 @@ unknowns.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from ..base.compilation import njit
 from ..base.errors import InputError
-from ..base.rotation import matrix_from_quaternion
+from ..base.rotation import exponential, multiply, normalize, rotate, rotate_inverse
 from . import mass_parameters as mp
 from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
-from .sensors import deviation, predicted
+from .local_motion import high_rate
+from .sensors import CODES, fill_columns, fill_residuals, fill_shift_columns, fill_time_column
 from .triangles import upper_triangle
-from .unknowns import Unknowns, Values
+from .unknowns import NONE, Unknowns, Values
+from .varied_flights import fly_variations
 
 START = 12
 """Unknowns of a segment's start: position [m, world], turn [rad], velocity [m/s] and angular velocity [rad/s], these
@@ -29,6 +33,10 @@ three in body axes: so a turn alone, which nothing shows of a flight without att
 """
 START_STEPS = np.array([0.0] * 3 + [mp.STEP] * 3 + [0.0] * 3 + [mp.STEP] * 3)
 """For difference quotients; how a flight shifts with its position and velocity is known in closed form."""
+MOST_TURN = 20.0
+"""Of a segment for whose difference quotients to one side the steps are short enough [rad]: their error is half of the
+angle by which the flights end apart, 4e-5, and of longer turns too, as the steps are shorter then.
+"""
 OFFSET_STEP_S = 1e-5
 FAILED = 1e20
 """Residual of a flight that didn't come through, in standard deviations: the step is then taken back."""
@@ -45,6 +53,16 @@ class Piece:
     sigma: float
     weights: np.ndarray
 
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Standard deviations for each unit, weighted, (n,)."""
+        return np.sqrt(self.weights) / self.sigma
+
+    @property
+    def sensor(self) -> tuple[int, bool, bool]:
+        """Kind, ``in_body`` and ``is_imu``, as the kernels of ``sensors`` take them."""
+        return CODES[self.series.kind], self.series.in_body, self.series.is_imu
+
 
 @dataclass(frozen=True)
 class ShootingInterval:
@@ -59,6 +77,11 @@ class ShootingInterval:
     def samples(self) -> int:
         """How many there are in all."""
         return sum(len(piece.times_ns) for piece in self.pieces)
+
+    @property
+    def duration_s(self) -> float:
+        """From its begin to the last sample [s]."""
+        return 1e-9 * (max(int(piece.times_ns[-1]) for piece in self.pieces) - self.begin_ns)
 
 
 def cut(
@@ -85,7 +108,7 @@ def cut(
                 begun, ended = np.searchsorted(series.times_ns, (first, last))
                 inside = slice(begun, ended, every(series))
                 if ended > begun:
-                    times, values = series.times_ns[inside], series.values[inside]
+                    times, values = series.times_ns[inside], np.ascontiguousarray(series.values[inside], float)
                     topic = topics.index(series.topic)
                     pieces.append(Piece(series, topic, times, values, sigma(series), weights(series)[inside]))
             if pieces:
@@ -95,22 +118,52 @@ def cut(
     return segments
 
 
+@njit(cache=True, error_model="numpy")
+def _move(starts: np.ndarray, changes: np.ndarray) -> None:
+    for k in range(starts.shape[0]):
+        start, change = starts[k], changes[k]
+        qx, qy, qz, qw = start[3], start[4], start[5], start[6]
+        u, v, w = rotate_inverse(qx, qy, qz, qw, start[7], start[8], start[9])
+        turn = exponential(change[3], change[4], change[5])
+        qx, qy, qz, qw = normalize(*multiply(qx, qy, qz, qw, turn[0], turn[1], turn[2], turn[3]))
+        start[3], start[4], start[5], start[6] = qx, qy, qz, qw
+        u, v, w = rotate(qx, qy, qz, qw, u + change[6], v + change[7], w + change[8])
+        start[7], start[8], start[9] = u, v, w
+        for i in range(3):
+            start[i] += change[i]
+            start[10 + i] += change[9 + i]
+
+
 def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
     """Starts (n, 13) of the tracked frame changed by (n, 12)."""
-    moved = starts.copy()
-    moved[:, :3] += changes[:, :3]
-    attitude = rot.product(starts[:, 3:7], rot.exponential(changes[:, 3:6]))
-    moved[:, 3:7] = attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
-    moved[:, 7:10] = rot.turned(attitude, rot.turned_back(starts[:, 3:7], starts[:, 7:10]) + changes[:, 6:9])
-    moved[:, 10:13] += changes[:, 9:12]
+    moved = np.array(starts)
+    _move(moved, changes)
     return moved
 
 
-def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
-    """Rows of ``trajectories.fly_rows`` (n, FLOWN): starts (n, 13) of the tracked frame as those of the
-    centre of mass.
-    """
-    rows = np.empty((len(starts), tr.FLOWN))
+@njit(cache=True, error_model="numpy")
+def _begin(rows: np.ndarray, starts: np.ndarray) -> None:
+    """The start of the centre of mass of each of ``rows`` (n, FLOWN), from the tracked frame's (n, 13)."""
+    for k in range(rows.shape[0]):
+        row, start = rows[k], starts[k]
+        x, y, z = row[tr.COM], row[tr.COM + 1], row[tr.COM + 2]
+        wx, wy, wz = start[10], start[11], start[12]
+        px, py, pz = rotate(start[3], start[4], start[5], start[6], x, y, z)
+        u, v, w = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
+        vx, vy, vz = rotate(start[3], start[4], start[5], start[6], u, v, w)
+        for i in range(13):
+            row[tr.START + i] = start[i]
+        row[tr.START] += px
+        row[tr.START + 1] += py
+        row[tr.START + 2] += pz
+        row[tr.START + 7] += vx
+        row[tr.START + 8] += vy
+        row[tr.START + 9] += vz
+
+
+def _body_rows(values: Sequence[Values]) -> np.ndarray:
+    """Rows of ``trajectories.fly_rows`` (n, FLOWN) without their starts."""
+    rows = np.zeros((len(values), tr.FLOWN))
     for row, v in zip(rows, values, strict=True):
         mass = v.body
         row[tr.MASS] = mass.mass
@@ -118,54 +171,47 @@ def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
         row[tr.INERTIA : tr.INERTIA + 9] = mass.inertia.ravel()
         row[tr.GRAVITY : tr.GRAVITY + 3] = v.gravity
         row[tr.LINEAR_DAMPING], row[tr.ANGULAR_DAMPING] = v.damping
-    at, com = tr.START, rows[:, tr.COM : tr.COM + 3]
-    q, w = starts[:, 3:7], starts[:, 10:13]
-    rows[:, at : at + 13] = starts
-    rows[:, at : at + 3] += rot.turned(q, com)
-    rows[:, at + 7 : at + 10] += rot.turned(q, rot.cross(w, com))
     return rows
 
 
-def _times(segment: ShootingInterval, offsets: Sequence[float]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Times to look at, ascending from the segment's begin [ns], and for each piece which of them are its own."""
-    own = [piece.times_ns - segment.begin_ns + round(offsets[piece.topic] * 1e9) for piece in segment.pieces]
+def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
+    """Rows of ``trajectories.fly_rows`` (n, FLOWN): starts (n, 13) of the tracked frame as those of the
+    centre of mass.
+    """
+    rows = _body_rows(values)
+    _begin(rows, starts)
+    return rows
+
+
+def _sensor_row(values: Values) -> np.ndarray:
+    """(SENSOR,) of ``sensors``."""
+    return np.concatenate([values.theta[mp.COM], values.imu_place, values.gyro_bias, values.accel_bias])
+
+
+def _times(
+    segment: ShootingInterval, offsets: Sequence[float], topic: int | None = None
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Times to look at, ascending from the segment's begin [ns], and for each piece, or each of one topic, which of
+    them are its own.
+    """
+    pieces = [piece for piece in segment.pieces if topic in (None, piece.topic)]
+    own = [piece.times_ns - segment.begin_ns + round(offsets[piece.topic] * 1e9) for piece in pieces]
     times, where = np.unique(np.maximum(np.concatenate(own), 0), return_inverse=True)
     ends = np.cumsum([len(part) for part in own])
     return times, np.split(where, ends[:-1])
 
 
-def _shown(
-    segment: ShootingInterval, starts: np.ndarray, values: Sequence[Values]
-) -> tuple[list[np.ndarray], np.ndarray | None]:
-    """What each piece would show of each flight, (n, m, 3 or 4), and the samples of the first one; None
-    where one failed.
-    """
-    times, where = _times(segment, values[0].offsets)
-    rows = flown_rows(starts, values)
-    # An IMU's biases and place change what it shows and not the flight.
-    others = np.any(rows != rows[0], axis=1)
-    others[0] = True
-    samples, good = tr.fly_rows(rows[others], times, segment.wrenches)
-    if not good.all():
-        return [], None
-    flown = np.where(others, np.cumsum(others) - 1, 0)[:, None]
-    com = np.array([v.theta[mp.COM] for v in values])[:, None]
-    place = np.array([v.imu_place for v in values])[:, None]
-    shown = []
-    for piece, index in zip(segment.pieces, where, strict=True):
-        series = piece.series
-        name = "accel_bias" if series.kind == ms.ACCELERATION else "gyro_bias"
-        bias = np.array([getattr(v, name) for v in values])[:, None] * (1.0 if series.is_imu else 0.0)
-        shown.append(predicted(series, samples[flown, index], com, place, bias))
-    return shown, samples[0]
-
-
 def segment_residuals(segment: ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
     """Measured minus shown of each piece (m, 3), in its own unit; None where the flight failed."""
-    shown, _ = _shown(segment, start[None], [values])
-    if not shown:
+    times, where = _times(segment, values.offsets)
+    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
+    if not good.all():
         return None
-    return [deviation(p.series.kind, s[0], p.values) for p, s in zip(segment.pieces, shown, strict=True)]
+    sensor, found = _sensor_row(values), []
+    for piece, own in zip(segment.pieces, where, strict=True):
+        found.append(np.empty((len(own), 3)))
+        fill_residuals(*piece.sensor, samples[0], own, sensor, piece.values, found[-1])
+    return found
 
 
 def flown_poses(
@@ -185,113 +231,117 @@ def flown_poses(
 class Variations:
     """Values and those beside them whose flights give difference quotients.
 
-    central: to both sides, which costs twice as much. wider: by how much the steps are longer.
+    central: to both sides, which costs twice as much. wider: by how much the steps are longer. turn: of a segment
+    [rad], by which the steps of what changes its rate are shorter, so that flights end no farther apart.
     """
 
-    def __init__(self, values: Values, unknowns: Unknowns, central: bool = True, wider: float = 1.0) -> None:
+    def __init__(
+        self, values: Values, unknowns: Unknowns, central: bool = True, wider: float = 1.0, turn: float = 0.0
+    ) -> None:
         self.values, self.unknowns = values, unknowns
-        self.sides = (1.0, -1.0) if central else (1.0,)
-        self.start_widths = wider * START_STEPS
-        self.widths = np.concatenate([self.start_widths, wider * unknowns.steps(values)])
-        turned = np.flatnonzero(START_STEPS)
-        varied = [k for k, (name, _) in enumerate(unknowns.slots) if name != "offsets"]
-        self.columns = [*turned.tolist(), *(START + k for k in varied)]
-        """Which columns of the derivatives they give, in their order."""
-        self._changes = (np.diag(self.start_widths)[turned][:, None] * np.array(self.sides)[:, None]).reshape(-1, START)
-        base = unknowns.read(values)
-        self.each = [values] * (1 + len(self._changes))
-        """Of each flight: the base, then those to each side of each column."""
-        for k in varied:
-            for sign in self.sides:
-                numbers = base.copy()
-                numbers[k] += sign * self.widths[START + k]
-                self.each.append(unknowns.put(values, numbers))
+        shorter = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
+        of_turn = np.array([shorter if name in ("theta", "tensor_change") else 1.0 for name, _ in unknowns.slots])
+        start_widths = wider * START_STEPS * np.repeat([1.0, 1.0, 1.0, shorter], 3)
+        widths = np.concatenate([start_widths, wider * of_turn * unknowns.steps(values)])
+        sides = (1.0, -1.0) if central else (1.0,)
+        base, each, changes = unknowns.read(values), [values], [np.zeros(START)]
+        differences = []
+        for column, width in enumerate(widths.tolist()):
+            if width == 0.0 or (column >= START and unknowns.slots[column - START][0] == "offsets"):
+                continue
+            differences.append((column, len(each), len(each) + 1 if central else 0))
+            for sign in sides:
+                change, other = np.zeros(START), values
+                if column < START:
+                    change[column] = sign * width
+                else:
+                    numbers = base.copy()
+                    numbers[column - START] += sign * width
+                    other = unknowns.put(values, numbers)
+                each.append(other)
+                changes.append(change)
+        self.differences = np.array(differences, np.int64)
+        """Of each column that they give: which one, and the two variations whose difference it is."""
+        self.widths = len(sides) * widths[self.differences[:, 0]]
+        self.sensors = np.array([_sensor_row(one) for one in each])
+        rows, moved = _body_rows(each), np.array(changes)
+        # An IMU's biases and place change what it shows and not the flight.
+        own = np.any(rows != rows[0], axis=1) | moved.any(axis=1)
+        own[0] = True
+        self.flights = np.where(own, np.cumsum(own) - 1, 0)
+        """Which flight is that of each variation."""
+        self._rows, self._changes = rows[own], moved[own]
 
-    def starts(self, start: np.ndarray) -> np.ndarray:
-        """Of each flight, (n, 13)."""
-        starts = np.repeat(start[None], len(self.each), axis=0)
-        count = len(self._changes)
-        starts[1 : 1 + count] = moved_starts(starts[:count], self._changes)
-        return starts
+    def rows(self, start: np.ndarray) -> np.ndarray:
+        """Of each flight from about ``start`` (13,), as ``trajectories.fly_rows`` takes them."""
+        rows = self._rows.copy()
+        _begin(rows, moved_starts(np.repeat(start[None], len(rows), axis=0), self._changes))
+        return rows
 
 
-def _shift_columns(
-    piece: Piece, base: np.ndarray, seconds: np.ndarray, rate: float, attitude: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """How a piece changes with its start's position and velocity, (m, 3, 3) each; base (m, SAMPLE), rate c/m [1/s].
+def linearized(segment: ShootingInterval, start: np.ndarray, variations: Variations) -> np.ndarray | None:
+    """How the residuals of all pieces change with the start and the unknowns, and as the last row the residuals
+    themselves: (12 + unknowns + 1, 3 m of all pieces), in units of the standard deviations, weighted.
 
-    attitude (4,): the start's, in whose axes its velocity changes.
+    None where a flight failed.
     """
-    m, kind = len(base), piece.series.kind
-    position, velocity = np.zeros((m, 3, 3)), np.zeros((m, 3, 3))
-    decay = np.exp(-rate * seconds)[:, None, None]
-    back = rot.turned_back(base[:, None, 3:7], np.eye(3)[None]).transpose(0, 2, 1)
-    if kind == ms.POSITION:
-        position[:] = np.eye(3)
-        way = -np.expm1(-rate * seconds) / rate if rate else seconds
-        velocity[:] = np.eye(3) * way[:, None, None]
-    elif kind == ms.VELOCITY:
-        velocity[:] = (back if piece.series.in_body else np.eye(3)) * decay
-    elif kind == ms.ACCELERATION:
-        velocity[:] = -rate * back * decay
-    return position, velocity @ matrix_from_quaternion(attitude)
-
-
-def linearized(
-    segment: ShootingInterval, start: np.ndarray, variations: Variations
-) -> tuple[list[np.ndarray], np.ndarray] | None:
-    """Departures of each piece, and how all of them change with the start and the unknowns, (3 m of all pieces, 12 +
-    unknowns).
-
-    Both in units of the standard deviations, weighted. None where a flight failed.
-    """
-    values, unknowns, columns = variations.values, variations.unknowns, variations.columns
-    shown, base = _shown(segment, variations.starts(start), variations.each)
-    if base is None:
-        return None
+    values, unknowns = variations.values, variations.unknowns
     times, where = _times(segment, values.offsets)
-    rate = values.damping[0] / values.body.mass
-    central, widths = len(variations.sides) > 1, len(variations.sides) * variations.widths
-    blocks, found = [], []
-    for piece, own, index in zip(segment.pieces, shown, where, strict=True):
-        kind = piece.series.kind
-        block = np.zeros((len(index), 3, START + len(unknowns)))
-        block[:, :, 0:3], block[:, :, 6:9] = _shift_columns(piece, base[index], 1e-9 * times[index], rate, start[3:7])
-        # The derivative of what a flight shows is minus that of its deviation from a nearby flight.
-        difference = deviation(kind, own[2::2] if central else own[:1], own[1 :: len(variations.sides)])
-        block[:, :, columns] = (difference / widths[columns][:, None, None]).transpose(1, 2, 0)
-        weight = np.sqrt(piece.weights)[:, None] / piece.sigma
-        blocks.append(-block * weight[:, :, None])
-        found.append(deviation(kind, own[0], piece.values) * weight)
+    samples = fly_variations(variations.rows(start), times, segment.wrenches)
+    if samples is None:
+        return None
+    rate, seconds = values.damping[0] / values.body.mass, 1e-9 * times
+    columns = np.zeros((START + len(unknowns) + 1, 3 * segment.samples))
+    first = 0
+    for piece, own in zip(segment.pieces, where, strict=True):
+        of_all = (variations.flights, variations.sensors, variations.differences, variations.widths)
+        fill_columns(*piece.sensor, samples, own, *of_all, piece.values, piece.scale, columns, first)
+        kind, in_body, _ = piece.sensor
+        fill_shift_columns(kind, in_body, samples[0], own, seconds, rate, start, piece.scale, columns, first)
+        first += 3 * len(own)
     for k, (name, topic) in enumerate(unknowns.slots):
         if name == "offsets":
-            _fill_offset(segment, start, values, topic, [block[:, :, START + k] for block in blocks])
-    return found, np.concatenate([block.reshape(-1, START + len(unknowns)) for block in blocks])
+            _fill_offset(segment, start, variations, topic, columns[START + k])
+    return columns
 
 
 def _fill_offset(
-    segment: ShootingInterval, start: np.ndarray, values: Values, topic: int, columns: Sequence[np.ndarray]
+    segment: ShootingInterval, start: np.ndarray, variations: Variations, topic: int, column: np.ndarray
 ) -> None:
-    """How what a topic shows changes with its clock, into a column (m, 3) of each piece."""
-    sides = []
-    for sign in (1.0, -1.0):
+    """How what a topic shows changes with its clock."""
+    values, row, sides = variations.values, variations.rows(start)[:1], []
+    for sign in (-1.0, 1.0):
         offsets = list(values.offsets)
         offsets[topic] += sign * OFFSET_STEP_S
-        moved = replace(values, offsets=tuple(offsets))
-        sides.append(_shown(segment, start[None], [moved])[0])
-    for number, (piece, column) in enumerate(zip(segment.pieces, columns, strict=True)):
+        times, where = _times(segment, offsets, topic)
+        if not len(times):
+            return
+        samples, _ = tr.fly_rows(row, times, segment.wrenches)
+        sides.append([samples[0, own] for own in where])
+    first = 0
+    both = iter(zip(*sides, strict=True))
+    for piece in segment.pieces:
+        part = column[first : first + 3 * len(piece.times_ns)]
+        first += len(part)
         if piece.topic == topic:
-            change = deviation(piece.series.kind, sides[1][number][0], sides[0][number][0])
-            weight = np.sqrt(piece.weights)[:, None] / piece.sigma
-            column[:] = -weight * change / (2.0 * OFFSET_STEP_S)
+            earlier, later = next(both)
+            between_s = 2.0 * OFFSET_STEP_S
+            fill_time_column(*piece.sensor, earlier, later, between_s, variations.sensors[0], piece.scale, part)
             # Where a load begins or ends an accelerometer's curve jumps, and says nothing about its slope.
             times = piece.times_ns - segment.begin_ns + round(values.offsets[topic] * 1e9)
-            column[segment.wrenches.is_near_edge(times, round(2e9 * OFFSET_STEP_S))] = 0.0
+            near = segment.wrenches.is_near_edge(times, round(2e9 * OFFSET_STEP_S))
+            part.reshape(-1, 3)[near] = 0.0
 
 
-def compressed(found: Sequence[np.ndarray], jacobian: np.ndarray) -> np.ndarray:
-    """[J r] as an upper triangle (k, k), k the columns of J and one, with the same products of its columns."""
-    return upper_triangle(np.vstack([jacobian.T, np.concatenate([part.ravel() for part in found])]))
+def compressed(columns: np.ndarray, prior: np.ndarray | None = None) -> np.ndarray:
+    """[J r] of ``linearized`` as an upper triangle (k, k) with the same products of its columns.
+
+    prior (12,): standard deviations of what is assumed of the start beforehand, nothing without it.
+    """
+    diagonal = np.zeros(len(columns))
+    if prior is not None:
+        diagonal[:START] = 1.0 / prior
+    return upper_triangle(columns, diagonal)
 
 
 PRIOR_STEPS = 1.0 / mp.STEP
@@ -317,15 +367,21 @@ class Problem:
         self._base: _Linearized | None = None
         self._trial: _Linearized | None = None
         self._starts = starts
+        self.evaluations = 0
+        """Of all residuals, with their derivatives."""
+        rates = {id(flight): high_rate(flight) for flight in {id(s.flight): s.flight for s in segments}.values()}
+        self._turn = max(rates[id(segment.flight)] * segment.duration_s for segment in segments)
 
     def values(self, numbers: np.ndarray) -> Values:
         """With these unknowns."""
         return self.unknowns.put(self._given, numbers)
 
     def starts(self, numbers: np.ndarray) -> np.ndarray:
-        """The best starts (k, 13) for these unknowns, at which the last step ended."""
-        at = self._at(numbers)
-        return at.starts_for(numbers) if at.triangles is not None else at.starts
+        """The best starts (k, 13) for these unknowns, as the nearest derivatives say."""
+        for known in (self._trial, self._base):
+            if known is not None and np.array_equal(known.numbers, numbers):
+                return known.starts_for(numbers)
+        return (self._base or self._at(numbers)).starts_for(numbers)
 
     def residuals(self, numbers: np.ndarray) -> np.ndarray:
         """For SciPy."""
@@ -340,33 +396,39 @@ class Problem:
         for known in (self._trial, self._base):
             if known is not None and np.array_equal(known.numbers, numbers):
                 return known
+        self.evaluations += 1
         if self._base is not None:
             self._trial = self._linearized(numbers, self._base.starts_for(numbers))
             return self._trial
         # What a start could still take counts as taken already: so it has to be near before steps are measured by
         # what is left.
-        self._trial = self._linearized(numbers, self._starts)
+        starts = self._starts
         for _ in range(SETTLING):
-            if self._trial.is_converged:
+            alone = self._linearized(numbers, starts, of_starts=True)
+            starts = alone.starts_for(numbers)
+            if alone.is_converged:
                 break
-            self._trial = self._linearized(numbers, self._trial.starts_for(numbers))
+        self._trial = self._linearized(numbers, starts)
         return self._trial
 
-    def _linearized(self, numbers: np.ndarray, starts: np.ndarray) -> _Linearized:
-        values, free = self.values(numbers), len(self.unknowns)
+    def _linearized(self, numbers: np.ndarray, starts: np.ndarray, of_starts: bool = False) -> _Linearized:
+        """of_starts: without the derivatives by the unknowns, which take most of the flights."""
+        values, unknowns = self.values(numbers), NONE if of_starts else self.unknowns
+        free = len(unknowns)
         triangles: list[np.ndarray] = []
-        variations = Variations(values, self.unknowns, central=False)
-        prior = ((numbers - self.first) / self.widths, np.diag(1.0 / self.widths))
+        variations = Variations(values, unknowns, central=False, turn=self._turn)
         for segment, start in zip(self.segments, starts, strict=True):
             flown = linearized(segment, start, variations)
             if flown is None:
-                rows = len(self.segments) * (free + 1)
-                failed = np.concatenate([np.full(rows, FAILED), prior[0]])
-                return _Linearized(numbers, starts, None, failed, np.vstack([np.zeros((rows, free)), prior[1]]))
-            triangles.append(compressed(*flown))
-        below = np.concatenate([triangle[START:, START:] for triangle in triangles])
-        residuals = np.concatenate([below[:, -1], prior[0]])
-        return _Linearized(numbers, starts, triangles, residuals, np.vstack([below[:, :-1], prior[1]]))
+                failed = np.concatenate([np.zeros(free), [FAILED]])
+                return _Linearized(numbers, starts, None, failed, np.eye(free + 1, free))
+            triangles.append(compressed(flown, START_WIDTHS))
+        rows = [triangle[START:, START:] for triangle in triangles]
+        if not of_starts:
+            rows.append(np.column_stack([np.diag(1.0 / self.widths), (numbers - self.first) / self.widths]))
+        # All of it together as a triangle: what SciPy's algebra would share out among threads is small then.
+        left = upper_triangle(np.concatenate(rows).T)
+        return _Linearized(numbers, starts, triangles, left[:, -1], left[:, :-1])
 
 
 @dataclass(frozen=True)
@@ -393,21 +455,20 @@ class _Linearized:
         """The best starts for other unknowns, as far as the derivatives say."""
         if self.triangles is None:
             return self.starts
-        change = np.append(numbers - self.numbers, 1.0)
+        free = self.jacobian.shape[1]
+        change = np.append((numbers - self.numbers)[:free], 1.0)
         steps = []
         for triangle in self.triangles:
-            own, rest = triangle[:START, :START], triangle[:START, START:] @ change
-            # Tiny prior on the start: what too few samples leave open stays where it is.
-            prior = np.diag(1.0 / START_WIDTHS)
-            whole = np.vstack([own, prior])
-            steps.append(-np.linalg.lstsq(whole, np.concatenate([rest, np.zeros(START)]), rcond=None)[0])
+            steps.append(-np.linalg.solve(triangle[:START, :START], triangle[:START, START:] @ change))
         return moved_starts(self.starts, np.array(steps))
 
 
 SETTLING = 6
 """Most steps of the starts alone before the first step of the unknowns."""
-CONVERGED = 0.01
-"""Part of the squares that starts could still take away."""
+CONVERGED = 0.1
+"""Part of the squares that starts could still take away, by a step that is then the last one."""
 
 START_WIDTHS = np.repeat([1e3, 1.0, 1e3, 1e3], 3)
-"""Of what is assumed of a start beforehand."""
+"""Standard deviations of what is assumed of a start beforehand, little: what too few samples leave open stays where it
+is, and takes nothing of the residuals.
+"""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numba import int64, types
@@ -53,9 +53,14 @@ class Wrenches:
     commands: np.ndarray
     loads: np.ndarray
 
+    @cached_property
+    def edges_ns(self) -> np.ndarray:
+        """When loads begin and end, ascending."""
+        return np.sort(np.concatenate([self.commands[:, 0], self.commands[:, 0] + self.commands[:, 1]]))
+
     def is_near_edge(self, times_ns: np.ndarray, within_ns: int) -> np.ndarray:
         """Whether a load begins or ends so near to each of the times (m,)."""
-        edges = np.sort(np.concatenate([self.commands[:, 0], self.commands[:, 0] + self.commands[:, 1]]))
+        edges = self.edges_ns
         after = np.searchsorted(edges, times_ns - within_ns)
         return after < np.searchsorted(edges, times_ns + within_ns, side="right")
 

@@ -94,6 +94,10 @@ class Unknowns:
         return np.array([float(given[name][index]) if name in given else mp.STEP for name, index in self.slots])
 
 
+NONE = Unknowns((), ())
+"""Nothing is free."""
+
+
 def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
     """Of the groups in ``fit``; raises InputError for one that isn't known."""
     slots: list[tuple[str, int]] = []

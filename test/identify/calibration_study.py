@@ -77,7 +77,7 @@ class MeasuredThrow:
         [segment] = sh.cut([self.flight], 1e9, topics, lambda s: SIGMAS[s.kind], lambda s: np.ones(len(s.times_ns)))
         linear = sh.linearized(segment, self.start, sh.Variations(self.truth, unknowns.physical))
         assert linear is not None
-        root = sh.compressed(*linear)[sh.START : -1, sh.START : -1]
+        root = sh.compressed(linear)[sh.START : -1, sh.START : -1]
         return Estimate(self.truth, unknowns, [segment], self.start[None], {}, root, root, 0.0, 0)
 
     def error(self, theta: np.ndarray) -> float:

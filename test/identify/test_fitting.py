@@ -32,7 +32,7 @@ def test_derivatives_agree_with_extrapolated_differences() -> None:
     [segment] = sh.cut([flight], 9.0, topics, lambda _: 1.0, lambda s: np.ones(len(s.times_ns)))
     start = mf.tumbling()
     unknowns = make_unknowns(GROUPS, topics)
-    _, jacobian = sh.linearized(segment, start, sh.Variations(truth, unknowns))
+    jacobian = sh.linearized(segment, start, sh.Variations(truth, unknowns))[:-1].T
     numbers, steps = unknowns.read(truth), np.maximum(50.0 * unknowns.steps(truth), 1e-5)
 
     def shown(k: int, h: float) -> np.ndarray:
