@@ -38,7 +38,6 @@ from rigid_proto_ros.identify import measurements as ms
 from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.local_motion import local_start
-from rigid_proto_ros.identify.sensors import departure
 from rigid_proto_ros.identify.shooting import moved_starts
 from rigid_proto_ros.motion import loads as ld
 
@@ -96,7 +95,7 @@ class Rollouts:
             poses[k] = data.qpos
         with np.errstate(all="ignore"):
             q = poses[:, [4, 5, 6, 3]]
-            turned = departure(ms.ATTITUDE, q, self.attitudes) / mf.MOCAP[1]
+            turned = rot.logarithm(rot.product(rot.inverse(q), self.attitudes)) / mf.MOCAP[1]
             moved = (self.positions - poses[:, :3]) / mf.MOCAP[0]
         return np.nan_to_num(np.concatenate([moved.ravel(), turned.ravel()]), nan=1e6, posinf=1e6, neginf=-1e6)
 
