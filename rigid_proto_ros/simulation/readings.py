@@ -220,7 +220,8 @@ def why_rounding_binds(setup: Setup, state: State, step_floor: bool, exact_step:
 
     A state is held in doubles, so three things no method can better: a spin known to ε turns into an attitude known to
     ε|ω|t, a position far from the world's origin is known to half a unit in its last place, and a slender body's tensor
-    given in axes other than its own holds its smallest moment, and the difference of the others, to ε I₃ alone.
+    given in axes other than its own holds its smallest moment, and the difference of the others, to ε I₃ alone
+    (diagonalizing it adds no more to that: mass/slender_axes.py).
 
     step_floor: the stepper's own report. exact_step: the segment is one exact step. elapsed: since the segment's start
     [s].

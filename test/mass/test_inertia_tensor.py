@@ -71,6 +71,22 @@ def test_small_moments_of_scaled_diagonally_dominant_tensors_keep_their_digits()
     assert principal_axes(tensor)[0] == pytest.approx(exact, rel=1e-14)  # LAPACK's are off by up to 2e-12 here
 
 
+@pytest.mark.parametrize("ratio", [2e5, 1.4e8, 1e12])
+@pytest.mark.parametrize("unit", [1e-40, 1.0, 1e30])
+def test_a_turned_needle_has_the_moments_that_its_tensor_says(ratio, unit):
+    for seed in range(4):
+        tensor = unit * turned([1.0 / ratio, 1.0 - 0.3 * seed / ratio, 1.0], seed)
+        (a, b, c), axes = principal_axes(tensor)
+        with mpmath.workdps(60):
+            exact, vectors = mpmath.eigsy(mpmath.matrix(tensor.tolist()))
+            gap = exact[2] - exact[1]
+            assert abs(a / exact[0] - 1) <= 1.2e-16  # in doubles 2e-11 at 1e5, and more as I₃/I₁
+            assert abs(c / exact[2] - 1) <= 1.2e-16
+            assert abs((c - b) - gap) <= 0.6 * np.spacing(c)
+            cosine = sum(vectors[i, 0] * axes[i, 0] for i in range(3))
+            assert abs(abs(cosine) - 1) <= 2e-16
+
+
 def test_equal_moments_are_told():
     assert degenerate_pairs(np.array([1.0, 1.0, 1.0])) == (True, True)
     assert degenerate_pairs(np.array([1.0, 2.0, 2.0 + 1e-12])) == (False, True)
