@@ -59,7 +59,7 @@ def draw_comparison(page: Page, picture: Path, started_s: float) -> None:
     actions = ["rigid_proto workbench", "open the page"]
     page.button(START)
     actions.append(f"click {START!r}")
-    alike = r"Released alike[^*]*?([1-9]\d*)° apart"
+    alike = r"Started alike[^*]*?([1-9]\d*)° apart"
     found = page.until(lambda: re.search(alike, page.text), "the angle between body and ghost")
     seen_s = time.monotonic()
     print(

@@ -31,7 +31,7 @@ HELP = {
     "parquet": "write the states as a table",
     "gltf": "write the motion for Blender, Unreal, three.js and others that read glTF",
     "usd": "write the motion, with mass properties, for Omniverse, Houdini and others that read USD",
-    "video": "write a film, without a display; needs a Vulkan driver, of which mesa-vulkan-drivers will do",
+    "video": "write a film, without a display; needs a Vulkan driver (mesa-vulkan-drivers works without a GPU)",
 }
 
 PARTS = ("ghost", "string", "trail")
@@ -52,24 +52,23 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("for other tools")
     for name, endings in ENDINGS.items():
         group.add_argument(f"--{name}", metavar=f"FILE{endings[0]}", help=HELP[name])
-    of = {name: f"of {' and '.join(f'--{file}' for file in files)}" for name, files in FOR.items()}
+    use = {name: f"with {' or '.join(f'--{file}' for file in files)}" for name, files in FOR.items()}
     group.add_argument(
         "--tolerance",
         type=float,
         metavar="T",
-        help=f"{of['tolerance']}: key frames are off by at most T body sizes and 100 T degrees (default 1e-3)",
+        help=f"{use['tolerance']}: key frames are off by at most T body sizes and 100 T degrees (default 1e-3)",
     )
     group.add_argument(
         "--fps",
         type=float,
         metavar="N",
-        help="of --gltf and --usd: N evenly spaced keys a second, whatever their error; of --video: pictures a second"
-        " (default 30)",
+        help="with --gltf or --usd: N evenly spaced key frames a second; with --video: pictures a second (default 30)",
     )
-    group.add_argument("--with", metavar="PART,..", help=f"{of['with']}: draw {', '.join(PARTS)} too")
-    group.add_argument("--size", metavar="WxH", help=f"{of['size']}: pixels (default 960x540)")
-    group.add_argument("--from", type=float, metavar="T", help=f"{of['from']}: simulated time [s] that it begins at")
-    group.add_argument("--to", type=float, metavar="T", help=f"{of['to']}: simulated time [s] that it ends at")
+    group.add_argument("--with", metavar="PART,..", help=f"{use['with']}: draw {', '.join(PARTS)} too")
+    group.add_argument("--size", metavar="WxH", help=f"{use['size']}: pixels (default 960x540)")
+    group.add_argument("--from", type=float, metavar="T", help=f"{use['from']}: simulated time [s] at which it begins")
+    group.add_argument("--to", type=float, metavar="T", help=f"{use['to']}: simulated time [s] at which it ends")
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
@@ -113,13 +112,13 @@ def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
     for option, of in FOR.items():
         given = getattr(args, option)
         if given is not None and not set(of) & set(files):
-            raise InputError(f"--{option}", given, f"it together with {' or '.join(f'--{name}' for name in of)}")
+            raise InputError(f"--{option}", f"needs {' or '.join(f'--{name}' for name in of)}")
     if args.tolerance is not None and not (math.isfinite(args.tolerance) and 1e-9 <= args.tolerance <= 0.5):
         raise InputError("--tolerance", args.tolerance, "a share of the body's size from 1e-9 to 0.5")
     if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
         raise InputError("--fps", args.fps, "pictures or keys a second, from 1e-3 to 1e5")
     if args.fps is not None and args.tolerance is not None:
-        raise InputError("--tolerance", args.tolerance, "either it or --fps")
+        raise InputError("--tolerance", "can't be combined with --fps")
     for part in _parts(args):
         if part not in PARTS:
             raise InputError("--with", part, one_of(part, PARTS))
@@ -134,7 +133,7 @@ def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
 def _film_size(args: argparse.Namespace) -> tuple[int, int]:
     width, height = pixels(args.size or "960x540", 64)
     if width % 2 or height % 2:
-        raise InputError("--size", args.size, "even numbers of pixels, as video codecs have it")
+        raise InputError("--size", args.size, "even numbers of pixels, which video codecs need")
     return width, height
 
 

@@ -109,13 +109,13 @@ def _choice(args: argparse.Namespace) -> Choice:
         if value is not None and not (0.0 < value < math.inf):
             raise InputError(name, value, "a finite number above 0")
     if args.density is not None and (args.mesh is None or args.mass is not None):
-        raise InputError("--density", args.density, "--mesh beside it, and no --mass")
+        raise InputError("--density", "needs --mesh, and no --mass")
     if not (0.0 <= args.first < args.last):
         raise InputError("--from", args.first, f"0 or more, and less than --to ({args.last:g})")
     if args.gravity is not None and not all(map(math.isfinite, args.gravity)):
         raise InputError("--gravity", args.gravity, "three finite numbers [m/s²]")
     if args.json and args.urdf:
-        raise InputError("--urdf", "with --json", "one of the two")
+        raise InputError("--urdf", "can't be combined with --json")
     topics = {sensor: getattr(args, sensor) for sensor in SENSORS if getattr(args, sensor)}
     gravity = None if args.gravity is None else tuple(args.gravity)
     return Choice(topics, given_offsets(args.offset), args.first, args.last, gravity)

@@ -144,14 +144,12 @@ def run(args: argparse.Namespace) -> int:
         return compare(args, meshes[0] if meshes else None, scale, given_mass, given_density)
     if given_mass.by_link or given_density.by_link:
         named = next(iter({**given_mass.by_link, **given_density.by_link}))
-        raise InputError(
-            "--mass" if given_mass.by_link else "--density", f"{named}=", "LINK= with --compare ROBOT alone"
-        )
+        raise InputError("--mass" if given_mass.by_link else "--density", f"{named}= needs --compare ROBOT")
     mass, density = given_mass.everywhere or 0.0, given_density.everywhere or DENSITY
     if not meshes:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     if len(meshes) > 1 and args.record:
-        raise InputError("--record", args.record, "one MESH with it")
+        raise InputError("--record", "needs exactly one MESH")
     found = [_inspect(args, name, scale, mass, density) for name in meshes]
     if len(meshes) == 1:
         one = found[0]

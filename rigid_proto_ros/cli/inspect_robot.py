@@ -74,7 +74,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=float, metavar="T",
-        help="with --compare: one line a link; exit 1 when one is off by more than T, relatively (default 1e-3)",
+        help="with --compare: one line per link; exit 1 when one has a relative error above T (default 1e-3)",
     )  # fmt: skip
     parser.add_argument(
         "--fix", metavar="OUT", help="with --compare: write the file to OUT with every inertial that is off rewritten"
@@ -98,17 +98,17 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
     for names, use in ((_COMPARES, "compare"), (_LUMPS, "lump")):
         for name in names:
             if getattr(args, use) is None and getattr(args, name) not in (None, []):
-                raise InputError(f"--{name.replace('_', '-')}", f"takes --{use} ROBOT with it")
+                raise InputError(f"--{name.replace('_', '-')}", f"needs --{use} ROBOT")
     for flag, words in (("--package-path", args.package_path), ("--xacro", args.xacro)):
         if words and args.compare is None and args.lump is None:
-            raise InputError(flag, "takes --compare ROBOT or --lump ROBOT with it")
+            raise InputError(flag, "needs --compare ROBOT or --lump ROBOT")
     for word in args.xacro:
         if ":=" not in word:
             raise InputError("--xacro", word, "NAME:=VALUE, as xacro takes it")
     if args.compare is not None and len(meshes) > 1:
         raise InputError("--compare", " ".join(meshes), "one MESH, or none for all links")
     if args.lump is not None and (args.compare is not None or meshes):
-        raise InputError("--lump", args.lump, "a robot by itself, without MESH and --compare")
+        raise InputError("--lump", "can't be combined with MESH or --compare")
 
 
 def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
@@ -202,17 +202,17 @@ def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> No
             raise InputError(f"--{flag}", "can't be used with --compare, which takes --json alone")
     # Solids of one density are what a robot's inertials are compared with.
     if args.model != "solid" or args.ballast:
-        flag, received = ("ballast", args.ballast) if args.ballast else ("model", args.model)
-        raise InputError(f"--{flag}", received, "--compare with plain solids: without --model and --ballast")
+        flag = "ballast" if args.ballast else "model"
+        raise InputError(f"--{flag}", "can't be used with --compare, which compares solids")
     if mesh is None and scale != [1.0]:
-        raise InputError("--scale", scale, "the MESH of one link with it; without, the robot's file says each scale")
+        raise InputError("--scale", "needs the MESH of one link; the robot's file gives the scales of its own meshes")
     for name in ("tolerance", "total_mass"):
         value = getattr(args, name)
         if value is not None and not 0.0 < value < float("inf"):
             raise InputError(f"--{name.replace('_', '-')}", value, "a finite number > 0")
     if mesh is not None and (args.fix is not None or args.total_mass is not None):
         flag = "--fix" if args.fix is not None else "--total-mass"
-        raise InputError(flag, mesh, "the whole robot: --compare ROBOT without a MESH")
+        raise InputError(flag, "needs the whole robot: --compare ROBOT without a MESH")
 
 
 def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
@@ -220,9 +220,9 @@ def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
 
     both = mass.by_link.keys() & density.by_link.keys()
     if both:
-        raise InputError("--mass", min(both), "either the mass or the density of a link")
+        raise InputError("--mass", f"link {min(both)} has a mass and a density; give one of them")
     if args.total_mass is not None and (mass.everywhere or density.everywhere):
-        raise InputError("--total-mass", args.total_mass, "--mass and --density with LINK= beside it, or none")
+        raise InputError("--total-mass", "can be combined with --mass and --density of single links (LINK=) only")
     return Options(
         mass.everywhere or 0.0,
         density.everywhere or 0.0,

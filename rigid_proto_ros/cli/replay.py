@@ -90,15 +90,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> None:
     if (args.at is None) != (args.as_scene is None):
-        raise InputError("--at", args.at, "a time together with --as-scene FILE.yaml")
+        raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
     if args.at is not None and not (math.isfinite(args.at) and 0.0 <= args.at <= 1e9):
         raise InputError("--at", args.at, "seconds from 0 to 1e9")
     if args.until_differs and not (args.verify and args.record and args.record.endswith(".rrd")):
-        raise InputError("--until-differs", True, "it together with --verify and --record FILE.rrd")
+        raise InputError("--until-differs", "needs --verify and --record FILE.rrd")
     if args.speed is not None and not (math.isfinite(args.speed) and 1e-6 <= args.speed <= 1e6):
         raise InputError("--speed", args.speed, "a factor from 1e-6 to 1e6")
     if args.speed is not None and args.publish != "states":
-        raise InputError("--speed", args.speed, "it with --publish states; a running node has real_time_factor")
+        raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
     if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
         raise InputError("--record", args.record, "another file than the session")
     check_exports(args)

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
         "Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a Vulkan "
-        "driver; mesa-vulkan-drivers will do."
+        "driver; mesa-vulkan-drivers has one that needs no GPU."
     )
     add_session(parser, node="the body, in a bag with several")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
@@ -33,7 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Motion",
     )
-    parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (%(default)s)")
+    parser.add_argument(
+        "--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (default %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

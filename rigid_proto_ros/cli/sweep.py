@@ -50,12 +50,12 @@ def run(args: argparse.Namespace) -> int:
     from ..sweep.study import read_study
 
     if args.threads < 0 or args.threads > 1024:
-        raise InputError("--threads", args.threads, "1 to 1024, or 0 for one a core")
+        raise InputError("--threads", args.threads, "1 to 1024, or 0 for one per core")
     if args.ghosts is not None and args.row is not None:
-        raise InputError("--ghosts", args.ghosts, "--row or --ghosts, not both")
+        raise InputError("--ghosts", "can't be combined with --row")
     for option, needs in (("record", "--row or --ghosts"), ("as_scene", "--row")):
         if getattr(args, option) and args.row is None and (option == "as_scene" or args.ghosts is None):
-            raise InputError(f"--{option.replace('_', '-')}", getattr(args, option), f"it with {needs}")
+            raise InputError(f"--{option.replace('_', '-')}", f"needs {needs}")
     study = read_study(args.study, args.yes)
     if args.row is not None:
         return _one_row(study, args)

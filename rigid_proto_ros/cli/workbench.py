@@ -28,7 +28,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_scene(parser, "scene file or bundled name (t_handle)", nargs="?")
+    add_scene(parser, "scene file or bundled name (default t_handle)", nargs="?")
     add_mesh(parser)
     parser.add_argument("--node", metavar="NAME", help="open the page for a running node of this name")
     parser.add_argument("--link", metavar="LINK", help="open this link, made by a button of the page")

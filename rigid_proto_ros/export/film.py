@@ -118,7 +118,9 @@ def pictures(record: FlightRecord, motion: Motion, size: tuple[int, int]) -> Ite
         renderer = pygfx.renderers.WgpuRenderer(canvas, pixel_scale=OVERSAMPLING, pixel_filter="linear", ppaa="none")
     except RuntimeError as error:
         reason = " ".join(str(error).split())[:120]
-        raise InputError("--video", f"no Vulkan driver; mesa-vulkan-drivers will do without a GPU ({reason})") from None
+        raise InputError(
+            "--video", f"no Vulkan driver; mesa-vulkan-drivers has one that needs no GPU ({reason})"
+        ) from None
     stage = _Stage(record, motion, size[0] / size[1])
     canvas.request_draw(lambda: renderer.render(stage.scene, stage.camera))
     for k in range(len(motion.times_ns)):

@@ -63,7 +63,7 @@ class FlightRecord(Observer):
     def times_ns(self) -> np.ndarray:
         """Times (n,) int64 [ns] of the states; raises InputError where there are none."""
         if not self._times:
-            raise InputError("session", "it holds no state, so that there is no motion to export")
+            raise InputError("session", "it has no states to export")
         return np.array(self._times, dtype=np.int64)
 
     @property

@@ -202,7 +202,9 @@ class Sampler:
                 break
             if len(times) + len(where) > SAMPLES_MAX:
                 raise InputError(
-                    "--tolerance", tolerance.position, f"a larger one: it takes over {SAMPLES_MAX} samples"
+                    "--tolerance",
+                    tolerance.position,
+                    f"a larger tolerance; this one needs more than {SAMPLES_MAX} samples",
                 )
             found, ghosts_found = self.source.at(middles)
             u = ((middles - times[where]) / (times[where + 1] - times[where]))[:, np.newaxis]
@@ -235,8 +237,8 @@ class Sampler:
         if parts.sum() > SAMPLES_MAX:
             raise InputError(
                 "--gltf",
-                f"{parts.sum():.3g} samples, so fast does the body turn",
-                f"flights of at most {SAMPLES_MAX:g}",
+                f"{parts.sum():.3g} samples, because the body turns fast",
+                f"flights of at most {SAMPLES_MAX:g} samples",
             )
         counts = np.maximum(parts, 1.0).astype(int)
         if counts.max(initial=1) == 1:

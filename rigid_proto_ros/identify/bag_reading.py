@@ -70,7 +70,7 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     chosen = {kind: _read(content, *found) for kind, found in _chosen(content, choice.topics, str(path)).items()}
     if not set(chosen) & {"pose", "odom", "imu", "twist"}:
         known = ", ".join(f"{t} ({k})" for t, k in sorted(content.types.items())[:6]) or "nothing"
-        raise InputError("session", f"{path} has no pose or rate to go by; it has {known}")
+        raise InputError("session", f"{path} has neither poses nor rates; it has {known}")
     _check_clocks(chosen, choice)
     begin = min(int(topic.times_ns[0]) for topic in chosen.values() if topic.messages)
     window = (begin + round(choice.first_s * 1e9), begin + round(min(choice.last_s, 1e9) * 1e9))
@@ -228,7 +228,7 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
             apart = 1e-9 * (begin + shift - first[1][0])
             raise InputError(
                 "clocks",
-                f"{name} begins {apart:.6g} s after {first[0]} and they have no time in common; --offset {name}=S",
+                f"{name} begins {apart:.6g} s after {first[0]} and they have no time in common; give --offset {name}=S",
             )
 
 

@@ -79,8 +79,8 @@ def _check_axes(flights: Sequence[MeasuredFlight]) -> None:
         if rate is not None and flight.first(ATTITUDE) is None and flight.first(RATE, in_body=True) is None:
             raise InputError(
                 rate.topic,
-                f"{flight.name} has rates in world axes and no attitude, so nothing says how the body's axes lie;"
-                " --pose or --odom adds one, and rates along the body's axes are TOPIC@body",
+                f"{flight.name} has rates in world axes and no attitude, so the body's axes are unknown;"
+                " add attitudes by --pose or --odom, or give rates along the body's axes as TOPIC@body",
             )
 
 

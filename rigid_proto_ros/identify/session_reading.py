@@ -36,12 +36,14 @@ def session_flight(
     setup = scenario.setup
     if setup.string.attached:
         raise InputError(
-            "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are taken"
+            "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are supported"
         )
     if setup.in_flight is not None and setup.in_flight.acts:
         raise InputError("session", f"{name} continues a flight whose loads still act; identify that one")
     if not setup.gyroscopic:
-        raise InputError("session", f"{name} was simulated with gyroscopic: false: no rigid body moves so")
+        raise InputError(
+            "session", f"{name} was simulated with gyroscopic: false, which isn't the motion of a rigid body"
+        )
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
     frames = frame_names(scenario.parameters, session.node_name)
     loads = _load_history(session, setup, frames, name, end_ns)
@@ -101,7 +103,7 @@ def _load_history(
             continue
         if not isinstance(command, WrenchCommand):
             reason = f"at {1e-9 * time_ns:g} s {name} has a {kind} event"
-            raise InputError("session", f"{reason}: only wrenches and pokes are taken; end before it with --to")
+            raise InputError("session", f"{reason}: only wrenches and pokes are supported; end before it with --to")
         row = _tracked(command, setup, name, time_ns)
         if command.held:
             if command.slot in held:
@@ -137,13 +139,13 @@ def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> n
         raise InputError("session", f"at {1e-9 * time_ns:g} s {name} has a poke in a slot; end before it with --to")
     if command.frame.point[0] == "ray":
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
-        raise InputError("session", f"{where}: where it hit is not in the log; end before it with --to")
+        raise InputError("session", f"{where}: the point it hit isn't in the log; end before it with --to")
     try:
         load = resolve_load(
             command.frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), None
         )
     except CommandRefused as refusal:
-        raise InputError("session", f"a command of {name} can't have been taken: {refusal}") from None
+        raise InputError("session", f"{name} has a command that the simulation refuses: {refusal}") from None
     point = None if load.mesh_point is None else _three(load.arm(setup.body))
     if load.axes == "normal":
         return Load("body", point, _three(load.own_force(setup.body)), load.torque).row

@@ -220,7 +220,7 @@ class Robot:
                 volumes[link.link] = volume
         if not volumes or not rest > 0.0:
             left = f"{rest:.6g} kg for {len(volumes)} links that enclose a volume"
-            raise InputError("--total-mass", total, f"more than the links of given mass weigh; it leaves {left}")
+            raise InputError("--total-mass", total, f"more than the mass of the other links; it leaves {left}")
         density = rest / sum(volumes.values())
         return {**given, **{name: density * volume for name, volume in volumes.items()}}
 
@@ -341,5 +341,5 @@ def ranked(robot: Robot, link: str | None = None) -> list[LinkDiagnosis]:
     """Diagnoses of the robot's links (or of that one), those farthest off first; raises InputError when it has none."""
     diagnoses = [diagnosis for _, diagnosis in robot.diagnoses(link)]
     if not diagnoses:
-        raise InputError("compare", robot.path.name, "links that show a mesh; name it, inspect MESH --compare FILE")
+        raise InputError("compare", robot.path.name, "links with a shape, or a mesh: inspect MESH --compare FILE")
     return sorted(diagnoses, key=lambda diagnosis: (_RANK[diagnosis.status], -diagnosis.error))

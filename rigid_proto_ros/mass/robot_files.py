@@ -185,7 +185,7 @@ def links_of(root: ElementTree.Element, path: Path) -> list[LinkInertial]:
     except (ValueError, TypeError, KeyError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("compare", path.name, f"numbers where the format has numbers ({error})") from None
+        raise InputError("compare", path.name, f"valid numbers ({error})") from None
 
 
 def parse_xml(data: bytes, path: Path) -> ElementTree.Element:

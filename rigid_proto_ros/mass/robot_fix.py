@@ -246,7 +246,7 @@ def fix_robot(path: Path, options: Options, *, link: str | None = None) -> tuple
         plain = path.name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
         raise InputError("fix", path.name, f"plain URDF: xacro {path} > {plain}, and then --compare {plain} --fix OUT")
     if b"\0" in data:
-        raise InputError("fix", path.name, "a file in UTF-8 or another encoding that has ASCII's bytes")
+        raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")
     spans = [span for span in _spans(data) if span.tag in ("inertial", "link")]
     # Included files are put into the tree by reading it.
     elements = [element for element in root.iter() if element.tag in ("inertial", "link")]

@@ -273,6 +273,6 @@ def link_poses(root: Element, path: Path, values: Mapping[str, float]) -> dict[i
     except (ValueError, KeyError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("lump", path.name, f"joints as the format has them ({error})") from None
+        raise InputError("lump", path.name, f"valid joints ({error})") from None
     joints.check()
     return poses

@@ -39,7 +39,7 @@ def _round_shape(points: np.ndarray) -> np.ndarray:
     points = points @ (axes if np.linalg.det(axes) > 0.0 else -axes)  # a mirrored shape's hull would face inward
     half = 0.5 * np.ptp(points, axis=0)
     if half.min() < FLAT:
-        raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; box may do")
+        raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; use box instead")
     return points / half
 
 
@@ -51,9 +51,9 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
     try:
         from scipy.spatial import ConvexHull, QhullError
     except ImportError:
-        raise MeshError("mesh_fallback", f"hull: {is_missing('scipy', 'meshes')}; box needs nothing") from None
+        raise MeshError("mesh_fallback", f"hull: {is_missing('scipy', 'meshes')}; box needs no package") from None
     if len(points) < 4:
-        raise MeshError("mesh_fallback", f"{len(points)} points have no hull with a volume; box may do")
+        raise MeshError("mesh_fallback", f"{len(points)} points have no hull with a volume; use box instead")
     shape = _round_shape(points)
     try:
         # Points that lie in one plane but for rounding can leave cracks between Qhull's triangles; moved by 1e-11 of
@@ -68,7 +68,7 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
                 return triangles
     except QhullError:
         pass
-    raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; box may do")
+    raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; use box instead")
 
 
 def _is_closed(triangles: np.ndarray) -> bool:

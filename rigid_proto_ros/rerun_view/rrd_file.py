@@ -50,7 +50,7 @@ def whole_bytes(path: Path) -> tuple[int, bool]:
                 break
             at += FRAME_HEAD.size + length
     if at == HEADER_BYTES:
-        raise InputError("session", str(path), "a recording with something in it; this one ends before its first chunk")
+        raise InputError("session", str(path), "a recording with data; this one ends before its first chunk")
     return at, False
 
 

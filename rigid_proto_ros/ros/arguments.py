@@ -155,7 +155,7 @@ def _ros_options(argv: list[str]) -> list[tuple[str, str]]:
         elif inside and argument in ("-p", "--param", "--params-file"):
             value = next(arguments, None)
             if value is None:
-                raise InputError(argument, "a value is missing behind it")
+                raise InputError(argument, "needs a value")
             found.append(("--params-file" if argument == "--params-file" else "-p", value))
     return found
 
@@ -202,7 +202,7 @@ def read_bodies(files: list[str]) -> dict[str, dict[str, object]]:
         path = scene_file(file)
         name = _node_name_of(path)
         if name in bodies:
-            raise InputError("--bodies", file, f"files with different names; {name} is there already")
+            raise InputError("--bodies", file, f"files with different names; {name} is used twice")
         bodies[name] = scene_values(path, print)
     return bodies
 
@@ -211,5 +211,5 @@ def _node_name_of(path: Path) -> str:
     """The file's stem with other characters than [A-Za-z0-9_] as _; raises InputError if that names no node."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", path.stem)
     if not _NODE_NAME_FORM.match(name) or len(name) > 255:
-        raise InputError("--bodies", str(path), "a file whose name, made a node's name, begins with a letter or _")
+        raise InputError("--bodies", str(path), "a file whose name begins with a letter or _, as node names do")
     return name

@@ -329,4 +329,4 @@ def read_message(data: bytes, message_type: type) -> Any:
         return deserialize_message(data, message_type)
     except Exception:  # rclpy's own error types differ between versions and middlewares
         accepted = f"a serialized {message_type.__name__}"
-        raise CommandRefused("frame", "message", f"{len(data)} bytes that are none", accepted) from None
+        raise CommandRefused("frame", "message", f"{len(data)} bytes that can't be decoded", accepted) from None

@@ -69,9 +69,8 @@ class PhysicsThread:
             return future.result(timeout_s)
         except TimeoutError:
             if future.cancel():
-                raise InputError(
-                    "request", "no time for it", f"a motion that leaves some every {timeout_s:g} s"
-                ) from None
+                text = f"the simulation was too busy to begin it within {timeout_s:g} s"
+                raise InputError("request", text) from None
         # It has begun, so it will end.
         return future.result()
 
@@ -136,8 +135,9 @@ def advance_by(loop: SimulationLoop, periods: int) -> Iterator[None]:
     # One after another: a step that somebody else has begun is made first.
     while loop.stepping or not begun:
         if time.monotonic() > end:
-            accepted = f"publication periods that are simulated in {STEP_PATIENCE_S:g} s; it goes on"
-            raise InputError("step", f"{loop.simulation.time_ns / 1e9:.9g} s reached", accepted)
+            reached_s = loop.simulation.time_ns / 1e9
+            text = f"{reached_s:.9g} s reached after {STEP_PATIENCE_S:g} s of computing; the step continues"
+            raise InputError("step", text)
         if not loop.stepping:
             begun = True
             if loop.step(periods):

@@ -60,7 +60,7 @@ class StepAction:
             if goal.is_cancel_requested:
                 return
             if not self._loop.timekeeping.paused:
-                raise InputError("simulate_steps", "the simulation is running", "a pause before it")
+                raise InputError("simulate_steps", "the simulation is running; pause it first")
             step_over(self._call, self._loop)
             goal.publish_feedback(self._action.Feedback(completed_steps=done, remaining_steps=steps - done))
 

@@ -81,6 +81,6 @@ def take_lists(take_commands: Callable[[], None], intake: CommandIntake) -> Iter
     take_commands()
     while intake.in_progress:
         if time.monotonic() > deadline:
-            raise InputError("schedule", f"a list that is still worked out after {WAIT_S:g} s: try again")
+            raise InputError("schedule", f"a list is still being prepared after {WAIT_S:g} s; try again")
         yield
         take_commands()

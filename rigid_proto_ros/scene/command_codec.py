@@ -343,7 +343,7 @@ def entry_of(command: ScriptCommand, frames: tuple[str, str] = _WORDS) -> dict:
         return {"wrench": _load_entry(command, frames)}
     if kind == "poke":
         return _load_entry(command, frames)
-    raise InputError("script", f"{kind} in {command.frame_id!r}", "what an entry of a script can say")
+    raise InputError("script", f"{kind} in {command.frame_id!r}", "a command that a script entry can express")
 
 
 def _load_entry(command: ScriptCommand, frames: tuple[str, str]) -> dict:
@@ -356,7 +356,7 @@ def _load_entry(command: ScriptCommand, frames: tuple[str, str]) -> dict:
     force, torque = [float(f) for f in command.force], [float(x) for x in command.torque]
     if frame.axes == "normal":
         if frame.impulse or any(force[1:]) or any(torque):
-            raise InputError("script", command.frame_id, "what an entry of a script can say")
+            raise InputError("script", command.frame_id, "a command that a script entry can express")
         entry["push"] = force[0]
     else:
         words = ("impulse", "angular_impulse") if frame.impulse else ("force", "torque")

@@ -197,7 +197,7 @@ class _Fields:
     def nothing_else(self) -> None:
         """Raises InputError where there is more than was taken."""
         if self._said:
-            raise InputError(self._where, next(iter(self._said)), "no such key")
+            raise InputError(self._where, f"there is no key {next(iter(self._said))!r}")
 
     def _take(self, key: str, accepted: str, good: Callable[[Any], bool]) -> Any:
         value = self._said.pop(key, None)

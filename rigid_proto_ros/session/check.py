@@ -182,7 +182,9 @@ def _line_difference(recorded: Sequence[str], computed: Sequence[str], begin: in
 def _not_taken(again: Resimulation, lines: _Lines, recorded: list[str], refusal: CommandRefused) -> Difference:
     earlier = _line_difference(recorded, lines.lines)
     number = len(lines.lines) + 1
-    return earlier or Difference(again.simulation.time_ns, f"command {number} can't have been taken: {refusal}")
+    return earlier or Difference(
+        again.simulation.time_ns, f"command {number} was applied in the recording, but is refused here: {refusal}"
+    )
 
 
 def _begins_at_its_start(session: RecordedSession, events: list) -> bool:

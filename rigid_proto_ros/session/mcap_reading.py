@@ -71,7 +71,7 @@ def read_mcap(data: bytes, name: str, wanted: Callable[[str], bool] = lambda _: 
     if content.complete:
         content.readable_bytes = len(data)
     elif not content.readable_bytes:
-        raise InputError("session", name, "a recording with something in it; this one ends before its first chunk")
+        raise InputError("session", name, "a recording with data; this one ends before its first chunk")
     return content
 
 
@@ -90,7 +90,7 @@ def whole_records(data: bytes, name: str) -> Iterator[tuple[records.McapRecord, 
     """
     if data[: len(MCAP0_MAGIC)] != MCAP0_MAGIC:
         if MCAP0_MAGIC.startswith(data):
-            raise InputError("session", name, "a recording with something in it; this one is empty")
+            raise InputError("session", name, "a recording with data; this one is empty")
         raise InputError("session", name, "an MCAP file")
     for opcode, begin, end in _frames(data, len(MCAP0_MAGIC)):
         try:

@@ -41,7 +41,7 @@ def play(
         try:
             computed = again.advance(time_ns)
         except InputError:
-            # A command that can't have been taken: from here on what was recorded is all there is.
+            # A command that is refused here: from now on only the recorded states are shown.
             computed = row
         observer.state(time_ns, computed if _published_alike(session, computed, row) else row)
         again.simulation.notify_status()
@@ -67,7 +67,7 @@ def play_beside(
         try:
             computed = again.advance(time_ns)
         except InputError:
-            break  # a command that can't have been taken
+            break  # a command that is refused here
         if again.simulation.setup is not shown:
             shown = again.simulation.setup
             observer.ghost_began(time_ns, again.simulation.snapshot())

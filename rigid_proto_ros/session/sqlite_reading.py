@@ -36,7 +36,7 @@ def read_sqlite(file: Path, wanted: Callable[[str], bool]) -> McapContent:
             topics = bag.execute("SELECT id, name, type, serialization_format FROM topics").fetchall()
             for number, name, message_type, serialization in topics:
                 if serialization != "cdr":
-                    raise InputError(str(file), f"messages of {name} as {serialization}; cdr is taken")
+                    raise InputError(str(file), f"messages of {name} as {serialization}; only cdr is supported")
                 content.types[name] = message_type
                 if wanted(name):
                     query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"

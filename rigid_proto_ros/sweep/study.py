@@ -226,7 +226,7 @@ def _script(spec: Any, folder: Path, field: str) -> Any:
 
 def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[Vary, ...]:
     if not isinstance(spec, dict) or not spec:
-        raise InputError(f"{name}, vary", spec, "{name: how, ...} with at least one thing that varies")
+        raise InputError(f"{name}, vary", spec, "{name: how, ...} with at least one entry")
     found = []
     values = parameters.named()
     for key, how in spec.items():
@@ -241,7 +241,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[
         found.append(Vary(target, form))
     lengths = {len(v.form.values) for v in found if isinstance(v.form, Points) and v.form.kind == LIST}
     if len(lengths) > 1:
-        raise InputError(f"{name}, vary", sorted(lengths), "lists of one length: they go in step")
+        raise InputError(f"{name}, vary", sorted(lengths), "lists of the same length; they advance together")
     return tuple(found)
 
 
@@ -276,7 +276,7 @@ def _samples(spec: Any, field: str, vary: tuple[Vary, ...], sampler: str) -> int
     points = any(isinstance(v.form, Points) for v in vary)
     if not random:
         if spec not in (None, 1):
-            raise InputError(field, spec, "nothing: the study has nothing random to draw samples of")
+            raise InputError(field, spec, "no samples: nothing in the study is random")
         return 1
     if spec is None and not points:
         raise InputError(field, None, "how many rows to draw")

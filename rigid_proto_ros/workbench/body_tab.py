@@ -116,7 +116,7 @@ class BodyTab:
             controls.vector("scale", "Scale x y z", 3)
             controls.factor(
                 "Mass ×",
-                "Times the mass that the body came with, ballast aside (mass)",
+                "Times the original mass, without ballast (mass)",
                 2.0,
                 self._mass_factor,
                 self._set_mass,
@@ -191,7 +191,7 @@ class BodyTab:
         with gui.add_folder("Ballast"):
             weight: Any = gui.add_dropdown("Weight", (ANOTHER,), initial_value=ANOTHER)
             name: Any = gui.add_text("Its name", "weight", hint="Small letters, digits and _")
-            mass: Any = gui.add_text("Its mass [kg]", "0", hint="0 takes it off")
+            mass: Any = gui.add_text("Its mass [kg]", "0", hint="0 removes it")
             place: Any = gui.add_text("At x y z", "0 0 0", hint="Mesh coordinates")
             put = gui.add_button("Put it there")
         self._weight, self._name, self._weight_mass, self._place = weight, name, mass, place

@@ -83,7 +83,7 @@ class NodeFollower:
     def _odd_line(self, error: Exception) -> None:
         if not self._odd_line_said:
             self._odd_line_said = True
-            self._announcements.say(f"Lines of {self._target}/events are passed over, the first: {error}")
+            self._announcements.say(f"Lines of {self._target}/events can't be read; the first: {error}")
 
     def follow(self, scenario: Scenario, now_s: float) -> None:
         """Take up events in their order, then the newest state; a reset, and another mesh, once the scene is known that

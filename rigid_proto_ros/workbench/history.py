@@ -218,8 +218,8 @@ class History:
         with self._lock:
             run = self._runs[-1]
             if not run.whole or not run.scene:
-                accepted = f"at most {MAX_EVENTS} events since the last reset or rewind: reset, or rewind, and go on"
-                raise InputError("history", "more than is kept" if run.scene else "no scene received", accepted)
+                accepted = f"at most {MAX_EVENTS} events since the last reset or rewind; reset or rewind, then continue"
+                raise InputError("history", "more events than are kept" if run.scene else "no scene received", accepted)
             row = self._states.at(self._live_ns)
             return self._session(run, self._live_ns - run.offset_ns, row)
 

@@ -64,7 +64,7 @@ def encode(scene: str, script: str = "") -> str:
 
 
 def _too_long(received: str) -> InputError:
-    return InputError("link", received, f"at most {MAX_LINK} characters of link: save so long a script as a file")
+    return InputError("link", received, f"a link of at most {MAX_LINK} characters; save a longer script as a file")
 
 
 def decode(link: str) -> tuple[str, str]:
@@ -129,8 +129,8 @@ def _check(values: Mapping[str, object], entries: Any) -> None:
 def _check_parameters(values: Mapping[str, object], where: str) -> None:
     for name in sorted(NOT_OF_THE_MOTION & values.keys()):
         raise InputError(
-            f"{where}, {name}", values[name], "a scene to look at: a link sets nothing of the program itself"
+            f"{where}, {name}", values[name], "parameters of the motion; a link can't set those of the program"
         )
     mesh = values.get("mesh", "")
     if mesh and mesh not in body_names():
-        raise InputError(f"{where}, mesh", mesh, f"a bundled body, which a link can name: {', '.join(body_names())}")
+        raise InputError(f"{where}, mesh", mesh, f"a bundled body: {', '.join(body_names())}")

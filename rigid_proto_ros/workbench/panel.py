@@ -32,7 +32,7 @@ STRONGEST = 1e12
 
 HELP = """
 **Drag** the body: a string ties it to the pointer. **Click**: poke along the view; **shift-click**: push inward.
-Beside it, drag to turn the view, wheel or two fingers to come closer. **?** lists the keys.
+Beside it, drag to turn the view; wheel or two fingers zoom. **?** lists the keys.
 """
 
 
@@ -126,10 +126,10 @@ class Panel:
         gui, tools = self._gui, self._tools
         with gui.add_folder("Poke (click)"):
             click = gui.add_dropdown(
-                "Click", (POKE, PUSH), initial_value=POKE, hint="Shift-click does the other; for pages without shift"
+                "Click", (POKE, PUSH), initial_value=POKE, hint="What a click does; shift-click does the other"
             )
-            self._force: Any = gui.add_text("Force [N]", "1", hint="Of a poke; it lasts as long as the next line says")
-            suits = "Factor on a force that suits the body"
+            self._force: Any = gui.add_text("Force [N]", "1", hint="Force of a poke; its duration is the next input")
+            suits = "Times a force that suits the body's mass and size"
             times: Any = gui.add_text("Force ×", "1", hint=suits)
             slider: Any = log_slider(gui, FORCE_DECADES, suits)
             self._times, self._slider = times, slider
@@ -184,7 +184,7 @@ class Panel:
                 hint="Frequency of the effective mass (string.frequency)",
             )
             scaled = gui.add_checkbox(
-                "Scaled by effective mass", True, hint="So that light and heavy bodies respond alike"
+                "Scaled by effective mass", True, hint="Light and heavy bodies then respond alike"
             )
             controls.number("string.stiffness", "Stiffness [N/m]")
             controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)

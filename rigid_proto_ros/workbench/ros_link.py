@@ -149,7 +149,7 @@ class RosLink:
             if time.monotonic() > deadline:
                 found = ", ".join(flying_nodes(self.node.get_topic_names_and_types())) or "none is running"
                 raise InputError(
-                    "--node", self.target, f"a node that is there within {patience_s:g} s, with its namespace ({found})"
+                    "--node", self.target, f"a node that answers within {patience_s:g} s, with its namespace ({found})"
                 )
             time.sleep(0.02)
 

@@ -41,7 +41,7 @@ class ShowTab:
                 "Point of the path", "", hint="x y z in mesh coordinates; empty: the vertex farthest from the COM"
             )
             follow = gui.add_checkbox(
-                "Keep the body in view", True, hint="The picture follows; the grid shows the distance covered"
+                "Keep the body in view", True, hint="The camera follows it; the grid shows the distance covered"
             )
             centre = gui.add_button("Centre on the body")
 

@@ -30,7 +30,7 @@ class SideBySide:
     def __init__(self, gui: viser.GuiApi, start: Callable[[], Awaitable[None]]) -> None:
         button = gui.add_button(
             START,
-            hint="An L-bracket and its ghost, released alike: one with its own tensor, one with its bounding box's",
+            hint="An L-bracket and its ghost, started alike: one with its own tensor, one with its bounding box's",
         )
         self._legend = gui.add_html("", visible=False)
         self._sentence = gui.add_markdown("", visible=False)
@@ -96,11 +96,11 @@ def compared(scenario: Scenario, time_ns: int, began_ns: int | None) -> str:
     if ghost.integrator and not ghost.inertia_model:
         differs = "only the integrator differs"
     elif scenario.parameters.inertia_model_com == "solid":
-        differs = "with one mass; only the tensor differs"
+        differs = "with the same mass; only the tensor differs"
     else:
-        differs = "with one mass; tensor and COM differ"
+        differs = "with the same mass; tensor and COM differ"
     if began_ns == 0:
-        return f"Released alike, {differs}. After {time_ns * 1e-9:.1f} s"
+        return f"Started alike, {differs}. After {time_ns * 1e-9:.1f} s"
     return f"Alike at {began_ns * 1e-9:.1f} s, {differs}. {(time_ns - began_ns) * 1e-9:.1f} s later"
 
 

@@ -43,7 +43,7 @@ class Status:
             said = command_warnings(last, values)
             lost_s = increase("real_time_lost_s", last, values)
             if lost_s > SLOW:
-                said.append(f"too much to compute here: {lost_s:.2g} s behind real time")
+                said.append(f"this machine is too slow: {lost_s:.2g} s behind real time")
             self._troubles |= dict.fromkeys(said, now_s + SHOWN_S)
 
     def received(self, now_s: float) -> None:
@@ -86,9 +86,9 @@ class Status:
     def _gone(self) -> str:
         self._silent_since = self._silent_since or time.strftime("%H:%M:%S")
         return (
-            f"⚠ **`{self._target}` has ended, or hangs: no message since {self._silent_since}.** The picture shows its "
-            "last state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in another terminal): this "
-            "page continues by itself when it is back."
+            f"⚠ **`{self._target}` has ended or doesn't respond: no message since {self._silent_since}.** "
+            "The picture shows its last state.  \nStart it again (`rigid_proto workbench`, or `rigid_body_node` in "
+            "another terminal): this page continues by itself when it is back."
         )
 
 
@@ -126,5 +126,5 @@ class Announcements:
             self.activity = ""
 
 
-ENDED = "⚠ **The workbench has ended.** Start it again with `rigid_proto workbench` and load this page anew."
+ENDED = "⚠ **The workbench has ended.** Start it again with `rigid_proto workbench` and reload this page."
 """What stands on the page when its server ends."""

@@ -63,7 +63,7 @@ def comparison(scenario: Scenario) -> str:
     difference = model_difference(approximate, true)
     title = TITLES.get(other, other)
     what = f"Simulating: **{TITLES.get(flying, flying)}**. "
-    what += f"The {title} would have" if flying == "solid" else "Against the true solid it has"
+    what += f"The {title} would have" if flying == "solid" else "Compared with the true solid, it has"
     percents = ", ".join(_per_cent(error) for error in difference.principal_moments)
     lines = [
         what,
@@ -102,7 +102,7 @@ def _com_text(scenario: Scenario, off: np.ndarray, own: np.ndarray) -> str:
     text = f"COM offset **{away:.3g} m**, {100.0 * away / size:.2g} % of the size"
     if away < 1e-9 * size < own_away:
         share = f"{100.0 * own_away / size:.2g} % of the size"
-        return f"COM where the solid has it; the model's own lies {own_away:.3g} m off, {share}"
+        return f"COM of the solid; the model's own is {own_away:.3g} m off, {share}"
     return text
 
 

@@ -156,7 +156,7 @@ class Uploads:
             return Upload(name, str(path), inspection, as_json(inspection))
         except OSError as error:
             shutil.rmtree(path.parent, ignore_errors=True)
-            raise MeshError("upload", name, f"room for it ({error.strerror})") from None
+            raise MeshError("upload", name, f"free space for it ({error.strerror})") from None
         except BaseException:
             shutil.rmtree(path.parent, ignore_errors=True)
             raise
@@ -196,7 +196,7 @@ def refuse_other_files(name: str, data: bytes) -> None:
     except (struct.error, ValueError, AttributeError, TypeError) as error:
         raise MeshError("upload", name, "a binary glTF file") from error
     if any(uri is not None and not str(uri).startswith("data:") for uri in named):
-        raise MeshError("upload", name, "a .glb that holds all of its parts itself")
+        raise MeshError("upload", name, "a .glb that contains all of its data")
 
 
 def shown_name(file_name: str) -> tuple[str, str]:

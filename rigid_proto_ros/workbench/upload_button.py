@@ -56,10 +56,13 @@ class UploadButton:
                 hint=f".{', .'.join(ACCEPTED)}; at most {MAX_BYTES // 1_000_000} MB",
             )
             self._unit: Any = gui.add_dropdown(
-                "Its unit", tuple(UNITS), visible=False, hint="Of the file's numbers (scale)"
+                "Its unit", tuple(UNITS), visible=False, hint="Unit of the file's coordinates (scale)"
             )
             self._up: Any = gui.add_dropdown(
-                "Its up axis", tuple(UPRIGHT), visible=False, hint="initial.orientation_xyzw"
+                "Its up axis",
+                tuple(UPRIGHT),
+                visible=False,
+                hint="The file's axis that points up (initial.orientation_xyzw)",
             )
             self._size = gui.add_markdown("", visible=False)
             self._as_it_is = gui.add_button("Simulate it", visible=False)

@@ -100,7 +100,7 @@ def guard_uploads(server: viser.ViserServer, refuse: Callable[[str], None]) -> N
             return
         if transfer["transferred_bytes"] + len(message.content) > transfer["total_bytes"]:
             del transfers[message.transfer_uuid]
-            refuse(f"upload: {transfer['filename']} is longer than it said; accepted: a whole file")
+            refuse(f"upload: {transfer['filename']} is longer than announced; accepted: a whole file")
             return
         part(client_id, message)
 

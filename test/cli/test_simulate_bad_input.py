@@ -276,7 +276,7 @@ def test_an_unknown_name_under_the_wildcard_is_only_warned_of(tmp_path, capfd):
         (["-p", "mass"], "name:=value"),
         (["-p", "gravity:=[0, 0, -9.81]"], "[0.0, 0.0, -9.81]"),
         (["--params-file", "nowhere.yaml"], "nowhere.yaml"),
-        (["-p"], "behind it"),
+        (["-p"], "needs a value"),
     ],
 )
 def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):

@@ -88,7 +88,7 @@ def test_what_cannot_be_written_is_refused_in_one_line_before_the_flight(argumen
 
 
 def test_a_flight_without_a_state_is_refused():
-    with pytest.raises(ValueError, match="holds no state"):
+    with pytest.raises(ValueError, match="no states to export"):
         _ = FlightRecord().times_ns
 
 

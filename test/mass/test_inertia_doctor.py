@@ -174,7 +174,7 @@ def test_a_link_without_an_inertial_is_told_what_to_write(capsys, tmp_path, trut
         ("<robot", "well-formed XML"),
         ("", "well-formed XML"),
         ("<html/>", "<robot>"),
-        ("<robot name='r'/>", "links that show a mesh"),
+        ("<robot name='r'/>", "links with a shape"),
         ("<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:include filename='a'/></robot>", "xacro"),
         ('<!DOCTYPE x [<!ENTITY a "b">]><robot/>', "entities"),
         (urdf([0, 0, 0], [1, 0, 0, 1, 0, 1]).replace('mass value="0.7"', 'mass value="heavy"'), "numbers"),

@@ -207,7 +207,7 @@ def test_a_check_prints_one_line_a_link_and_fails_beyond_the_tolerance(parts, ca
     ("arguments", "words"),
     [
         (["--mass", "nobody=1", "--fix", "OUT"], "nobody"),
-        (["--mass", "arm=1", "--density", "arm=1"], "either the mass or the density"),
+        (["--mass", "arm=1", "--density", "arm=1"], "has a mass and a density"),
         (["--mass", "arm=-1"], "> 0"),
         (["--total-mass", "nan"], "> 0"),
         (["--tolerance", "0"], "> 0"),

@@ -248,7 +248,7 @@ def test_what_a_branch_brings_along_comes_back_at_a_reset_and_is_left_out_where_
         ("[1]", "mapping"),
         ("{began_ns: 3, state: []}", "began_ns: got '3'"),
         ("{began_ns: -1, state: [1.0]}", "13 finite numbers"),
-        ("{began_ns: -1, state: [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], more: 1}", "no such key"),
+        ("{began_ns: -1, state: [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], more: 1}", "there is no key"),
         (
             "{began_ns: -1, state: [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], loads: [{kind: pull, began_ns: 0}]}",
             "loads, 1",

@@ -216,7 +216,7 @@ def test_one_click_shows_body_and_ghost_released_alike_and_the_angle_that_grows_
         "only the tensor differs" in shown.sentence
         and flown.page.scenes.scenario.parameters.inertia_model_com == "solid"
     )
-    assert shown.sentence.startswith("Released alike") and "After 1.0 s" in shown.sentence
+    assert shown.sentence.startswith("Started alike") and "After 1.0 s" in shown.sentence
     flown.pick("One book, three throws")
     flown.until(lambda: not shown.sentence, "end of the comparison")
     # A ghost that comes in flight wasn't released with the body.

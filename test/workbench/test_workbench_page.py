@@ -404,7 +404,8 @@ def test_a_killed_node_is_said_on_the_page_which_goes_on_with_the_next_one(page,
     try:
         os.kill(node, signal.SIGKILL)
         page.until(
-            lambda: "has ended, or hangs" in page.text and "Start it again" in page.text, "word of the node's end"
+            lambda: "has ended or doesn't respond" in page.text and "Start it again" in page.text,
+            "word of the node's end",
         )
         assert "is simulating" not in page.text and "is sleeping" not in page.text
     finally:

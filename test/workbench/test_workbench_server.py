@@ -223,7 +223,7 @@ def test_a_file_that_is_longer_than_it_said_is_dropped_whole() -> None:
     transfers.announce("liar.obj", 1000)
     transfers.send(b"v" * 600)
     transfers.send(b"v" * 600)
-    assert transfers.transfers == {} and "longer than it said" in transfers.refused[0]
+    assert transfers.transfers == {} and "longer than announced" in transfers.refused[0]
     transfers.send(b"v" * 100)
     assert transfers.taken == 600
 

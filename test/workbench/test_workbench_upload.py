@@ -138,7 +138,7 @@ def test_a_glb_is_taken_in_metres_with_y_up(place: Path) -> None:
 
 @pytest.mark.parametrize("uri", ["../../../etc/passwd", "/etc/passwd", "file:///etc/passwd", "http://127.0.0.1/x"])
 def test_a_glb_that_names_other_files_is_refused_unread(place: Path, uri: str) -> None:
-    with pytest.raises(MeshError, match="holds all of its parts"):
+    with pytest.raises(MeshError, match="contains all of its data"):
         Uploads().take("Box.glb", glb(uri))
     assert not files(place)
 
