@@ -175,7 +175,7 @@ def test_a_bag_without_pose_or_rate_is_refused(tmp_path: Path) -> None:
     bag = fb.write(
         tmp_path / "bag.mcap", {"/w": ("geometry_msgs/msg/WrenchStamped", [(0, fb.wrench(0, FORCE, TORQUE, "body"))])}
     )
-    with pytest.raises(InputError, match="no pose or rate"):
+    with pytest.raises(InputError, match="neither poses nor rates"):
         bag_flight(bag, Choice())
 
 
