@@ -296,10 +296,11 @@ def _segments(
 def _start_of(
     work: _Work, segment: sh.ShootingInterval, before: Sequence[sh.ShootingInterval], starts: np.ndarray
 ) -> np.ndarray:
-    """The start of that of the earlier segments which begins with this one, or a guess."""
-    for other, start in zip(before, starts, strict=True):
-        if other.flight is segment.flight and other.begin_ns == segment.begin_ns:
-            return start
+    """Where that of the earlier segments which this one begins in has come to by then, or a guess."""
+    for other, start in zip(reversed(before), reversed(starts), strict=True):
+        if other.flight is segment.flight and other.begin_ns <= segment.begin_ns:
+            come = sh.flown_state(other, start, work.values, segment.begin_ns)
+            return _local_start(work, segment) if come is None else come
     return _local_start(work, segment)
 
 

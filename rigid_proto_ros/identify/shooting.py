@@ -28,8 +28,9 @@ from .unknowns import NONE, Unknowns, Values
 from .varied_flights import fly_variations
 
 START = 12
-"""Unknowns of a segment's start: position [m, world], turn [rad], velocity [m/s] and angular velocity [rad/s], these
-three in body axes: so a turn alone, which nothing shows of a flight without attitudes, changes nothing else.
+"""Unknowns of a segment's start: position [m, world], turn [rad, world], velocity [m/s, body axes] and angular velocity
+[rad/s, body axes]: so a turn about the vertical alone, which nothing shows of a flight without attitudes unless a load
+along world axes acts, is one of them and changes nothing else.
 """
 START_STEPS = np.array([0.0] * 3 + [mp.STEP] * 3 + [0.0] * 3 + [mp.STEP] * 3)
 """For difference quotients; how a flight shifts with its position and velocity is known in closed form."""
@@ -125,7 +126,7 @@ def _move(starts: np.ndarray, changes: np.ndarray) -> None:
         qx, qy, qz, qw = start[3], start[4], start[5], start[6]
         u, v, w = rotate_inverse(qx, qy, qz, qw, start[7], start[8], start[9])
         turn = exponential(change[3], change[4], change[5])
-        qx, qy, qz, qw = normalize(*multiply(qx, qy, qz, qw, turn[0], turn[1], turn[2], turn[3]))
+        qx, qy, qz, qw = normalize(*multiply(turn[0], turn[1], turn[2], turn[3], qx, qy, qz, qw))
         start[3], start[4], start[5], start[6] = qx, qy, qz, qw
         u, v, w = rotate(qx, qy, qz, qw, u + change[6], v + change[7], w + change[8])
         start[7], start[8], start[9] = u, v, w
@@ -212,6 +213,20 @@ def segment_residuals(segment: ShootingInterval, start: np.ndarray, values: Valu
         found.append(np.empty((len(own), 3)))
         fill_residuals(*piece.sensor, samples[0], own, sensor, piece.values, found[-1])
     return found
+
+
+def flown_state(segment: ShootingInterval, start: np.ndarray, values: Values, time_ns: int) -> np.ndarray | None:
+    """The tracked frame's state (13,) at a time within the segment, or None where the flight failed."""
+    if time_ns == segment.begin_ns:
+        return start
+    times = np.array([time_ns - segment.begin_ns], np.int64)
+    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
+    if not good.all():
+        return None
+    state, com = samples[0, 0, :13], values.theta[mp.COM]
+    state[7:10] -= rot.turned(state[3:7], rot.cross(state[10:13], com))
+    state[:3] -= rot.turned(state[3:7], com)
+    return state
 
 
 def flown_poses(
@@ -402,14 +417,23 @@ class Problem:
             return self._trial
         # What a start could still take counts as taken already: so it has to be near before steps are measured by
         # what is left.
-        starts = self._starts
-        for _ in range(SETTLING):
-            alone = self._linearized(numbers, starts, of_starts=True)
-            starts = alone.starts_for(numbers)
-            if alone.is_converged:
-                break
-        self._trial = self._linearized(numbers, starts)
+        self._trial = self._linearized(numbers, self._settled(numbers))
         return self._trial
+
+    def _settled(self, numbers: np.ndarray) -> np.ndarray:
+        """The given starts improved by steps of their own, each as long as its segment's residuals become less."""
+        kept = tried = self._starts
+        least = np.full(len(tried), np.inf)
+        for _ in range(SETTLING):
+            alone = self._linearized(numbers, tried, of_starts=True)
+            better = alone.squares < least
+            kept, least = np.where(better[:, None], tried, kept), np.where(better, alone.squares, least)
+            if not better.any():
+                break
+            tried = np.where(better[:, None], alone.starts_for(numbers), kept)
+            if alone.is_converged:
+                return tried
+        return kept
 
     def _linearized(self, numbers: np.ndarray, starts: np.ndarray, of_starts: bool = False) -> _Linearized:
         """of_starts: without the derivatives by the unknowns, which take most of the flights."""
@@ -444,6 +468,13 @@ class _Linearized:
     jacobian: np.ndarray
 
     @property
+    def squares(self) -> np.ndarray:
+        """Sum of the squared residuals of each segment (k,), infinite where one failed."""
+        if self.triangles is None:
+            return np.full(len(self.starts), np.inf)
+        return np.array([float(triangle[:, -1] @ triangle[:, -1]) for triangle in self.triangles])
+
+    @property
     def is_converged(self) -> bool:
         """Whether the starts are as good as they can be for these unknowns, or so bad that they can't be flown."""
         if self.triangles is None:
@@ -468,7 +499,7 @@ SETTLING = 6
 CONVERGED = 0.1
 """Part of the squares that starts could still take away, by a step that is then the last one."""
 
-START_WIDTHS = np.repeat([1e3, 1.0, 1e3, 1e3], 3)
+START_WIDTHS = np.repeat([1e3, 0.1, 1e3, 1e3], 3)
 """Standard deviations of what is assumed of a start beforehand, little: what too few samples leave open stays where it
 is, and takes nothing of the residuals.
 """
