@@ -51,6 +51,10 @@ def _twists(axes: str, seed: int, seconds: float = 2.0, noise: float = 0.01, in_
         ("body", 1, 10.0, 0.01),
         # Parts of a flight that no load acts on don't show their turn about the vertical.
         ("world", 4, 10.0, 1e-4),
+        # The second stage's segments don't begin where the first one's do.
+        ("world", 5, 10.0, 1e-4),
+        # The first heading is .3 rad off, and the poked segment's own start alone would go elsewhere for it.
+        ("world", 4, 10.0, 0.01),
     ],
 )
 def test_twists_in_body_axes_without_an_attitude_give_the_body(
