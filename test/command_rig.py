@@ -73,10 +73,17 @@ def stamp_ns(message: dict) -> int:
 class NodeProcess(RosProcess):
     """A ``rigid_body_node`` with these parameters; ``log`` is what it says on stderr."""
 
-    def __init__(self, environment: dict, log: Path, values: dict | None = None, *ros_arguments: str) -> None:
+    def __init__(
+        self,
+        environment: dict,
+        log: Path,
+        values: dict | None = None,
+        *ros_arguments: str,
+        name: str = "rigid_body_node",
+    ) -> None:
         self.log = log.with_suffix(".err")
         given = [part for n, v in (values or {}).items() for part in ("-p", f"{n}:={_text(v)}")]
-        super().__init__("rigid_body_node", "--ros-args", *given, *ros_arguments, environment=environment, log=log)
+        super().__init__(name, "--ros-args", *given, *ros_arguments, environment=environment, log=log)
 
     @property
     def alive(self) -> bool:
@@ -303,7 +310,7 @@ class Commanded(RosClient):
         self.folder = folder
         self.scene = scene
         self.sent = 0
-        self.node_process = NodeProcess(environment, folder / "node.log", scene)
+        self.node_process = NodeProcess(environment, folder / "node.log", scene, name="often_reporting_node")
         try:
             super().__init__(environment, node)
             self.node_process.wait_for("is simulating")

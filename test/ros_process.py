@@ -16,6 +16,7 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parent.parent
 MODULES = {
     "rigid_body_node": "rigid_proto_ros.ros.main",
+    "often_reporting_node": "often_reporting_node",
     "poke_client": "rigid_proto_ros.ros.poke_client",
     "rigid_proto": "rigid_proto_ros.cli.main",
 }
@@ -36,9 +37,9 @@ def command(name: str, *arguments: object) -> list[str]:
 
 
 def from_source(environment: dict[str, str]) -> dict[str, str]:
-    """The environment with this source tree first on the path."""
+    """The environment with this source tree first on the path, and what tests start themselves last."""
     rest = filter(None, [environment.get("PYTHONPATH", "")])
-    path = os.pathsep.join([str(SOURCE), *rest])
+    path = os.pathsep.join([str(SOURCE), *rest, str(SOURCE / "test")])
     return {**environment, "PYTHONPATH": path, "PYTHONFAULTHANDLER": "1"}
 
 

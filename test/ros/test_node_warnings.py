@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import resource
 import time
 
@@ -11,7 +12,7 @@ from command_rig import NodeProcess, RosClient
 
 pytest.importorskip("rclpy")
 
-from rigid_proto_ros.ros.diagnostics import WARNING_S
+from rigid_proto_ros.ros.diagnostics import REPORT_S, WARNING_S
 
 
 def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
@@ -60,5 +61,7 @@ def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_a
             report = client.diagnostics()
             assert "recording stopped" not in report["message"]
             assert report["recording"] == str(again)
+            stamps = [report["stamp_ns"] for report in client.all_diagnostics()]
+            assert 0.95 * REPORT_S < min(b - a for a, b in itertools.pairwise(stamps)) * 1e-9 < 2.0 * REPORT_S
     finally:
         assert node.stop() == 0, node.log.read_text()

@@ -302,7 +302,7 @@ def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_en
         while not catches(client.pid, signal.SIGINT):
             assert client.process.poll() is None, client.errors
             time.sleep(0.02)
-        time.sleep(1.0)
+        time.sleep(0.2)
         assert client.process.poll() is None, client.errors
         with running_node(environment=environment, log=tmp_path / "node"):
             assert client.process.wait(READY_S) == 0, client.errors

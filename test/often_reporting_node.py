@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_body_node`` that reports on /diagnostics ten times a second: tests wait for a report of what is so now very often."""
+
+import sys
+
+from rigid_proto_ros.ros import diagnostics
+from rigid_proto_ros.ros.main import main
+
+if __name__ == "__main__":
+    diagnostics.REPORT_S = 0.1
+    sys.exit(main())
