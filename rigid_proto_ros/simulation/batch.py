@@ -11,10 +11,12 @@ import numpy as np
 from numba import boolean, float64, int64, types
 
 from ..base.compilation import njit
+from ..base.simd import aligned
+from ..base.uncounted_arrays import uncounted
 from ..motion import problem as pr
 from ..motion.body import BODY, INERTIA, MASS
 from ..motion.integrators.integrator import Integrator
-from ..motion.integrators.stepping import COLUMNS, METHOD, ROWS, method_table, provide_kernel
+from ..motion.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
 from ..motion.integrators.taylor_adaptive import MAX_DEGREE
 from ..motion.loads import LOAD, is_within_magnitude
 from . import batch_body as b
@@ -176,18 +178,32 @@ def _one(
     )
 
 
-@njit(cache=True, error_model="numpy")
-def _tables(variants: tuple, references: tuple) -> tuple[np.ndarray, ...]:
-    """Arrays of simulation/flight.py with room for any of these flights."""
-    commands, room = 0, 0
-    for side in (variants, references):
-        commands = max(commands, side[5].shape[1])
-        for method in side[7].reshape((-1, METHOD)):
-            room = max(room, method[ROWS] * method[COLUMNS])
-    rows = commands + 1
-    f, n = np.zeros(fl.ROOM + room), np.zeros(fl.INTEGERS, np.int64)
+_LINE = 8
+"""Doubles in a line of the processor's cache."""
+
+_ROOM = (
+    float64[::1],
+    float64[::1],
+    types.Tuple((float64[::1], int64[::1], int64[:, ::1], float64[:, ::1], int64[:, ::1])),
+    float64[:, ::1],
+    float64[:, ::1],
+)
+
+
+def _room(variants: Variants, references: Variants | None, samples: int) -> tuple:
+    """Arrays in which a block works, with room for any of these flights: body (BODY,), context (CONTEXT,), those of
+    simulation/flight.py, states (m, STATE) at the samples, and those of the references.
+    """
+    sides = (variants,) if references is None else (variants, references)
+    rows = max(side.commands.shape[1] for side in sides) + 1
+    room = max(int((table[..., ROWS] * table[..., COLUMNS]).max()) for table in (_methods(s.integrator) for s in sides))
+    # The workspace begins a line of the processor's cache.
+    before = -fl.ROOM % _LINE
+    f, n = aligned((1, before + fl.ROOM + room))[0, before:], np.zeros(fl.INTEGERS, np.int64)
     events = np.zeros((4 * rows + 4, fl.EVENT), np.int64)
-    return f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
+    flight = f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
+    others = np.zeros((samples if references is not None else 1, STATE))
+    return np.zeros(BODY), np.zeros(CONTEXT), flight, np.zeros((samples, STATE)), others
 
 
 def _fly_block(
@@ -201,14 +217,15 @@ def _fly_block(
     stops: np.ndarray,
     measures: np.ndarray,
     results: tuple,
+    room: tuple,
 ) -> None:
     """Variations first to last − 1."""
-    status, end_ns, stop, measured, finals = results
-    body, context, tables = np.zeros(BODY), np.zeros(CONTEXT), _tables(variants, references)
-    states = np.zeros((sample_ns.shape[0], STATE))
-    others = np.zeros((sample_ns.shape[0] if has_references else 1, STATE))
+    variants, references = uncounted(variants), uncounted(references)
+    sample_ns, watched, stops, measures = uncounted((sample_ns, watched, stops, measures))
+    status, end_ns, stop, measured, finals = uncounted(results)
+    body, context, tables, states, others = uncounted(room)
     # One place that flies, whichever it is: a second one would be compiled a second time.
-    sides, kept, ends = (references, variants), (others, states), (np.zeros((0, 3)), stops)
+    sides, kept, ends = (references, variants), (others, states), (stops[:0], stops)
     for i in range(first, last):
         status[i] = 0
         reached = 0
@@ -227,7 +244,14 @@ def _fly_block(
 @cache
 def _compiled() -> Callable:
     """``_fly_block`` compiled, or loaded from the cache: when it is first wanted and not at import."""
-    block = (types.Tuple(_VARIANTS), types.Tuple(_VARIANTS), boolean, *_SAMPLING, types.Tuple(_RESULTS))
+    block = (
+        types.Tuple(_VARIANTS),
+        types.Tuple(_VARIANTS),
+        boolean,
+        *_SAMPLING,
+        types.Tuple(_RESULTS),
+        types.Tuple(_ROOM),
+    )
     signature = types.void(int64, int64, *block)
     return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_block)
 
@@ -257,5 +281,6 @@ def fly_variants(
     filled = (results.status, results.end_ns, results.stop, results.measured, results.states)
     own = variants.arrays
     other = own if references is None else references.arrays
-    _compiled()(0, rows, own, other, references is not None, sample_ns, watched, stops, measures, filled)
+    room = _room(variants, references, len(sample_ns))
+    _compiled()(0, rows, own, other, references is not None, sample_ns, watched, stops, measures, filled, room)
     return results
