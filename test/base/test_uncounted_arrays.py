@@ -20,7 +20,9 @@ def add_to_rows(arrays):
 
 def test_an_uncounted_array_is_the_callers_own() -> None:
     first, second = np.zeros((3, 2)), np.array([1.0, 2.0, 3.0])
+    arrays = (first, True), second
     before = sys.getrefcount(first), sys.getrefcount(second)
-    assert add_to_rows(((first, True), second)) is True
+    some = add_to_rows(arrays)
+    assert some is True
     assert first.tolist() == [[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]
     assert (sys.getrefcount(first), sys.getrefcount(second)) == before
