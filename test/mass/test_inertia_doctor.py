@@ -93,9 +93,9 @@ def quarter_turn(six) -> tuple:
 
 
 MISTAKES = {
-    "millimetres": (lambda c, s: (c, 1e6 * s), "kg mm^2"),
-    "gram millimetres": (lambda c, s: (c, 1e9 * s), "g mm^2"),
-    "pounds and inches": (lambda c, s: (c, POUND_INCH * s), "lb in^2"),
+    "millimetres": (lambda c, s: (c, 1e6 * s), "kg mm²"),
+    "gram millimetres": (lambda c, s: (c, 1e9 * s), "g mm²"),
+    "pounds and inches": (lambda c, s: (c, POUND_INCH * s), "lb in²"),
     "density": (lambda c, s: (c, 3.3 * s), "2.31 kg"),
     "sign of products": (lambda c, s: (c, s * [1, -1, -1, 1, -1, 1]), "signs of the products"),
     "order of entries": (lambda c, s: (c, s[[0, 3, 5, 1, 2, 4]]), "order of entries: xx yy zz"),
@@ -193,7 +193,7 @@ def test_the_printed_diagnosis_says_cause_and_remedy(capsys, tmp_path, truth):
     (tmp_path / "robot.urdf").write_text(urdf(truth[0], 1e6 * truth[1]))
     assert main(["inspect", "--compare", str(tmp_path / "robot.urdf")]) == 1
     out = capsys.readouterr().out
-    for part in ("head (hammer): off", "kg mm^2", "expected: mass 0.7", "density"):
+    for part in ("head (hammer): off", "kg mm²", "expected: mass 0.7", "density"):
         assert part in out
     assert main(["inspect", "--compare", str(tmp_path / "robot.urdf"), "--verify"]) == 2
 
