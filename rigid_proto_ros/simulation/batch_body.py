@@ -88,7 +88,10 @@ def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> tuple[
     inertia[1, 2] = inertia[2, 1] = given[4]
     mass = settings[GIVEN_MASS]
     center = settings[GIVEN_CENTER : GIVEN_CENTER + 3].copy()
-    good = 0.0 < mass < math.inf and is_plainly_good(principal_axes_kernel(inertia)[0])
+    good = 0.0 < mass < math.inf
+    # Without ballast the tensor that comes out is the one given.
+    if points.shape[0] > 0:
+        good = good and is_plainly_good(principal_axes_kernel(inertia)[0])
     total, com, gathered, principal, _, _ = given_mass(mass, center, inertia, s, points)
     return total, com, gathered, good and is_plainly_good(principal)
 
