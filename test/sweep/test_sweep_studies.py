@@ -37,7 +37,7 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"vary": {"gravity.q": {"grid": [1.0]}}}, "vary", "x, y, z"),
         ({"vary": {"script.1.force": {"grid": [[0, 0, 1]]}}}, "vary", "a study with a script"),
         ({"vary": {"mass": {"grid": TWELVE}, "density": {"grid": TWELVE}}}, "samples", "--yes"),
-        ({"vary": {"mass": {"list": [1, 2]}, "density": {"list": [1, 2, 3]}}}, "vary", "in step"),
+        ({"vary": {"mass": {"list": [1, 2]}, "density": {"list": [1, 2, 3]}}}, "vary", "advance together"),
         ({"duration": math.nan}, "duration", "finite"),
         ({"seed": 0.5}, "seed", "whole"),
         ({"sampler": "halton"}, "sampler", "sobol"),
