@@ -154,7 +154,7 @@ class MeshMoments:
         if mass > 0.0:
             return float(mass)
         if not (0.0 < density < math.inf):
-            raise InputError("density", density, "a finite number > 0 [kg/m^3]")
+            raise InputError("density", density, "a finite number > 0 [kg/m³]")
         body = float(density) * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
         if not (1e-300 < body < math.inf):
             raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
@@ -220,7 +220,7 @@ def explicit_mass_properties(
     if center.shape != (3,) or not np.all(np.isfinite(center)):
         raise TensorError("explicit_inertia.center_of_mass", center.tolist(), "three finite numbers [mesh coordinates]")
     if len(tuple(tensor6)) != 6:
-        raise TensorError("explicit_inertia.tensor", list(tensor6), "six numbers: ixx ixy ixz iyy iyz izz [kg m^2]")
+        raise TensorError("explicit_inertia.tensor", list(tensor6), "six numbers: ixx ixy ixz iyy iyz izz [kg m²]")
     inertia = tensor_from_six(tensor6)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor")
     points = _checked_ballast(ballast)

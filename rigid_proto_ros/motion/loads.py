@@ -222,7 +222,7 @@ class Load(NamedTuple):
             raise CommandRefused(
                 "magnitude",
                 "wrench",
-                f"{linear:.3g} m/s2 and {angular:.3g} rad/s2",
+                f"{linear:.3g} m/s² and {angular:.3g} rad/s²",
                 f"at most {MAX_ACCELERATION:g} of each for a body of {body.mass:g} kg",
             )
 

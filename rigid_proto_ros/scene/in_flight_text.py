@@ -37,16 +37,16 @@ def in_flight_text(flight: InFlight) -> str:
     """The text; ``read_in_flight`` gives back the same bits."""
     said: dict[str, object] = {"began_ns": flight.began_ns, "state": list(flight.start)}
     if flight.loads:
-        said["loads"] = [_load_said(going) for going in flight.loads]
+        said["loads"] = [_load_fields(going) for going in flight.loads]
     if flight.string is not None:
-        said["string"] = _string_said(flight.string)
+        said["string"] = _string_fields(flight.string)
     if flight.thrusters:
-        named = {name: _push_said(push) for name, push in flight.thrusters.items()}
+        named = {name: _push_fields(push) for name, push in flight.thrusters.items()}
         said["thrusters"] = {"last_ns": flight.thrusters_last_ns, **named}
     return flow(said)
 
 
-def _load_said(going: GoingLoad) -> dict[str, object]:
+def _load_fields(going: GoingLoad) -> dict[str, object]:
     if going.load is None:
         return {"kind": "thruster", "thruster": going.thruster, "began_ns": going.began_ns}
     load = going.load
@@ -63,7 +63,7 @@ def _load_said(going: GoingLoad) -> dict[str, object]:
     return {**said, "force": list(load.force), "torque": list(load.torque)}
 
 
-def _string_said(string: GoingString) -> dict[str, object]:
+def _string_fields(string: GoingString) -> dict[str, object]:
     then, tied = string.settings, string.tied
     parameters = {
         "attached": then.attached,
@@ -86,7 +86,7 @@ def _string_said(string: GoingString) -> dict[str, object]:
     return said
 
 
-def _push_said(push: Push) -> dict[str, object]:
+def _push_fields(push: Push) -> dict[str, object]:
     if push.until_ns == NEVER:
         return {"target": push.target}
     return push._asdict()

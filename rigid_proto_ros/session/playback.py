@@ -103,9 +103,9 @@ def _play_states(session: RecordedSession, observer: Observer, given: Scenario |
 def _snapshot(scenario: Scenario) -> BodySnapshot:
     told: list[BodySnapshot] = []
 
-    class _Asked(Observer):
+    class _BodyMessages(Observer):
         def body_changed(self, _time_ns: int, body: BodySnapshot) -> None:
             told.append(body)
 
-    Simulation(scenario.setup, _Asked()).announce()
+    Simulation(scenario.setup, _BodyMessages()).announce()
     return told[0]

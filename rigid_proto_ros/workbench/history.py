@@ -50,8 +50,8 @@ STALE_STATES = 20
 
 
 @dataclass(frozen=True)
-class LeftFuture:
-    """A future that was left: moments (n,) [ns] and rows (n, 13) as published, from the branch on."""
+class PreviousMotion:
+    """The motion before a rewind: moments (n,) [ns] and rows (n, 13) as published, from the branch on."""
 
     moments: np.ndarray
     rows: np.ndarray
@@ -113,7 +113,7 @@ class History:
         self._stale_left = 0
         self._restarted_by_state = False
         self._rewinding: Rewind | None = None
-        self._ghost: LeftFuture | None = None
+        self._ghost: PreviousMotion | None = None
 
     # What is heard
 
@@ -181,7 +181,7 @@ class History:
             return moment_ns - self._run_at(moment_ns).offset_ns
 
     @property
-    def ghost(self) -> LeftFuture | None:
+    def ghost(self) -> PreviousMotion | None:
         """The future that the last rewind left."""
         with self._lock:
             return self._ghost
@@ -254,7 +254,7 @@ class History:
             offset_ns = rewinding.moment_ns
             future = self._states.cut_after(offset_ns)
             if len(future[0]):
-                self._ghost = LeftFuture(*future)
+                self._ghost = PreviousMotion(*future)
         while len(self._runs) > 1 and (
             self._runs[-1].offset_ns > offset_ns or (self._runs[-1].offset_ns == offset_ns and self._runs[-1].untouched)
         ):

@@ -25,8 +25,8 @@ PORTION_NS = 1_000_000_000
 """[ns] That it is advanced at most between two pictures: whoever draws waits for it."""
 
 
-class _Told(Observer):
-    """What a run computed anew tells of its ghost; on_refusal(reason) hears of what the ghost goes without."""
+class _GhostObserver(Observer):
+    """Receives the ghost of a run that is computed anew; on_refusal(reason) hears of refused commands."""
 
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
         self._on_refusal = on_refusal
@@ -53,7 +53,7 @@ class PageGhost:
     def __init__(self, node_name: str, on_refusal: Callable[[str], None]) -> None:
         self._node_name = node_name
         self._on_refusal = on_refusal
-        self._told = _Told(on_refusal)
+        self._observer = _GhostObserver(on_refusal)
         self._run: Resimulation | None = None
         self._scenario: Scenario | None = None
         self._offset_ns = 0
@@ -81,8 +81,8 @@ class PageGhost:
             setup = replace(scenario.setup, initial=state.row)
             ghost = replace(ghost, initial=_beside(scenario, ghost, state))
             scenario = replace(scenario, setup=setup, ghost=ghost)
-        self._told = _Told(self._on_refusal)
-        self._run = Resimulation(scenario, [], self._told, self._mesh, self._node_name)
+        self._observer = _GhostObserver(self._on_refusal)
+        self._run = Resimulation(scenario, [], self._observer, self._mesh, self._node_name)
         self._run.begin_ghost()
 
     def changed(self, scenario: Scenario, state: State) -> None:
@@ -116,9 +116,9 @@ class PageGhost:
             self._on_refusal(f"the ghost ends here: {error}")
             self._run = None
             return None
-        self._told.row = None
+        self._observer.row = None
         run.ghost.advance(next_ns)
-        return self._told.row if next_ns == until_ns else None
+        return self._observer.row if next_ns == until_ns else None
 
     def _mesh(self, name: str) -> Mesh | None:
         """The mesh of a change: the one that the page shows, where that bears its name already."""
