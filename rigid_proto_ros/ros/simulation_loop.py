@@ -25,6 +25,9 @@ LEAD = 0.2
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
 
+REFUSED_STEPS_NS = 100_000_000
+"""While time runs, requests to step, which are refused then, are looked for this often [ns of wall time]."""
+
 LOCKSTEP_NS = 100_000
 """In lockstep commands are looked for this often [ns of wall time], for some seconds after the last one."""
 
@@ -73,7 +76,7 @@ class SimulationLoop(ScenarioRun):
         self._present_ns = 0
         self._last_drain_ns = 0
         self._paused_publication_ns = 0
-        self._next_listener_check_ns = 0
+        self._next_listener_check_ns = self._next_refused_steps_ns = 0
         self._caught_up = True
         self._end_ns: int | None = None
         self._on_end: Callable[[], None] = lambda: None
@@ -218,6 +221,8 @@ class SimulationLoop(ScenarioRun):
         if wall_ns >= self._next_listener_check_ns:
             self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
+        if wall_ns >= self._next_refused_steps_ns:
+            self._next_refused_steps_ns = wall_ns + REFUSED_STEPS_NS
             self.serve_steps(wall_ns)
         present_ns = self._simulated_present_ns()
         if present_ns > LAST_STAMP_NS:
