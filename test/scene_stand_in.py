@@ -20,7 +20,9 @@ class SceneStandIn:
             properties = {"visible": True, "position": (0.0, 0.0, 0.0), **properties}
             if method == "add_label":
                 properties["text"] = arguments[0]
-            self.nodes[name] = SimpleNamespace(kind=method, arguments=arguments, **properties)
-            return self.nodes[name]
+            node = SimpleNamespace(kind=method, arguments=arguments, **properties)
+            node.remove = lambda: self.nodes.pop(name)
+            self.nodes[name] = node
+            return node
 
         return add

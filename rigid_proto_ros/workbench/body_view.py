@@ -138,6 +138,7 @@ class BodyView:
         split where edges are sharp, and an outline made of it would be torn there.
         """
         scene = self._scene
+        drawn_apart = self._drawn_mesh if self._drawn_mesh is not self.mesh else None
         if surface is None:
             self.mesh = self._drawn_mesh = scene.add_icosphere("/body/mesh", 1.0, BODY_COLOUR, subdivisions=4)
             self._ghost = scene.add_icosphere(
@@ -156,6 +157,8 @@ class BodyView:
             self._ghost = scene.add_mesh_simple(
                 "/ghost/mesh", vertices, triangles, color=GHOST_COLOUR, opacity=GHOST_OPACITY, side="double"
             )
+        if drawn_apart is not None and self._drawn_mesh is self.mesh:
+            drawn_apart.remove()  # the body before had sharp edges, this one has none: no node takes its place
         self.see_through(self._switches.shown("See through the body"))
 
     def see_through(self, seen_through: bool) -> None:
@@ -210,6 +213,8 @@ class BodyView:
         semi_axes = tuple((ellipsoid / unit).tolist())
         solid = scene.add_icosphere("/body/ellipsoid", 1.0, MOMENTUM_COLOUR, scale=semi_axes, wxyz=turned, opacity=0.3)
         equal = scene.add_box("/body/box", GHOST_COLOUR, tuple((box / unit).tolist()), wxyz=turned, opacity=0.3)
+        for node in self._switches.nodes("Bounding box"):
+            node.remove()
         bounds: list[Any] = []
         if scenario.setup.surface is not None:
             edges = _box_edges((corners - body.center_of_mass) / unit)

@@ -100,9 +100,9 @@ KEYS = (
 
 
 def key_list() -> str:
-    """All keys in one line, and the button that no other control stands for."""
-    keys = "; ".join(f"{key.shown}: {key.does}" for key in KEYS if key.hotkey != "H")
-    return f"{keys}; right button: move the view"
+    """All keys, and the button that no other control stands for, each in a line."""
+    keys = [f"{key.shown}: {key.does}" for key in KEYS if key.hotkey != "H"]
+    return "\n".join([*keys, "right button: move the view"])
 
 
 def add_keys(gui: viser.GuiApi, page: Keyboard) -> None:

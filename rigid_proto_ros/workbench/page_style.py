@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """How the page is laid out on a narrow screen and on paper: the picture above, below it and not over it readouts and
-controls; on paper all of them, however far they were scrolled.
+controls; on paper all of them, however far they were scrolled. What is said in the corner keeps its lines.
 
 viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a
 long way down; it has no setting for either. A style sheet can change it, and viser passes HTML of its server's on to
@@ -26,6 +26,7 @@ _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
 _SCROLLED = ".mantine-ScrollArea-viewport"
 
 STYLE = f"""<style>
+.mantine-Notification-description {{ white-space: pre-line; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
   {_SHEET} [style*="width: 20em"] {{ width: 100% !important; }}

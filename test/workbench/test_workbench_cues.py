@@ -17,9 +17,11 @@ from rigid_proto_ros.rerun_view.plot_range import plot_range
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import readout_panel
+from rigid_proto_ros.workbench.body_view import BodyView, Switches
 from rigid_proto_ros.workbench.keys import KEYS
 from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text
 from rigid_proto_ros.workbench.poke_mark import PokeMark
+from rigid_proto_ros.workbench.scene_view import SWITCHES
 from rigid_proto_ros.workbench.soft_shadow import CELLS, sampled, shadow_picture
 from rigid_proto_ros.workbench.surroundings import CELL, SECTION, Surroundings
 from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point
@@ -250,6 +252,23 @@ def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_o
     assert scene.nodes["/grid/shadow"].position[2] < scene.nodes["/grid/floor"].position[2]
     view.show_ghost(None, com, ("true", "its box"))
     assert not any(label.visible for label in labels)
+
+
+@pytest.mark.parametrize("follower", ["ball", "explicit"])
+def test_of_a_body_with_sharp_edges_nothing_is_left_in_the_picture_when_a_smooth_one_follows(follower, tmp_path) -> None:
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=3).export(tmp_path / "ball.stl")
+    smooth = {"mesh": str(tmp_path / "ball.stl")} if follower == "ball" else {"mesh": "", "inertia_model": "explicit"}
+    scene = SceneStandIn()
+    body = BodyView(scene, Switches(SWITCHES))
+    body.set_body(read_scene("teapot", {}), 0.5)
+    assert "/body/drawn" in scene.nodes
+    body.set_body(read_scene("teapot", smooth), 0.5)
+    assert "/body/mesh" in scene.nodes and "/body/drawn" not in scene.nodes
+    assert ("/body/bounds" in scene.nodes) == (follower == "ball")
+    body.set_body(read_scene("teapot", {}), 0.5)
+    assert "/body/drawn" in scene.nodes
 
 
 def test_the_number_at_the_top_of_an_axis_is_whole() -> None:
