@@ -26,6 +26,7 @@ _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
 _SCROLLED = ".mantine-ScrollArea-viewport"
 
 STYLE = f"""<style>
+.mantine-Notification-root {{ max-height: 60vh !important; }}
 .mantine-Notification-description {{ white-space: pre-line; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}

@@ -255,7 +255,9 @@ def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_o
 
 
 @pytest.mark.parametrize("follower", ["ball", "explicit"])
-def test_of_a_body_with_sharp_edges_nothing_is_left_in_the_picture_when_a_smooth_one_follows(follower, tmp_path) -> None:
+def test_of_a_body_with_sharp_edges_nothing_is_left_in_the_picture_when_a_smooth_one_follows(
+    follower, tmp_path
+) -> None:
     import trimesh
 
     trimesh.creation.icosphere(subdivisions=3).export(tmp_path / "ball.stl")
