@@ -23,7 +23,8 @@ WRENCH_TIMEOUT_NS = 1_500_000_000
 """A wrench holds until the next message, and at most as long as the node's own default."""
 EARTH = (0.0, 0.0, -9.81)
 
-POSES = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
+TRANSFORMS = ("geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
+POSES = ("geometry_msgs/msg/PoseStamped", *TRANSFORMS)
 KINDS = {
     "pose": POSES,
     "twist": ("geometry_msgs/msg/TwistStamped",),
@@ -123,8 +124,10 @@ def _read(content: McapContent, topic: str, frame: str) -> _Topic:
             if message.stamp_ns == 0:
                 message = Stamped(log_time, message.frame_id, message.child_frame_id, message.numbers)
             messages.append(message)
-    if message_type == "tf2_msgs/msg/TFMessage":
+    if message_type in TRANSFORMS:
         messages, frame = _one_transform(messages, topic, frame), ""
+    elif frame and message_type not in KINDS["twist"] + KINDS["wrench"]:
+        raise InputError(topic, f"{topic}@{frame}", f"{topic} alone, as a {message_type} has no choice of frames")
     messages.sort(key=lambda message: message.stamp_ns)
     # Of messages with one stamp the first counts: a repeated one says nothing new.
     kept = [m for k, m in enumerate(messages) if k == 0 or m.stamp_ns != messages[k - 1].stamp_ns]
@@ -143,7 +146,7 @@ def _one_transform(messages: list[Stamped], topic: str, child: str) -> list[Stam
         raise InputError("--pose", topic, f"{topic}@CHILD with the frame of the body, one of {', '.join(children)}")
     if child and child not in children:
         raise InputError("--pose", f"{topic}@{child}", f"one of the frames {', '.join(children)}")
-    found = [message for message in messages if message.child_frame_id == (child or children[0])]
+    found = [message for message in messages if message.child_frame_id == (child or "".join(children[:1]))]
     parents = {message.frame_id for message in found}
     if len(parents) > 1:
         raise InputError(topic, f"{child or children[0]} has several parents, {', '.join(sorted(parents))}")

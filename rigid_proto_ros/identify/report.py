@@ -21,6 +21,8 @@ from .unknowns import Values
 from .verdict import Identifiability, Quantity, Unidentified, summary
 
 MISFIT = "the residuals are larger than the noise, so the numbers may be farther off than their standard deviations say"
+OTHER_UNITS = {"gravity": "m/s²", "offsets": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
+DAMPING_UNITS = ("N s/m", "N m s")
 TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -93,6 +95,16 @@ class Identification:
         unknowns = self.estimate.unknowns
         return {
             unknowns.names[k]: self.identifiability.quantity(_reader(name, index))
+            for k, (name, index) in enumerate(unknowns.slots)
+            if name != "theta"
+        }
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of the others, by name."""
+        unknowns = self.estimate.unknowns
+        return {
+            unknowns.names[k]: DAMPING_UNITS[index] if name == "damping" else OTHER_UNITS[name]
             for k, (name, index) in enumerate(unknowns.slots)
             if name != "theta"
         }
@@ -192,7 +204,8 @@ def as_text(found: Identification) -> list[str]:
     for name, one in zip(TENSOR_NAMES, tensor, strict=True):
         if one.value is not None:
             lines.append(f"{name}                {number(one)}{unit}")
-    lines += [f"{name:<18} {number(one)}" for name, one in found.others.items() if one.value is not None]
+    units = found.units
+    lines += [f"{name:<18} {number(one)} {units[name]}" for name, one in found.others.items() if one.value is not None]
     for check in found.checks:
         white = "white" if check.is_white else "not white"
         lines.append(f"noise of {check.series}: {check.noise:.3g} {check.unit}, {white}, {check.samples} samples")

@@ -215,6 +215,7 @@ def test_too_few_samples_are_refused(tmp_path: Path, count: int) -> None:
     [
         ({"pose": "/nothing"}, "a topic of the bag: /pose"),
         ({"twist": "/pose"}, "geometry_msgs/msg/TwistStamped"),
+        ({"pose": "/pose@drone"}, "/pose alone, as a geometry_msgs/msg/PoseStamped has no choice of frames"),
         ({"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
     ],
 )

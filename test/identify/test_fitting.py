@@ -14,6 +14,7 @@ from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.mass_parameters import second_moments
 from rigid_proto_ros.identify.momentum_balance import balanced_values
 from rigid_proto_ros.identify.poses import poses_of
+from rigid_proto_ros.identify.report import as_text
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, GROUPS, make_unknowns
 
 POKE = (0.5, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.5, 2.0), (0.0, 0.0, 0.01))
@@ -65,6 +66,12 @@ def test_a_poked_throw_tells_all_ten_parameters() -> None:
     assert found.mass.sd < 0.01 * found.mass.value
     assert all(check.is_white for check in found.checks)
     assert not found.remarks
+
+
+def test_whatever_else_was_asked_for_is_printed_with_its_unit() -> None:
+    flight = mf.mocap(_body(), mf.tumbling(), np.random.default_rng(2), 1.0)
+    lines = as_text(identify([flight], ("com", "inertia", "gravity")))
+    assert [line.rpartition(" ")[2] for line in lines if line.startswith("gravity.")] == ["m/s²"] * 3
 
 
 def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
