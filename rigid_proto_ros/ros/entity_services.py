@@ -80,22 +80,24 @@ class EntityServices:
         if not self._is_known(request.entity, response):
             return response
         frame, results = request.state.header.frame_id, self._messages.Result
-        if request.set_acceleration or frame not in ("", "world", self._world_frame):
-            what = "set_acceleration" if request.set_acceleration else f"frame {frame!r}"
+        # The releases for Jazzy and Kilted have no switches: pose and twist are meant, the acceleration may be ignored.
+        accelerates = getattr(request, "set_acceleration", False)
+        if accelerates or frame not in ("", "world", self._world_frame):
+            what = "set_acceleration" if accelerates else f"frame {frame!r}"
             return _ended(
                 response, results.RESULT_FEATURE_UNSUPPORTED, f"{what}: pose and twist in {self._world_frame}"
             )
         values: dict[str, tuple[float, ...]] = {}
-        if request.set_pose:
+        if getattr(request, "set_pose", True):
             p, q = request.state.pose.position, request.state.pose.orientation
             values |= {"position": (p.x, p.y, p.z), "orientation_xyzw": (q.x, q.y, q.z, q.w)}
-        if request.set_twist:
+        if getattr(request, "set_twist", True):
             v, w = request.state.twist.linear, request.state.twist.angular
             values |= {"linear_velocity": (v.x, v.y, v.z), "angular_velocity": (w.x, w.y, w.z)}
         try:
             command = SetState(values)
         except CommandRefused as refusal:
-            return _ended(response, response.INVALID_POSE, str(refusal))
+            return _ended(response, getattr(response, "INVALID_POSE", results.RESULT_OPERATION_FAILED), str(refusal))
         if values:
             self._call(lambda: self._loop.simulation.submit(command))
         return _ended(response, results.RESULT_OK)

@@ -53,7 +53,9 @@ bounds = call(srv.GetEntityBounds, "get_entity_bounds", entity="rigid_body").bou
 said["bounds"] = [bounds.type, len(bounds.points)]
 wanted = msg.EntityState()
 wanted.pose.position.x, wanted.pose.orientation.w = 2.0, 1.0
-set_ = call(srv.SetEntityState, "set_entity_state", entity="rigid_body", state=wanted, set_pose=True)
+# The releases for Jazzy and Kilted have no such switch.
+what = {"set_pose": True} if hasattr(srv.SetEntityState.Request, "set_pose") else {}
+set_ = call(srv.SetEntityState, "set_entity_state", entity="rigid_body", state=wanted, **what)
 said["set"] = [set_.result.result, set_.result.error_message]
 said["step"] = call(srv.StepSimulation, "step_simulation", steps=2).result.result
 state = call(srv.GetEntityState, "get_entity_state", entity="rigid_body").state

@@ -281,6 +281,19 @@ def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services)
     assert entity.set_entity_state(asked("chair", state=wanted), response()).result.result == NOT_FOUND
 
 
+def test_a_request_of_a_release_without_switches_sets_pose_and_twist(services):
+    answer, node = services
+    wanted = entity_state((1.0, 2.0, 3.0), linear=(0.5, 0.0, 0.0))
+    said = answer._entity.set_entity_state(SimpleNamespace(entity="tool", state=wanted), response())
+    assert said.result.result == OK
+    answer.step_simulation(SimpleNamespace(steps=10), response())
+    assert node.loop.simulation.state.position == pytest.approx([1.05, 2.0, 3.0])
+    # Those for Jazzy up to 1.2 have no word for a broken pose either.
+    broken = SimpleNamespace(entity="tool", state=entity_state(orientation=(0.0,) * 4))
+    plain = SimpleNamespace(result=response().result)
+    assert answer._entity.set_entity_state(broken, plain).result.result == FAILED
+
+
 def test_the_only_entity_is_found_by_name_category_and_place(services):
     answer, node = services
     find = lambda **filters: answer._entity.get_entities(filtered(**filters), response())  # noqa: E731 (one line, used in the next ones)
