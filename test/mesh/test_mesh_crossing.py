@@ -104,16 +104,19 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
             node = (node - 1) // 2
 
 
-def test_patches_leave_no_crossing_out():
-    """Spheres and boxes bent through themselves, with faces turned and cut out: as many crossings with patches as
-    without, and patches cover most of what isn't bent much."""
+@pytest.mark.parametrize("count", [60, pytest.param(5000, marks=pytest.mark.stress)])
+def test_patches_leave_no_crossing_out(count):
+    """Spheres and boxes bent through themselves, with faces turned and cut out, some with all corners on a coarse grid:
+    as many crossings with patches as without, and patches cover most of what isn't bent much."""
     random = np.random.default_rng(11)
     crossings, covered = [], []
-    for number in range(60):
+    for number in range(count):
         vertices, triangles = box(cells=6) if number % 3 else sphere(16)
         bend = 10.0 ** random.uniform(-2.0, 1.0)
         waves = random.normal(size=(3, 3))
         vertices = vertices + bend * np.sin(vertices @ waves + random.uniform(0.0, 6.0, 3))
+        if number % 5 == 4:
+            vertices = np.round(8.0 * vertices) / 8.0
         triangles = triangles[random.uniform(size=len(triangles)) < 1.0 - 0.02 * (number % 2)]
         turned = random.uniform(size=len(triangles)) < 0.02 * (number % 4 == 3)
         triangles[turned] = triangles[turned][:, ::-1]
@@ -124,7 +127,7 @@ def test_patches_leave_no_crossing_out():
         assert found == self_crossings(vertices, topology.corners, component), number
         crossings.append(found)
         covered.append(np.mean(patch >= 0))
-    assert sum(found > 0 for found in crossings) > 15 and sum(found == 0 for found in crossings) > 15
+    assert count // 4 < sum(found > 0 for found in crossings) < count - count // 4
     assert np.max(covered) == 1.0 and np.median(covered) > 0.7
 
 
