@@ -15,7 +15,7 @@ from ..base.rotation import length, times
 from ..mesh.nesting import component_nesting
 from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent
 from ..mesh.union import counted_once, united
-from .verdict import MAX_NESTED_COMPONENTS
+from .verdict import MAX_NESTED_COMPONENTS, counted
 
 CRACK = 1e-12
 """Rim vertices closer than this part of the diagonal are one even where no repair is asked for: rounding put them
@@ -81,7 +81,7 @@ def _drop_copies(surface: RepairedSurface) -> list[str]:
     topology = surface.topology()
     done = []
     if topology.duplicates.any():
-        done.append(f"removed {int(np.count_nonzero(topology.duplicates))} duplicate faces")
+        done.append(f"removed {counted(int(np.count_nonzero(topology.duplicates)), 'duplicate face')}")
         surface.drop(topology.duplicates)
         topology = surface.topology()
     if 2 * topology.opposites == len(surface.triangles):
@@ -91,7 +91,7 @@ def _drop_copies(surface: RepairedSurface) -> list[str]:
         back = np.ones(len(surface.triangles), dtype=bool)
         back[first] = False
         surface.drop(back)
-        done.append(f"removed {int(np.count_nonzero(back))} faces wound opposite to another")
+        done.append(f"removed {counted(int(np.count_nonzero(back)), 'face')} wound opposite to another")
     return done
 
 
@@ -171,13 +171,13 @@ def unite_components(
     if nesting.crossing:
         solid = united(vertices, topology.corners, topology.component, sums.volume, nesting.depth)
         joined = np.concatenate([vertices, solid[0]])
-        done = f"united {topology.components} components, {len(nesting.crossing)} pairs of which overlapped"
+        done = f"united {topology.components} components, of which {counted(len(nesting.crossing), 'pair')} overlapped"
         return joined, solid[1] + len(vertices), None, done
     spare = counted_once(sums.volume, nesting.inside) == 0.0
     if not spare.any():
         return nothing
     surface.drop(spare[topology.component])
-    done = f"removed {int(np.count_nonzero(spare))} components inside others"
+    done = f"removed {counted(int(np.count_nonzero(spare)), 'component')} inside others"
     return vertices, surface.triangles, surface.polygon_starts, done
 
 
@@ -237,7 +237,7 @@ def _orient(surface: RepairedSurface) -> list[str]:
     size = np.bincount(patch, minlength=len(turn))
     turn ^= (turned > 0.5 * size)[patch]  # keep the way that most of a patch has
     surface.turn(turn)
-    return [f"turned {int(np.count_nonzero(turn))} faces to agree with their neighbours"]
+    return [f"turned {counted(int(np.count_nonzero(turn)), 'face')} to agree with the neighbours"]
 
 
 def _cap_holes(surface: RepairedSurface) -> list[str]:
@@ -272,7 +272,7 @@ def _cap_holes(surface: RepairedSurface) -> list[str]:
                 surface.add_polygon(ring)
                 caps += 1
     edges = "edge" if len(rim) == 1 else "edges"
-    return [f"capped {caps} holes with {len(rim)} {edges}"] if caps else []
+    return [f"capped {counted(caps, 'hole')} with {len(rim)} {edges}"] if caps else []
 
 
 def _turn_outward(surface: RepairedSurface) -> list[str]:

@@ -91,14 +91,15 @@ def stated_unit(unit: float) -> Finding | None:
     """A remark when a mesh's file says that its unit is ``unit`` metres."""
     if unit == 1.0:
         return None
-    name = {1e-6: "micrometre", 1e-3: "millimetre", 1e-2: "centimetre", 0.0254: "inch", 0.3048: "foot"}.get(unit)
-    said = f"{unit:g} m" + (f" (a {name})" if name else "")
+    names = {1e-6: "a micrometre", 1e-3: "a millimetre", 1e-2: "a centimetre", 0.0254: "an inch", 0.3048: "a foot"}
+    said = f"{unit:g} m" + (f" ({names[unit]})" if unit in names else "")
     return Finding(
         "stated_unit", INFO, f"the file says that its unit is {said}: coordinates have been converted to metres"
     )
 
 
-def _count(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
+    """``number`` and the noun, in the plural but for one."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
@@ -110,13 +111,13 @@ def _check_edges(
     verdict.winding_consistent = topology.flipped == 0
     copies = int(np.count_nonzero(topology.duplicates))
     if copies:
-        message = f"{_count(copies, 'duplicate face')}, which would count twice"
+        message = f"{counted(copies, 'duplicate face')}, which would count twice"
         verdict.add("duplicate_faces", ERROR, message, "--repair (mesh_repair) removes the copies")
     if topology.unbalanced and not topology.watertight:
         rim = len(topology.boundary)
-        edges = _count(rim, "boundary edge")
+        edges = counted(rim, "boundary edge")
         if topology.odd > rim:
-            edges += f" and {_count(topology.odd - rim, 'edge')} of 3 or more faces"
+            edges += f" and {counted(topology.odd - rim, 'edge')} of 3 or more faces"
         known = _known_volume(sums, half, "how holes are closed")
         capped = _capped_volume(topology, sums, vertices)
         if capped is not None:
@@ -124,18 +125,18 @@ def _check_edges(
         remedy = "--repair (mesh_repair) welds edges and caps holes"
         verdict.add("open", ERROR, f"open surface with {edges}; {known}", remedy)
     if topology.flipped:
-        edges = f"{_count(topology.flipped, 'edge')} used twice in the same direction"
+        edges = f"{counted(topology.flipped, 'edge')} used twice in the same direction"
         known = _known_volume(sums, half, "how faces are turned")
         remedy = "--repair (mesh_repair) turns faces"
         verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}; {known}", remedy)
     if topology.nonmanifold and not topology.unbalanced and not copies:
-        message = f"{_count(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently"
+        message = f"{counted(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently"
         verdict.add("non_manifold", INFO, message)
     if topology.opposites:
-        message = f"{_count(topology.opposites, 'face')} coinciding with another one that is wound the other way"
+        message = f"{counted(topology.opposites, 'face')} coinciding with another one that is wound the other way"
         verdict.add("opposite_faces", WARNING, message)
     if topology.degenerate:
-        message = f"{_count(topology.degenerate, 'triangle')} without area, which have no effect"
+        message = f"{counted(topology.degenerate, 'triangle')} without area, which have no effect"
         verdict.add("degenerate_faces", INFO, message)
 
 
@@ -214,7 +215,7 @@ def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
             message = f"inconsistent winding: {subtract}"
             verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
         if nested:
-            message = f"{_count(nested, 'component')} inside another and wound outward: their volume counts twice"
+            message = f"{counted(nested, 'component')} inside another and wound outward: their volume counts twice"
             if not nesting.crossing:
                 hollow = float(np.sum(expected * np.abs(volume)))
                 once = float(np.sum(counted_once(volume, nesting.inside) * np.abs(volume)))
@@ -224,14 +225,14 @@ def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
             remedy = "--repair (mesh_repair) makes cavities of them, --repair union one solid"
             verdict.add(NESTED, WARNING, message, remedy)
     if cavities:
-        verdict.add("cavities", INFO, f"{_count(cavities, 'closed inner surface')} wound inward, taken as cavities")
+        verdict.add("cavities", INFO, f"{counted(cavities, 'closed inner surface')} wound inward, taken as cavities")
     if not nesting.complete:
         verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
 
 
 def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | None) -> None:
     """Components that cross: by how much their volumes' sum exceeds that of the union, ``whole``, where it is known."""
-    overlap = f"{_count(pairs, 'pair')} of components overlap"
+    overlap = f"{counted(pairs, 'pair')} of components overlap"
     if whole is None or not whole > 0.0:
         measure = "" if can_unite() else " (the extra [meshes] measures by how much)"
         verdict.add(OVERLAPPING, WARNING, f"{overlap}; the volume that they share counts twice{measure}")
@@ -290,7 +291,8 @@ def check_surface(
         message = f"{spare} to no face; that carries no mass"
         lost = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
         if lost:
-            message += f"; {lost} of them are not finite and taken to lie at the first face's first corner"
+            message += "; it is" if extent.unused == 1 else f"; {lost} of them {'is' if lost == 1 else 'are'}"
+            message += " not finite and taken to lie at the first face's first corner"
         verdict.add(UNREFERENCED, INFO, message)
     _check_size(verdict, 2.0 * float(half.max()))
     if not verdict.usable:
@@ -309,7 +311,7 @@ def check_surface(
             verdict.add("thin", INFO, f"thin body: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
         crossings = self_crossings(vertices, topology.corners, topology.component, topology.edges)
         if crossings:
-            message = f"the surface passes through itself ({_count(crossings, 'pair')} of triangles)"
+            message = f"the surface passes through itself ({counted(crossings, 'pair')} of triangles)"
             verdict.add(SELF_CROSSING, WARNING, f"{message}; what it encloses twice counts twice")
     if polygon_starts is not None:
         _check_polygons(verdict, polygon_planarity(vertices, triangles, polygon_starts, middle), diagonal)

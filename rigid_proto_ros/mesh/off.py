@@ -70,10 +70,12 @@ def _announced(data: bytes, name: str) -> tuple[int, int, int]:
         raise MeshError(name, excerpt(data, 0), "an .off file: its first line is OFF")
     if header.group(2) or header.group(3) or header.group(4):
         raise MeshError(name, excerpt(data, 0), "ASCII OFF in three dimensions")
-    counts = re.match(rb"(?:\s|#[^\n]*\n)*(\d{1,18})[ \t]+(\d{1,18})(?:[ \t]+-?\d+)?[^\n]*", data[header.end() :])
+    body = re.compile(rb"(?:\s|#[^\n]*\n)*").match(data, header.end())
+    start = header.end() if body is None else body.end()
+    counts = re.compile(rb"(\d{1,18})[ \t]+(\d{1,18})(?:[ \t]+-?\d+)?[^\n]*").match(data, start)
     if counts is None:
-        raise MeshError(name, excerpt(data, header.end()), "numbers of vertices, faces and edges after OFF")
-    return int(counts.group(1)), int(counts.group(2)), header.end() + counts.end()
+        raise MeshError(name, excerpt(data, start), "numbers of vertices, faces and edges after OFF")
+    return int(counts.group(1)), int(counts.group(2)), counts.end()
 
 
 def read_off(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import codecs
+import itertools
+import re
 import struct
 
 import numpy as np
@@ -13,6 +15,8 @@ from ..base.errors import MeshError
 from .numbers_in_text import error_at, finish_numbers, read_point, skip_blanks, token_end
 from .topology import first_equal_rows
 
+_HEAD = 100
+"""Words, however many blanks stand between them, within which an ASCII file names its first facet."""
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -25,8 +29,11 @@ def _merge(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def is_ascii_stl(data: bytes) -> bool:
     """Whether the bytes read as ASCII STL: binary files, too, may begin with the word solid."""
-    head = data[:512].removeprefix(codecs.BOM_UTF8).lstrip().lower()
-    return head.startswith(b"solid") and (b"facet" in head or b"endsolid" in data[:4096].lower()) and b"\0" not in head
+    if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
+        return False
+    words = itertools.islice(re.finditer(rb"\S{1,80}", data), _HEAD)
+    head = b" ".join(word.group() for word in words).removeprefix(codecs.BOM_UTF8).lstrip().lower()
+    return head.startswith(b"solid") and (b"facet" in head or b"endsolid" in head) and b"\0" not in head
 
 
 def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray]:

@@ -65,6 +65,7 @@ UNREADABLE = [
     ("cut_vertex.obj", obj()[:9], "three coordinates"),
     ("long.stl", stl() + b"\0" * 33, "33 bytes follow the 12 facets"),
     ("huge.stl", stl(count=4_000_000_000), "announces 4000000000"),
+    ("digits.off", b"OFF\n" + b"9" * 4300 + b" 1 1\n", "got '9999"),
     ("huge.off", replaced(off(), b"8 12", b"8000000000 12"), "8000000000 vertices"),
     ("huge.ply", ply(announced=2_000_000_000), "2000000000 rows of face"),
     ("negative.ply", replaced(ply(), b"element face 12", b"element face -12"), "element face -12"),

@@ -176,11 +176,29 @@ def test_numbers_of_more_digits_than_a_double_holds_are_the_nearest_double():
         lambda text: text.upper(),
         lambda text: text.replace(b"solid test", b"solid of vertex 1 2 and an endfacet", 1),
         lambda text: text.replace(b"endsolid", b"\n" * 33_000 + b"endsolid"),
+        lambda text: text.replace(b"\n", b"\n" * 33_000, 1),
+        lambda text: b" \n" * 33_000 + text,
     ],
-    ids=["one line", "bare CR", "CRLF", "byte order mark", "capitals", "words in the name", "blank lines"],
+    ids=[
+        "one line",
+        "bare CR",
+        "CRLF",
+        "byte order mark",
+        "capitals",
+        "words in the name",
+        "blank lines",
+        "blank lines before the first facet",
+        "blank lines before all",
+    ],
 )
 def test_ascii_stl_in_every_spelling(tmp_path, change):
     mesh = load(tmp_path, "a.stl", change(stl_text()))
+    assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
+
+
+def test_a_binary_stl_whose_header_speaks_of_solids_and_facets_is_binary(tmp_path):
+    data = b"solid with one facet each".ljust(80) + stl()[80:]
+    mesh = load(tmp_path, "a.stl", data)
     assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
 
 

@@ -205,7 +205,7 @@ def test_repair_caps_flat_holes_exactly():
     vertices, triangles = box((1.0, 2.0, 3.0), 4)
     missing = np.all(vertices[triangles][:, :, 2] == 1.5, axis=1)
     repaired = body((vertices, triangles[~missing]), repair=True)
-    assert "capped 1 holes" in repaired.verdict.findings[0].message
+    assert "capped 1 hole with" in repaired.verdict.findings[0].message
     assert solid_volume(repaired) == pytest.approx(6.0, rel=1e-15)
     assert repaired.moments.moments("shell").measure == pytest.approx(22.0, rel=1e-14)
     few = body((vertices, np.delete(triangles, [3, 40, 41, 90], axis=0)), repair=True)
