@@ -158,7 +158,7 @@ def print_fixed_links(links: list[FixedLink], out: str) -> None:
                 (before.center_of_mass_error, after.center_of_mass_error),
             )
         ]
-        old, new = (f"{d.mass:.6g}" for d in (before, after))
+        old, new = ("-" if math.isnan(d.mass) else f"{d.mass:.6g}" for d in (before, after))
         mass = f"{old} -> {new}" if link.written and old != new else old
         done = f"from its {before.judged_by} shapes" if link.written else f"left: {link.left}" if link.left else ""
         status = f"{before.status} -> {after.status}" if link.written else before.status

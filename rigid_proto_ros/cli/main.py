@@ -58,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
     complete(parser)
     args = parser.parse_args(argv)
     if own_process and "numba" in sys.modules:
-        _without_linear_algebra()
+        _without_unused_libraries()
     # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in
     # the background had it ignored.
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -81,19 +81,20 @@ def main(argv: list[str] | None = None) -> int:
         return 2
 
 
-def _without_linear_algebra() -> None:
-    """Let numba find no SciPy when it looks for BLAS, as where it isn't installed: no kernel of this package has a use
-    for it, and importing scipy.linalg takes a fifth of a command's start. For processes that run nobody else's kernels.
+def _without_unused_libraries() -> None:
+    """Let numba find neither SciPy's BLAS nor cffi, as where they aren't installed: no kernel of this package has a use
+    for them, and importing them takes a fifth of a command's start. For processes that run nobody else's kernels.
     """
-    looks = "numba.np.arraymath"  # the module that does, when the first kernel is called (tried with numba 0.68)
-    modules: dict[str, Any] = sys.modules
-    if looks in modules or "scipy.linalg" in modules:
-        return
-    modules["scipy.linalg"] = None
-    try:
-        importlib.import_module(looks)
-    finally:
-        del modules["scipy.linalg"]
+    # The modules that look for them, when the first kernel is called (tried with numba 0.68).
+    for library, looks in (("scipy.linalg", "numba.np.arraymath"), ("cffi", "numba.core.typing.cffi_utils")):
+        modules: dict[str, Any] = sys.modules
+        if looks in modules or library in modules:
+            continue
+        modules[library] = None
+        try:
+            importlib.import_module(looks)
+        finally:
+            del modules[library]
 
 
 def _one_line(error: Exception) -> str:

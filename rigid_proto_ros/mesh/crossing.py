@@ -345,6 +345,20 @@ def _crossings(
         top, count = _descend(nodes, apart, stack, top, leaf_pairs, count)
 
 
+@njit(cache=True, nogil=True)
+def _self_crossings(
+    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, edges: np.ndarray, limit: int
+) -> int:
+    """All steps of the search in one kernel: each that Python calls takes some milliseconds to load."""
+    patch = np.full(len(corners), -1, np.int32)
+    if len(edges) > 0:
+        patch = surface_patches(vertices, corners, edges)
+    boxes = triangle_boxes(vertex_cells(vertices, corners), corners)
+    apart = apart_patches(vertices, corners, patch)
+    chosen, within = may_cross(boxes, patch, apart), np.zeros((0, 0), np.bool_)
+    return _crossings(vertices, corners, component, boxes, patch, apart, chosen, within, limit)[0]
+
+
 def self_crossings(
     vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, edges: np.ndarray | None = None
 ) -> int:
@@ -355,11 +369,8 @@ def self_crossings(
     """
     if len(corners) > MAX_TRIANGLES:
         return 0
-    patch = _no_patches(corners) if edges is None else surface_patches(vertices, corners, edges)
-    boxes = triangle_boxes(vertex_cells(vertices, corners), corners)
-    apart = apart_patches(vertices, corners, patch)
-    chosen, within = may_cross(boxes, patch, apart), np.zeros((0, 0), dtype=bool)
-    return int(_crossings(vertices, corners, component, boxes, patch, apart, chosen, within, SELF_LIMIT)[0])
+    edges = np.zeros((0, 6), dtype=np.int32) if edges is None else edges
+    return int(_self_crossings(vertices, corners, component, edges, SELF_LIMIT))
 
 
 def crossing_components(
@@ -375,7 +386,3 @@ def crossing_components(
     part = component.astype(np.int32)
     _, complete = _crossings(vertices, triangles, component, boxes, part, apart, chosen, left, WORK_LIMIT)
     return asked & ~left, complete
-
-
-def _no_patches(triangles: np.ndarray) -> np.ndarray:
-    return np.full(len(triangles), -1, dtype=np.int32)

@@ -64,13 +64,14 @@ import sys
 from rigid_proto_ros.cli import main
 sys.argv = ["rigid_proto", "inspect", "t_handle", "--urdf"]
 status = main.main()
-print(status, "numba.np.arraymath" in sys.modules, [m for m in ("scipy.linalg", "scipy.spatial") if m in sys.modules])
+looks = "numba.np.arraymath" in sys.modules and "numba.core.typing.cffi_utils" in sys.modules
+print(status, looks, [m for m in ("scipy.linalg", "scipy.spatial", "cffi") if m in sys.modules])
 import scipy.linalg
 """
 
 
-def test_a_command_starts_without_scipys_linear_algebra():
+def test_a_command_starts_without_scipys_linear_algebra_and_cffi():
     ran = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, text=True, check=True)
     expected = "0 True []"
-    moved = "numba no longer looks for BLAS where cli/main.py lets it find none"
+    moved = "numba no longer looks for BLAS or cffi where cli/main.py lets it find none"
     assert ran.stdout.splitlines()[-1] == expected, moved

@@ -175,6 +175,7 @@ def test_the_command_writes_tells_and_leaves(parts, capsys):
     assert main(["inspect", "--compare", str(path), "--fix", str(out), "--mass", "bare=0.5"]) == 0
     told = capsys.readouterr().out
     assert "off -> ok" in told and "left: open" in told and "3 of 4 inertials rewritten, 1 left" in told
+    assert "- -> 0.5" in told and "nan" not in told
     assert path.read_bytes() == URDF.encode()
     assert main(["inspect", "--compare", str(out), "--fix", str(out), "--json"]) == 0
     links = {link["link"]: link for link in json.loads(capsys.readouterr().out)["links"]}
