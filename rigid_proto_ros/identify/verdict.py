@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from . import mass_parameters as mp
-from . import shooting as sh
 from .fitting import Estimate
 from .unknowns import Unknowns, Values
+from .variable_projection import Problem
 
 MOST_RELATIVE = 0.5
 """A standard deviation of more than half of the quantity itself says nothing: neither the number nor its
@@ -165,10 +165,10 @@ def _is_confirmed(estimate: Estimate, direction: np.ndarray, sd: float) -> bool:
     """Whether the flights contradict a body far away along a direction of the physical unknowns, whatever
     their starts were.
     """
-    problem = sh.Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
+    problem = Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
     best = problem.residuals(problem.first)
     for side in (1.0, -1.0):
-        tried = sh.Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
+        tried = Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
         there = tried.residuals(tried.first + side * min(TRIED * sd, MOST_RELATIVE) * direction)
         if there @ there - best @ best < LEAST_RISE:
             return False

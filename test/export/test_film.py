@@ -90,7 +90,7 @@ def test_a_fall_out_of_sight_is_followed_and_the_ghost_is_seen():
         (["--video", "{tmp}/a.mp4", "--from", "5"], ("--from", "5.0", "0 to 0.1 s")),
         (["--video", "{tmp}/a.mp4", "--from", "0.08", "--to", "0.02"], ("--to", "0.02")),
         (["--video", "{tmp}/a.mp4", "--from", "-1"], ("--from", "-1.0")),
-        (["--size", "960x540"], ("--size", "together with --video")),
+        (["--size", "960x540"], ("--size", "needs --video")),
         (["--video", "{tmp}/a.mp4", "--with", "trail"], ("--with", "--gltf or --usd")),
     ],
 )

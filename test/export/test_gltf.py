@@ -183,7 +183,7 @@ def test_slerp_and_angles_agree_with_scipy():
         (["--gltf", "{tmp}/a.glb", "--tolerance", "nan"], ("--tolerance", "nan")),
         (["--gltf", "{tmp}/a.glb", "--fps", "-1"], ("--fps", "-1.0")),
         (["--gltf", "{tmp}/a.glb", "--with", "goat"], ("--with", "did you mean ghost?")),
-        (["--fps", "10"], ("--fps", "together with --gltf")),
+        (["--fps", "10"], ("--fps", "needs --gltf")),
         (["--gltf", "{tmp}/a.glb", "--tolerance", "1e-3", "--fps", "3"], ("--tolerance", "--fps")),
     ],
 )

@@ -205,7 +205,7 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
         (["--lump", "robot.urdf", "--joint", "elbow=1"], "did you mean shoulder?|one of shoulder"),
         (["--lump", "robot.urdf", "--joint", "mount=1"], "fixed"),
         (["--lump", "robot.urdf", "--mass", "1"], "--mass"),
-        (["--lump", "robot.urdf", "--compare", "robot.urdf"], "by itself"),
+        (["--lump", "robot.urdf", "--compare", "robot.urdf"], "combined with MESH or --compare"),
         (["hammer", "--joint", "a=1"], "--lump ROBOT"),
         (["hammer", "--as-scene", "x.yaml"], "--lump ROBOT"),
         (["--lump", "none.urdf"], "none.urdf"),
