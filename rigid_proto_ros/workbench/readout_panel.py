@@ -51,7 +51,7 @@ PLOT_PIXELS = 130
 AXES: Any = ({"label": "t [s]", "labelSize": 14, "size": 30}, {"size": AXIS_PIXELS})
 
 ROUNDING = 1e-9
-"""[°] A smaller angle comes from the arithmetic."""
+"""[°] A smaller angle comes from the arithmetic, and so does a smaller share of the spin."""
 
 FLAT_ANGLE = 1.0
 """[°] An angle's plot spans at least this much: rounding isn't blown up to fill it."""
@@ -194,7 +194,7 @@ class ReadoutPanel:
                 ("|L|", f"{length:.5g} {MOMENTUM_UNIT}"),
                 ("drift of L's direction", f"{angle if angle > ROUNDING else 0.0:.3g}{ANGLE_UNIT}"),
                 ("|ω|", f"{spin:.4g} {OMEGA_UNIT}"),
-                ("ω₁ ω₂ ω₃", " ".join(f"{x:.3g}" for x in w) + f" {OMEGA_UNIT}"),
+                ("ω₁ ω₂ ω₃", " ".join(f"{x if abs(x) > ROUNDING * spin else 0.0:.3g}" for x in w) + f" {OMEGA_UNIT}"),
                 ("COM", " ".join(f"{x:.4g}" for x in state.position) + " m"),
                 *scales.items(),
             )

@@ -65,9 +65,12 @@ class Status:
             return f"*{doing} …*"
         last = self._last
         state = last.get("state", "running")
-        text = f"`{self._target}` is {'simulating' if state == 'flying' else state}"
-        if (choice := last.get("integrator_choice")) and choice != last.get("integrator"):
-            text += f", method {choice}"
+        choice = last.get("integrator_choice", "")
+        if state == "sleeping" and ": sleeping" in choice:
+            state = choice.partition(": ")[2]  # it says why
+        elif choice and choice != last.get("integrator"):
+            state += f", method {choice}"
+        text = f"`{self._target}` is {state.replace('flying', 'simulating', 1)}"
         self._troubles = {said: until_s for said, until_s in self._troubles.items() if until_s > now_s}
         warnings = [last["warning"]] if last.get("warning") else []
         return "".join([text, *(f"  \n⚠ {said}" for said in (*warnings, *self._troubles))])

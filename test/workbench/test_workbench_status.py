@@ -31,6 +31,12 @@ def after(**changes: object) -> str:
     return status.text(1.0)
 
 
+def test_why_a_body_sleeps_is_told_once() -> None:
+    line = after(state="sleeping", integrator_choice="auto: sleeping, nothing moves or acts")
+    assert line == "`/rigid_body` is sleeping, nothing moves or acts"
+    assert after(integrator_choice="auto: free_body") == "`/rigid_body` is simulating, method auto: free_body"
+
+
 def test_states_published_late_are_no_matter_of_the_pages_user() -> None:
     assert "⚠" not in after(overruns=30, real_time_lost_s=0.05)
     assert warnings_since(CALM, {**CALM, "overruns": "30"}) == ["30 states published late"]
