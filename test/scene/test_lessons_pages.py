@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def test_the_notebook_runs_from_top_to_bottom(monkeypatch: pytest.MonkeyPatch) -
     nbclient = pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     pytest.importorskip("matplotlib")
-    monkeypatch.setenv("PYTHONPATH", str(PAGES.parent.parent))
+    monkeypatch.setenv("PYTHONPATH", str(PAGES.parent.parent), prepend=os.pathsep)
     notebook = nbformat.read(PAGES / "inertia.ipynb", as_version=4)
     nbformat.validate(notebook)
     nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(PAGES)}}).execute()
