@@ -19,8 +19,8 @@ from numba.extending import models, overload, register_model
 from .compilation import INTERPRETED, intrinsic
 
 _DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
-_LINE = 64
-"""Bytes."""
+LINE = 8
+"""Doubles in a line of the processor's cache."""
 Packed = Any
 """A vector within a kernel, to a type checker."""
 
@@ -39,13 +39,12 @@ class _DoublesModel(models.PrimitiveModel):
         super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.count))
 
 
-def aligned(shape: tuple[int, int]) -> np.ndarray:
-    """Zeros whose first number begins a line of the processor's cache: a vector that crosses two takes
-    twice as long.
+def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
+    """Zeros whose first number, or the one ``before`` numbers behind it, begins a line of the processor's cache: a
+    vector that crosses two takes twice as long.
     """
-    spare = _LINE // 8
-    whole = np.zeros(shape[0] * shape[1] + spare)
-    first = -(whole.ctypes.data // 8) % spare
+    whole = np.zeros(shape[0] * shape[1] + LINE)
+    first = -(whole.ctypes.data // 8 + before) % LINE
     return whole[first : first + shape[0] * shape[1]].reshape(shape)
 
 

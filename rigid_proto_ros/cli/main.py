@@ -86,8 +86,8 @@ def _without_unused_libraries() -> None:
     for them, and importing them takes a fifth of a command's start. For processes that run nobody else's kernels.
     """
     # The modules that look for them, when the first kernel is called (tried with numba 0.68).
+    modules: dict[str, Any] = sys.modules
     for library, looks in (("scipy.linalg", "numba.np.arraymath"), ("cffi", "numba.core.typing.cffi_utils")):
-        modules: dict[str, Any] = sys.modules
         if looks in modules or library in modules:
             continue
         modules[library] = None

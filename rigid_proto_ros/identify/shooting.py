@@ -199,16 +199,22 @@ def _times(
     return times, np.split(where, ends[:-1])
 
 
+def _flown(segment: ShootingInterval, start: np.ndarray, values: Values, times_ns: np.ndarray) -> np.ndarray | None:
+    """Samples (m, SAMPLE) at times_ns (m,) from the segment's begin; None where the flight failed."""
+    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times_ns, segment.wrenches)
+    return samples[0] if good.all() else None
+
+
 def segment_residuals(segment: ShootingInterval, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
     """Measured minus shown of each piece (m, 3), in its own unit; None where the flight failed."""
     times, where = _times(segment, values.offsets)
-    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
-    if not good.all():
+    samples = _flown(segment, start, values, times)
+    if samples is None:
         return None
     sensor, found = _sensor_row(values), []
     for piece, own in zip(segment.pieces, where, strict=True):
         found.append(np.empty((len(own), 3)))
-        fill_residuals(*piece.sensor, samples[0], own, sensor, piece.values, found[-1])
+        fill_residuals(*piece.sensor, samples, own, sensor, piece.values, found[-1])
     return found
 
 
@@ -216,11 +222,10 @@ def flown_state(segment: ShootingInterval, start: np.ndarray, values: Values, ti
     """The tracked frame's state (13,) at a time within the segment, or None where the flight failed."""
     if time_ns == segment.begin_ns:
         return start
-    times = np.array([time_ns - segment.begin_ns], np.int64)
-    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
-    if not good.all():
+    samples = _flown(segment, start, values, np.array([time_ns - segment.begin_ns], np.int64))
+    if samples is None:
         return None
-    state, com = samples[0, 0, :13], values.theta[mp.COM]
+    state, com = samples[0, :13], values.theta[mp.COM]
     state[7:10] -= rot.turned(state[3:7], rot.cross(state[10:13], com))
     state[:3] -= rot.turned(state[3:7], com)
     return state
@@ -233,11 +238,11 @@ def flown_poses(
     (n, 3) [m] and attitudes (n, 4) xyzw; raises InputError where the flight failed.
     """
     times, _ = _times(segment, values.offsets)
-    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches)
-    if not good.all():
+    samples = _flown(segment, start, values, times)
+    if samples is None:
         raise InputError("identify", "the estimate can't be simulated; see --from and --to")
-    attitudes = samples[0, :, 3:7]
-    return times, samples[0, :, :3] - rot.turned(attitudes, values.theta[mp.COM]), attitudes
+    attitudes = samples[:, 3:7]
+    return times, samples[:, :3] - rot.turned(attitudes, values.theta[mp.COM]), attitudes
 
 
 class Variations:

@@ -2,8 +2,9 @@
 """A body's flight at all samples, and those of its variations from fewer points of time.
 
 How far a varied flight is from the base bends with the body's turn, however often that is sampled: so variations are
-flown at knots a fifth of a radian apart, and between these their distance from the base is interpolated by polynomials
-of degree 7. That is linear in the distances, so directions of the unknowns that change nothing still change nothing.
+flown at knots at most two fifths of a radian apart, and between these their distance from the base is interpolated by
+polynomials of degree 7. That is linear in the distances, so directions of the unknowns that change nothing still change
+nothing.
 """
 
 from __future__ import annotations

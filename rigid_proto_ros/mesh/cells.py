@@ -24,23 +24,36 @@ NO_BOX = (_LAST | (_LAST << FIELD) | (_LAST << (2 * FIELD)), 0)
 
 
 @njit(cache=True, nogil=True)
-def _extent(vertices: np.ndarray, corners: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    """Lower and upper corner of the vertices that triangles use."""
-    low_x = low_y = low_z = math.inf
-    high_x = high_y = high_z = -math.inf
-    for i in range(len(corners)):
-        for corner in range(3):
-            vertex = corners[i, corner]
-            x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
-            low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
-            high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
-    return low_x, low_y, low_z, high_x, high_y, high_z
+def extents(vertices: np.ndarray, corners: np.ndarray, patch: np.ndarray, count: int) -> np.ndarray:
+    """Lower and upper corner (count, 6) of the triangles of each patch (m,), or of none where that is −1; those of the
+    one at hand are kept out of memory.
+    """
+    boxes = np.empty((count, 6))
+    boxes[:, :3], boxes[:, 3:] = math.inf, -math.inf
+    t = 0
+    while t < len(patch):
+        p = patch[t]
+        if p < 0:
+            t += 1
+            continue
+        low_x, low_y, low_z = boxes[p, 0], boxes[p, 1], boxes[p, 2]
+        high_x, high_y, high_z = boxes[p, 3], boxes[p, 4], boxes[p, 5]
+        while t < len(patch) and patch[t] == p:
+            for corner in range(3):
+                vertex = corners[t, corner]
+                x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
+                low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
+                high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
+            t += 1
+        boxes[p, 0], boxes[p, 1], boxes[p, 2] = low_x, low_y, low_z
+        boxes[p, 3], boxes[p, 4], boxes[p, 5] = high_x, high_y, high_z
+    return boxes
 
 
 @njit(cache=True, nogil=True)
 def vertex_cells(vertices: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Of each vertex (n,) the cell that it lies in; any number for one that no triangle of ``corners`` (m, 3) has."""
-    box = np.array(_extent(vertices, corners))
+    box = extents(vertices, corners, np.zeros(len(corners), np.int32), 1)[0]
     cells = np.zeros(len(vertices), np.int64)
     for k in range(3):
         low, high = box[k], box[3 + k]

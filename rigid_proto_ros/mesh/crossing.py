@@ -254,13 +254,26 @@ def _may_cross(nodes: np.ndarray, apart: np.ndarray, pairs: np.ndarray, count: i
 
 
 @njit(cache=True, nogil=True)
+def _put_if_near(
+    nodes: np.ndarray, a: int, b: int, stack: np.ndarray, top: int, leaf_pairs: np.ndarray, count: int
+) -> tuple[int, int]:
+    """Put two nodes of one depth, if their boxes meet, on the ``stack``, or, as leaves, among the leaf pairs; returns
+    how many both hold.
+    """
+    inner = (len(nodes) + 1) // 2 - 1
+    near = meet(nodes[a, 0], nodes[a, 1], nodes[b, 0], nodes[b, 1])
+    stack[top, 0], stack[top, 1] = a, b
+    leaf_pairs[count, 0], leaf_pairs[count, 1] = a, b
+    return top + (near & (a < inner)), count + (near & (a >= inner))
+
+
+@njit(cache=True, nogil=True)
 def _descend(
     nodes: np.ndarray, apart: np.ndarray, stack: np.ndarray, top: int, leaf_pairs: np.ndarray, count: int
 ) -> tuple[int, int]:
     """Replace the last pairs of nodes on the ``stack`` by those of their children whose boxes meet, put pairs of leaves
     among the leaf pairs, and return how many both hold. Pairs are taken _BATCH at a time: one needn't wait for another.
     """
-    inner = (len(nodes) + 1) // 2 - 1
     take = min(top, _BATCH)
     top -= take
     batch = stack[top : top + take].copy()
@@ -268,10 +281,7 @@ def _descend(
         a, b = batch[pair, 0], batch[pair, 1]
         for left in range(2 * a + 1, 2 * a + 3):
             for right in range(2 * b + 1, 2 * b + 3):
-                near = meet(nodes[left, 0], nodes[left, 1], nodes[right, 0], nodes[right, 1])
-                stack[top, 0], stack[top, 1] = left, right
-                leaf_pairs[count, 0], leaf_pairs[count, 1] = left, right
-                top, count = top + (near & (left < inner)), count + (near & (left >= inner))
+                top, count = _put_if_near(nodes, left, right, stack, top, leaf_pairs, count)
     return top, count
 
 
@@ -280,13 +290,9 @@ def _siblings(
     nodes: np.ndarray, first: int, last: int, stack: np.ndarray, leaf_pairs: np.ndarray, count: int
 ) -> tuple[int, int]:
     """The same for the children of each of the nodes from ``first`` to last − 1, on an empty stack."""
-    inner, top = (len(nodes) + 1) // 2 - 1, 0
+    top = 0
     for node in range(first, last):
-        a, b = 2 * node + 1, 2 * node + 2
-        near = meet(nodes[a, 0], nodes[a, 1], nodes[b, 0], nodes[b, 1])
-        stack[top, 0], stack[top, 1] = a, b
-        leaf_pairs[count, 0], leaf_pairs[count, 1] = a, b
-        top, count = top + (near & (a < inner)), count + (near & (a >= inner))
+        top, count = _put_if_near(nodes, 2 * node + 1, 2 * node + 2, stack, top, leaf_pairs, count)
     return top, count
 
 

@@ -3,40 +3,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..base.compilation import njit
-from .cells import NO_BOX, least, meet, most
+from .cells import NO_BOX, extents, least, meet, most
 
 GROUPS = 64
 """Groups that triangles of no patch are taken by."""
-
-
-@njit(cache=True, nogil=True)
-def _extents(vertices: np.ndarray, corners: np.ndarray, patch: np.ndarray, count: int) -> np.ndarray:
-    """Lower and upper corner (p, 6) of each patch; those of the one at hand are kept out of memory."""
-    boxes = np.empty((count, 6))
-    boxes[:, :3], boxes[:, 3:] = math.inf, -math.inf
-    t = 0
-    while t < len(patch):
-        p = patch[t]
-        if p < 0:
-            t += 1
-            continue
-        low_x, low_y, low_z = boxes[p, 0], boxes[p, 1], boxes[p, 2]
-        high_x, high_y, high_z = boxes[p, 3], boxes[p, 4], boxes[p, 5]
-        while t < len(patch) and patch[t] == p:
-            for corner in range(3):
-                vertex = corners[t, corner]
-                x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
-                low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
-                high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
-            t += 1
-        boxes[p, 0], boxes[p, 1], boxes[p, 2] = low_x, low_y, low_z
-        boxes[p, 3], boxes[p, 4], boxes[p, 5] = high_x, high_y, high_z
-    return boxes
 
 
 @njit(cache=True, nogil=True)
@@ -49,7 +22,7 @@ def apart_patches(vertices: np.ndarray, corners: np.ndarray, patch: np.ndarray) 
     count = 0
     for t in range(len(patch)):
         count = max(count, patch[t] + 1)
-    boxes = _extents(vertices, corners, patch, count)
+    boxes = extents(vertices, corners, patch, count)
     apart = np.zeros((count + 1, count + 1), np.bool_)
     for p in range(count):
         for q in range(p):

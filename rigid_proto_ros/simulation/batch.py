@@ -178,9 +178,6 @@ def _one(
     )
 
 
-_LINE = 8
-"""Doubles in a line of the processor's cache."""
-
 _ROOM = (
     float64[::1],
     float64[::1],
@@ -198,8 +195,7 @@ def _room(variants: Variants, references: Variants | None, samples: int) -> tupl
     rows = max(side.commands.shape[1] for side in sides) + 1
     room = max(int((table[..., ROWS] * table[..., COLUMNS]).max()) for table in (_methods(s.integrator) for s in sides))
     # The workspace begins a line of the processor's cache.
-    before = -fl.ROOM % _LINE
-    f, n = aligned((1, before + fl.ROOM + room))[0, before:], np.zeros(fl.INTEGERS, np.int64)
+    f, n = aligned((1, fl.ROOM + room), before=fl.ROOM)[0], np.zeros(fl.INTEGERS, np.int64)
     events = np.zeros((4 * rows + 4, fl.EVENT), np.int64)
     flight = f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
     others = np.zeros((samples if references is not None else 1, STATE))

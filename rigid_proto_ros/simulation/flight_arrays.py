@@ -13,6 +13,7 @@ from numba import int64
 
 from ..base.addresses import address_of_array, doubles_at, entry_of, integers_at
 from ..base.compilation import njit
+from ..base.simd import LINE
 from ..motion.body import BODY
 from ..motion.integrators.integrator import Method
 from ..motion.integrators.stepping import METHOD, provide_kernel
@@ -36,9 +37,6 @@ INTEGERS = fl.INTEGERS + 5
 
 # Looked up at every advance.
 _REACHED, _ACTING, _DUE, _DUE_END = fl.REACHED, fl.ACTING, fl.DUE, fl.DUE_END
-
-_LINE = 8
-"""Doubles of a line of the processor's cache."""
 
 
 def _sizes(rows: int) -> tuple[int, int, int]:
@@ -336,9 +334,9 @@ class FlightArrays:
     def _make_room(self, room: int) -> None:
         """Integers and doubles, with so much workspace that begins a line of the processor's cache."""
         doubles = fl.ROOM + room
-        whole = np.empty(INTEGERS + doubles + _LINE)
+        whole = np.empty(INTEGERS + doubles + LINE)
         at = address_of_array(whole)
-        first = -(at // 8 + INTEGERS + fl.ROOM) % _LINE
+        first = -(at // 8 + INTEGERS + fl.ROOM) % LINE
         self._at = at + 8 * first
         own = whole[first : first + INTEGERS].view(np.int64)
         self.integers = own.data
