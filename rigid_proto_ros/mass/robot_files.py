@@ -158,7 +158,7 @@ def robot_root(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...
     """The root of a robot file, xacro expanded with arguments like ``name:=value``, packages looked for upwards from
     the file and in ``folders``; raises InputError when the file can't be read.
     """
-    root = parse_xml(read_bounded(path, MAX_BYTES, "compare", "a URDF, SDF or MJCF file"), path)
+    root = parse_xml(read_bounded(path, MAX_BYTES, "robot file", "a URDF, SDF or MJCF file"), path)
     if is_xacro(root, path):
         return parse_xml(expand_xacro(path, Search(path.parent, folders), xacro), path)
     if xacro:
@@ -179,23 +179,23 @@ def links_of(root: ElementTree.Element, path: Path) -> list[LinkInertial]:
     if root.tag not in readers:
         tag = re.sub(r"[^\w:.{}/-]", "?", str(root.tag))[:40]
         accepted = "URDF's <robot>, SDF's <sdf> or MJCF's <mujoco>"
-        raise InputError("compare", f"{path.name} begins with <{tag}>, not with {accepted}")
+        raise InputError("robot file", f"{path.name} begins with <{tag}>, not with {accepted}")
     try:
         return readers[root.tag](root, path)
     except (ValueError, TypeError, KeyError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("compare", path.name, f"valid numbers ({error})") from None
+        raise InputError("robot file", path.name, f"valid numbers ({error})") from None
 
 
 def parse_xml(data: bytes, path: Path) -> ElementTree.Element:
     """The root of a file's XML; raises InputError for what is none, or has entities."""
     if b"<!ENTITY" in data:
-        raise InputError("compare", path.name, "a file without XML entities")
+        raise InputError("robot file", path.name, "a file without XML entities")
     try:
         return ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise InputError("compare", path.name, f"well-formed XML ({error})") from None
+        raise InputError("robot file", path.name, f"well-formed XML ({error})") from None
 
 
 def placed(shape: Shape, rotation: np.ndarray, position: np.ndarray) -> Shape:

@@ -48,7 +48,7 @@ class Model:
         """The element's own attributes, then those of its class, or of the class that its body's children have."""
         name = element.get("class") or childclass or "main"
         if name not in self.defaults:
-            raise InputError("compare", f"default class {name}", f"one of {', '.join(self.defaults)}")
+            raise InputError("robot file", f"default class {name}", f"one of {', '.join(self.defaults)}")
         return ChainMap(dict(element.attrib), dict(self.defaults[name].get(element.tag, {})))
 
 
@@ -65,10 +65,10 @@ def _with_includes(root: Element, path: Path) -> None:
             file = (path.parent / child.get("file", "")).resolve()
             if file in taken or len(taken) > MAX_INCLUDES:
                 raise InputError(
-                    "compare", f"<include file={child.get('file')!r}>", "each file included once, at most 200"
+                    "robot file", f"<include file={child.get('file')!r}>", "each file included once, at most 200"
                 )
             taken.add(file)
-            content = parse_xml(read_bounded(file, MAX_BYTES, "compare", "an MJCF file to include"), file)
+            content = parse_xml(read_bounded(file, MAX_BYTES, "robot file", "an MJCF file to include"), file)
             parent[place : place + 1] = list(content)
             waiting.extend(content)
             waiting.append(parent)
@@ -99,7 +99,7 @@ def mjcf_model(root: Element) -> Model:
         compiler.update(element.attrib)
     if compiler.get("coordinate", "local") != "local":
         raise InputError(
-            "compare", f"coordinate={compiler['coordinate']!r}", "local coordinates, as MuJoCo since 2.3.4"
+            "robot file", f"coordinate={compiler['coordinate']!r}", "local coordinates, as MuJoCo since 2.3.4"
         )
     model = Model(
         compiler.get("angle", "degree") != "radian",

@@ -64,7 +64,7 @@ def expand_xacro(path: Path, search: Search, arguments: Iterable[str] = ()) -> b
     program = shutil.which("xacro")
     if program is None:
         accepted = "plain URDF: expand it first, xacro FILE > robot.urdf (or install xacro)"
-        raise InputError("compare", path.name, accepted)
+        raise InputError("robot file", path.name, accepted)
     with tempfile.TemporaryDirectory() as folder:
         module = Path(folder) / "ament_index_python"
         module.mkdir()
@@ -78,10 +78,10 @@ def expand_xacro(path: Path, search: Search, arguments: Iterable[str] = ()) -> b
                 capture_output=True, timeout=TIMEOUT_S, check=False, env={**os.environ, "PYTHONPATH": places},
             )  # fmt: skip
         except (OSError, subprocess.TimeoutExpired) as error:
-            raise InputError("compare", path.name, f"a file that xacro expands ({error})") from None
+            raise InputError("robot file", path.name, f"a file that xacro expands ({error})") from None
     if done.returncode != 0:
         lines = [line.strip() for line in done.stderr.decode("utf-8", "replace").split("\n") if line.strip()]
         # Its last lines say in which files; the error stands before them.
         reason = next((line for line in lines if line.startswith("error:")), lines[-1] if lines else "no reason given")
-        raise InputError("compare", path.name, f"a file that xacro expands ({reason[:200]})")
+        raise InputError("robot file", path.name, f"a file that xacro expands ({reason[:200]})")
     return done.stdout
