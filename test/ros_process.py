@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rigid_proto_ros.base.child_processes import end_with_this_thread
+
 SOURCE = Path(__file__).resolve().parent.parent
 MODULES = {
     "rigid_body_node": "rigid_proto_ros.ros.main",
@@ -81,6 +83,8 @@ class RosProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=err,
+                # A test that fails before it ends its process leaves none behind.
+                preexec_fn=end_with_this_thread(),
             )
 
     @property

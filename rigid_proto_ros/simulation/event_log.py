@@ -19,7 +19,7 @@ MOST_NOTED = 10_000
 """Events that may wait to be chained: some megabytes."""
 
 
-class Noted(NamedTuple):
+class OtherEvent(NamedTuple):
     """An event that is no command, or not any more."""
 
     kind: str
@@ -38,7 +38,7 @@ class EventLog:
         """Start a new chain."""
         self.count = 0
         self._hash = hashlib.sha256()
-        self._noted: list[tuple[int, Command | Noted]] = []
+        self._noted: list[tuple[int, Command | OtherEvent]] = []
 
     @property
     def sha256(self) -> str:
@@ -54,7 +54,7 @@ class EventLog:
         self.count += 1
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, time_ns: int, event: Command | Noted) -> None:
+    def note(self, time_ns: int, event: Command | OtherEvent) -> None:
         """Add an event whose line nobody wants now."""
         self._noted.append((time_ns, event))
         self.count += 1
@@ -80,7 +80,7 @@ _quoted = lru_cache(maxsize=256)(json.dumps)
 """Frames come again and again."""
 
 
-def _line(time_ns: int, command: Command | Noted) -> str:
+def _line(time_ns: int, command: Command | OtherEvent) -> str:
     """The line of a command, as ``json.dumps`` writes it."""
     if isinstance(command, WrenchCommand):
         try:

@@ -95,7 +95,7 @@ class InFlight:
         return bool(self.loads or self.thrusters) or self.is_tied
 
 
-def told_of(state: State) -> np.ndarray:
+def initial_row_of(state: State) -> np.ndarray:
     """The row (13,) that a scene begins with which tells of this state by ``initial.*``."""
     row, q = np.empty(13), state.orientation_xyzw
     spin = np.array(rotate(*q.tolist(), *state.angular_velocity_body.tolist()))

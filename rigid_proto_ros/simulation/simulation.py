@@ -38,9 +38,9 @@ from .commands import (
     order_key,
     slot_name,
 )
-from .event_log import EventLog, Noted
+from .event_log import EventLog, OtherEvent
 from .flight_arrays import ActingLoad, FlightArrays
-from .in_flight import GoingLoad, InFlight, told_of
+from .in_flight import GoingLoad, InFlight, initial_row_of
 from .notifier import EventNotifier, snapshot
 from .observer import BodySnapshot, Observer
 from .readings import Readings
@@ -110,7 +110,7 @@ class Simulation(Readings):
         if self.observer.wants_events():
             self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
         else:
-            self.events.note(self.time_ns, Noted(kind, content))
+            self.events.note(self.time_ns, OtherEvent(kind, content))
 
     # The way of a command
 
@@ -420,7 +420,7 @@ class Simulation(Readings):
         loads = [self._going_load(going) for going in in_flight.loads]
         segment = State(in_flight.began_ns, np.array(in_flight.start))
         leads_here = arrays.go_on(setup, self._string.tied, loads, segment)
-        if not (leads_here and told_of(arrays.state).tobytes() == setup.initial.tobytes()):
+        if not (leads_here and initial_row_of(arrays.state).tobytes() == setup.initial.tobytes()):
             arrays.go_on(setup, self._string.tied, loads, None)
         self.state = arrays.state
         if self._string.catch_up(setup, self.state):
