@@ -244,6 +244,8 @@ def fix_robot(path: Path, options: Options, *, link: str | None = None) -> tuple
     root = parse_xml(data, path)
     if is_xacro(root, path):
         plain = path.name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
+        if plain == path.name:  # the shell would empty the file before xacro reads it
+            plain = f"{path.stem}.expanded.urdf"
         raise InputError("fix", path.name, f"plain URDF: xacro {path} > {plain}, and then --compare {plain} --fix OUT")
     if b"\0" in data:
         raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")

@@ -11,6 +11,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -23,6 +24,7 @@ TIMEOUT_S = 60.0
 MAX_FILES = 2000
 """Files of all packages together that are searched for names of packages."""
 _FIND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)")
+_NO_ARGUMENT = re.compile(r"Undefined substitution argument (\w+)")
 _INDEX = """
 FOLDERS = {folders!r}
 
@@ -61,7 +63,8 @@ def expand_xacro(path: Path, search: Search, arguments: Iterable[str] = ()) -> b
     """What the installed ``xacro`` makes of the file with ``arguments`` like ``name:=value``; raises InputError without
     it, and with its reason where it fails.
     """
-    program = shutil.which("xacro")
+    # pip puts it beside the Python of an environment, which need not be activated.
+    program = shutil.which("xacro") or shutil.which("xacro", path=os.path.dirname(sys.executable))
     if program is None:
         accepted = "plain URDF: expand it first, xacro FILE > robot.urdf (or install xacro)"
         raise InputError("robot file", path.name, accepted)
@@ -83,5 +86,7 @@ def expand_xacro(path: Path, search: Search, arguments: Iterable[str] = ()) -> b
         lines = [line.strip() for line in done.stderr.decode("utf-8", "replace").split("\n") if line.strip()]
         # Its last lines say in which files; the error stands before them.
         reason = next((line for line in lines if line.startswith("error:")), lines[-1] if lines else "no reason given")
-        raise InputError("robot file", path.name, f"a file that xacro expands ({reason[:200]})")
+        undefined = _NO_ARGUMENT.search(reason)
+        remedy = f"; --xacro {undefined[1]}:=VALUE gives it" if undefined else ""
+        raise InputError("robot file", path.name, f"a file that xacro expands ({reason[:200]}){remedy}")
     return done.stdout

@@ -250,6 +250,7 @@ def test_xacro_in_comments_is_no_xacro_and_the_rest_is_expanded_where_it_is_inst
     assert judge(path)["l0"].status == "ok"
     path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
     with pytest.raises(InputError, match="expand it first"):
         judge(path)
     program = tmp_path / "xacro"
@@ -259,6 +260,23 @@ def test_xacro_in_comments_is_no_xacro_and_the_rest_is_expanded_where_it_is_inst
     program.write_text("#!/bin/sh\necho no such argument >&2\nexit 3\n")
     with pytest.raises(InputError, match="no such argument"):
         judge(path)
+    program.write_text("#!/bin/sh\necho 'error: Undefined substitution argument name' >&2\nexit 3\n")
+    with pytest.raises(InputError, match="--xacro name:=VALUE"):
+        judge(path)
+
+
+def test_xacro_is_found_beside_the_python_that_runs(tmp_path, monkeypatch):
+    """An environment's programs aren't on the PATH until it is activated."""
+    (tmp_path / "cube.obj").write_bytes(obj(CUBE))
+    path = urdf(tmp_path, mesh("cube.obj") + inertial())
+    (tmp_path / "bin").mkdir()
+    program = tmp_path / "bin" / "xacro"
+    program.write_text(f"#!/bin/sh\n/bin/cat <<'END'\n{path.read_text()}\nEND\n")
+    program.chmod(0o755)
+    path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "python"))
+    assert judge(path)["l0"].status == "ok"
 
 
 def test_each_meshs_hull_is_made_once_a_link(tmp_path, monkeypatch):
