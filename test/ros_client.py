@@ -268,20 +268,21 @@ def _until(condition, what, timeout=WAIT_S, pause=0.002):
 
 
 def main() -> None:
+    # Answers get stdout for themselves: the middleware writes its errors there, too, and they now go to stderr.
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     client = Client()
-    # The interpreter's own stdout carries answers alone.
     for line in sys.stdin:
         job = json.loads(line)
         try:
             answer = {"done": getattr(client, job.pop("do"))(**job)}
         except Exception as error:  # told to the test, which fails with it
             answer = {"failed": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(answer), file=answers, flush=True)
     # The executor's thread still sits in the middleware: the orderly way out races with it. But a publisher that goes
     # without a word is believed to be there for 20 s more.
     for publisher, _ in client.publishers.values():
         client.node.destroy_publisher(publisher)
-    sys.stdout.flush()
     os._exit(0)
 
 

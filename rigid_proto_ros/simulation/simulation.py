@@ -183,14 +183,19 @@ class Simulation(Readings):
         """
         if until_ns < self.time_ns:
             raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
+        arrays = self._arrays
         while True:
             # 1. Commands that are nothing but loads are handed to the compiled flight.
             event_ns, due = self._hand_over(until_ns)
             # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
-            if not self._fly(event_ns, due):
-                return self._stop_in_last_good_state()
+            if not arrays.fly(event_ns):
+                return self._stop_in_last_good_state(due)
+            if due or self._notifier.wants_loads or arrays.integers[_TIMEOUTS]:
+                self._notify(due)
+            self.time_ns = event_ns
+            self.state = state = State(event_ns, arrays.row.copy())
             if event_ns == until_ns:
-                return self.state
+                return state
             # 3. That event is applied; with what acts now a new segment begins.
             self._act()
 
@@ -203,17 +208,21 @@ class Simulation(Readings):
             until_ns = self.thrusters.due_ns
         if not pending or pending[0][0] >= until_ns:
             return until_ns, ()
-        setup, due = self.setup, []
-        while pending and pending[0][0] < until_ns:
-            first = pending[0][-1]
+        setup = self.setup
+        due: list[Pending] = []
+        while pending:
+            entry = pending[0]
+            if entry[0] >= until_ns:
+                break
+            first = entry[-1]
             if first.resolved_for is not setup and not self._is_ready(first):
                 until_ns = first.time_ns
+                # All commands of one instant act together.
+                while due and due[-1].time_ns == until_ns:
+                    self._push(due.pop())
                 break
             heappop(pending)
             due.append(first)
-        # All commands of one instant act together.
-        while due and due[-1].time_ns == until_ns:
-            self._push(due.pop())
         self._arrays.put(due)
         return until_ns, due
 
@@ -227,33 +236,15 @@ class Simulation(Readings):
         except CommandRefused:
             return False  # refused when it acts, and not before
 
-    def _fly(self, until_ns: int, due: Sequence[Pending]) -> bool:
-        """The compiled flight to ``until_ns``, and word of what began and ended; False when the motion failed."""
-        arrays = self._arrays
-        reached = arrays.fly(until_ns)
-        if not reached:
-            acted = len(due) - arrays.waiting
-            for pending in due[acted:]:
-                self._push(pending)
-            due = due[:acted]
-        notifier = self._notifier
-        if due and notifier.ignores_commands and not arrays.integers[_TIMEOUTS]:
-            self.events.note_all(due)
-        elif due or notifier.wants_loads or arrays.integers[_TIMEOUTS]:
-            self._notify(due)
-        self.time_ns = until_ns if reached else arrays.time_ns
-        self.state = State(self.time_ns, arrays.row.copy())
-        return reached
-
     def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
-        observer, notifier = self.observer, self._notifier
-        observed = not notifier.ignores_commands and (notifier.wants_loads or observer.wants_events())
-        if not (observed or self._arrays.integers[_TIMEOUTS]):
+        observer, notifier, arrays = self.observer, self._notifier, self._arrays
+        ignored = notifier.ignores_commands or not (notifier.wants_loads or observer.wants_events())
+        if ignored and not arrays.integers[_TIMEOUTS]:
             self.events.note_all(due)
             return
-        first = self._arrays.first_due
-        for number, (now_ns, what, load_id, row) in enumerate(self._arrays.last_events()):
+        first = arrays.first_due
+        for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
             self.time_ns = now_ns
             if what in (fl.ENDED, fl.TIMED_OUT):
                 observer.load_ended(now_ns, load_id)
@@ -269,7 +260,7 @@ class Simulation(Readings):
             if load is None or not isinstance(command, WrenchCommand):
                 continue
             if what == fl.APPLIED:
-                observer.applied(now_ns, command, load, self.setup.body, self._arrays.attitude_at(number))
+                observer.applied(now_ns, command, load, self.setup.body, arrays.attitude_at(number))
             else:
                 kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
                 notifier.load_began(self, load_id, kind, load)
@@ -434,8 +425,15 @@ class Simulation(Readings):
         number, load = self.thrusters.load(going.thruster)
         return ActingLoad(load, going.began_ns, _UNTIL_REPLACED_NS, 0, fl.PULSE, -1 - number)
 
-    def _stop_in_last_good_state(self) -> State:
+    def _stop_in_last_good_state(self, due: Sequence[Pending]) -> State:
+        """The motion failed on the way; of these commands those that hadn't acted yet go on waiting."""
+        arrays = self._arrays
+        acted = len(due) - arrays.waiting
+        for pending in due[acted:]:
+            self._push(pending)
+        self._notify(due[:acted])
+        self.time_ns, self.state = arrays.time_ns, arrays.state
         when = f"{self._segment.committed_ns * 1e-9:.9g} s"
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
-        self._arrays.finish_segment()
+        arrays.finish_segment()
         return self.state
