@@ -18,6 +18,8 @@ class SceneStandIn:
 
         def add(name: str, *arguments, **properties) -> SimpleNamespace:
             properties = {"visible": True, "position": (0.0, 0.0, 0.0), **properties}
+            if method == "add_line_segments":
+                properties["points"] = arguments[0]
             if method == "add_label":
                 properties["text"] = arguments[0]
             node = SimpleNamespace(kind=method, arguments=arguments, **properties)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..base.rotation import quaternion_from_matrix
+from ..base.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ..mass.tensor import equimomental_shapes
 from ..motion.surface import Surface
 from ..rerun_view.appearance import AXES_COLOURS, BODY_COLOUR, GHOST_COLOUR, MOMENTUM_COLOUR
 from ..rerun_view.surface_normals import shaded_surface
 from ..scene.scenario import Scenario
-from .poke_mark import UNWRITTEN
+from .pair_names import PairNames
 
 BOUNDS_COLOUR = (90, 90, 90)
 
@@ -82,15 +82,12 @@ class BodyView:
         self._shape: tuple[Any, ...] = ()
         self._scale, self._center_of_mass = np.ones(3), np.zeros(3)
         self._middle = np.zeros(3)
-        self._name_points: tuple[tuple[Any, ...], np.ndarray] = ((), np.zeros((2, 3)))
+        self._far_points = np.zeros((2, 3))
         self._look_due_s, self._look_odd = 0.0, False
         self._look_until_s, self._last_pose = 0.0, np.zeros(7)
         self._frame = scene.add_frame("/body", show_axes=False)
         self._ghost_frame = scene.add_frame("/ghost", show_axes=False, visible=False)
-        self._names = [
-            scene.add_label(f"/{whose}/name", UNWRITTEN, visible=False, anchor="bottom-center")
-            for whose in ("body", "ghost")
-        ]
+        self._names = PairNames(scene)
         self._axes = scene.add_frame("/body/own_axes", axes_radius=0.008, origin_radius=0.0, visible=False)
         self._axes_labels = [scene.add_label(f"/body/own_axes/{axis}", f"body {axis}") for axis in "xyz"]
         switches.govern("Body axes", [self._axes])
@@ -129,6 +126,7 @@ class BodyView:
         if replaced or shape != self._shape:
             self._shape = shape
             self._draw_inertia(scenario, box, ellipsoid, corners)
+            self._far_points = _far_points(surface, body.scale, body.center_of_mass, self.radius)
         self._place_contacts(str(scenario.parameters.mesh))
 
     def _make_meshes(self, surface: Surface | None) -> None:
@@ -246,8 +244,15 @@ class BodyView:
         self._mesh_name = mesh
         for name, label in self._contact_labels.items():
             label.position = (np.array(self._contacts[name]) * self._scale - self._center_of_mass) / self._unit
-            set_visible(label, False)
-        self._switches.govern("Contacts", self._contact_labels.values() if mesh == self._contacts_mesh else ())
+        self._govern_contacts()
+
+    def _govern_contacts(self) -> None:
+        """Their names are written on the body; while it has one itself beside its ghost's, there would be too many."""
+        written = self._mesh_name == self._contacts_mesh and not self._names.shown
+        if not written:
+            for label in self._contact_labels.values():
+                set_visible(label, False)
+        self._switches.govern("Contacts", self._contact_labels.values() if written else ())
 
     # Every frame
 
@@ -263,45 +268,43 @@ class BodyView:
 
     def hide_ghost(self) -> None:
         """No ghost, or it isn't to be shown."""
-        for node in (self._ghost_frame, *self._names):
-            set_visible(node, False)
+        set_visible(self._ghost_frame, False)
+        if self._names.shown:
+            self._names.hide()
+            self._govern_contacts()
 
     def place_ghost(
         self, at: np.ndarray, quaternion_xyzw: np.ndarray, center_of_mass: np.ndarray, names: tuple[str, str]
     ) -> None:
         """The ghost's COM at a point of the picture (3,), in this attitude; its COM (3,) in scaled mesh coordinates.
-        names: of body and ghost, each written at a point of its own on them, away from the contacts' names.
+        names: of body and ghost. Call it after ``place``.
         """
         self._ghost_frame.position = at
         self._ghost_frame.wxyz = wxyz(quaternion_xyzw)
         if self._surface is not None:
             self._ghost.position = (self._middle * self._scale - center_of_mass) / self._unit
-        points, apart = self._named_points(), center_of_mass - self._center_of_mass
-        for label, point, name in zip(self._names, (points[0], points[1] - apart), names, strict=True):
-            label.position = point / self._unit
-            if label.text != name:
-                label.text = name
-        for node in (self._ghost_frame, *self._names):
-            set_visible(node, True)
+        set_visible(self._ghost_frame, True)
+        coms, apart = np.array([self._frame.position, at]), center_of_mass - self._center_of_mass
+        w, x, y, z = self._frame.wxyz
+        attitudes = matrix_from_quaternion(np.array([(x, y, z, w), quaternion_xyzw]))
+        points = self._far_points - np.array([np.zeros(3), apart])
+        drawn = coms + np.einsum("kij,kj->ki", attitudes, points) / self._unit
+        were_shown = self._names.shown
+        self._names.show(names, coms, drawn, self.radius / self._unit)
+        if not were_shown:
+            self._govern_contacts()
 
-    def _named_points(self) -> np.ndarray:
-        """Where the names of body and ghost stand, (2, 3) [m, from the body's COM]: vertices far from the contacts,
-        where other names stand, from the COM and from each other; found anew where one of these has moved.
-        """
-        written = self._contacts.values() if self._mesh_name == self._contacts_mesh else ()
-        of = (self._shape, *written)
-        if self._name_points[0] != of:
-            if self._surface is None:
-                points = self.radius * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-            else:
-                vertices = self._surface.vertices * self._scale - self._center_of_mass
-                taken = [np.zeros(3), *(np.array(point) * self._scale - self._center_of_mass for point in written)]
-                for _ in self._names:
-                    nearest = np.min([np.einsum("ij,ij->i", vertices - p, vertices - p) for p in taken], axis=0)
-                    taken.append(vertices[int(np.argmax(nearest))])
-                points = np.array(taken[-2:])
-            self._name_points = of, points
-        return self._name_points[1]
+
+def _far_points(surface: Surface | None, scale: np.ndarray, center_of_mass: np.ndarray, radius: float) -> np.ndarray:
+    """Two points (2, 3) [m, from the COM] of a body, far from the COM and from each other."""
+    if surface is None:
+        return radius * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    vertices = surface.vertices * scale - center_of_mass
+    distances = np.einsum("ij,ij->i", vertices, vertices)
+    first = vertices[int(np.argmax(distances))]
+    away = vertices - first
+    second = vertices[int(np.argmax(np.minimum(distances, np.einsum("ij,ij->i", away, away))))]
+    return np.array([first, second])
 
 
 def body_corners(scenario: Scenario) -> np.ndarray:

@@ -47,6 +47,9 @@ SWITCHES = {
 }
 """What can be shown beside the body, and whether it is at first."""
 
+HINTS = {"Contacts": "Names of the lesson's contacts, while no ghost is shown"}
+"""Of switches that don't say it all."""
+
 ZOOM = (0.15, 1.2)
 """Body sizes in the picture's units between which a body may grow or shrink before the picture is scaled anew."""
 

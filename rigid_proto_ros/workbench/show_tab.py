@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from .controls import parse_numbers
-from .scene_view import SWITCHES, SceneView
+from .scene_view import HINTS, SWITCHES, SceneView
 from .status import Announcements
 
 
@@ -29,7 +29,7 @@ class ShowTab:
         self._switches: dict[str, Any] = {}
         with tabs.add_tab("Show"):
             for name, shown in SWITCHES.items():
-                self._switches[name] = switch = gui.add_checkbox(name, shown)
+                self._switches[name] = switch = gui.add_checkbox(name, shown, hint=HINTS.get(name))
 
                 @switch.on_update
                 async def _(_: viser.GuiEvent[Any], name: str = name, switch: Any = switch) -> None:

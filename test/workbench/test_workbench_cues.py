@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from scene_stand_in import SceneStandIn
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.rerun_view.plot_range import plot_range
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -21,7 +24,7 @@ from rigid_proto_ros.workbench.body_view import BodyView, Switches
 from rigid_proto_ros.workbench.keys import KEYS
 from rigid_proto_ros.workbench.motion_arrows import MotionArrows, length_text
 from rigid_proto_ros.workbench.poke_mark import PokeMark
-from rigid_proto_ros.workbench.scene_view import SWITCHES
+from rigid_proto_ros.workbench.scene_view import CAMERA, SWITCHES, SceneView
 from rigid_proto_ros.workbench.soft_shadow import CELLS, sampled, shadow_picture
 from rigid_proto_ros.workbench.surroundings import CELL, SECTION, Surroundings
 from rigid_proto_ros.workbench.trails import COM_TRAIL, POINT_TRAIL, Trails, farthest_point
@@ -215,10 +218,8 @@ def test_no_label_begins_empty_for_viser_would_never_show_it() -> None:
     assert len(labels) >= 5 and all(label.arguments[0] for label in labels)
 
 
-def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_one() -> None:
-    from types import SimpleNamespace
-
-    from rigid_proto_ros.workbench.scene_view import SceneView
+def ghost_view() -> tuple[SceneStandIn, SceneView]:
+    """A picture without a browser."""
 
     class Scene(SceneStandIn):
         def __getattr__(self, method: str):
@@ -227,31 +228,77 @@ def test_a_ghost_and_its_body_are_named_where_they_are_and_only_while_there_is_o
         world_axes = SimpleNamespace(visible=True)
 
     scene = Scene()
-    view = SceneView(SimpleNamespace(scene=scene, initial_camera=SimpleNamespace()))
+    return scene, SceneView(SimpleNamespace(scene=scene, initial_camera=SimpleNamespace()))
+
+
+def test_the_names_of_body_and_ghost_are_apart_from_every_side_and_the_contacts_names_give_way() -> None:
+    scene, view = ghost_view()
     scenario = read_scene("true_or_box_tensor", {})
     view.set_body(scenario, zoom=True)
-    row, com = np.array([*scenario.setup.initial]), scenario.ghost.body.center_of_mass
-    labels = [scene.nodes[f"/{whose}/name"] for whose in ("body", "ghost")]
-    view.show_ghost(row, com, ("true", "its box"))
-    assert [label.text for label in labels] == ["true", "its box"] and all(label.visible for label in labels)
-    # Each at a point of its own, away from the contacts' names, on the body and the ghost as they lie.
-    contacts = [np.array(point) for point in scenario.parameters.contacts.values()]
     view.body.label_contacts(scenario.parameters.contacts, "l_bracket")
-    view.show_ghost(row, com, ("true", "its box"))
-    own = scenario.setup.body.center_of_mass
-    places = [label.position * view.unit + c for label, c in zip(labels, (own, com), strict=True)]
-    vertices = scenario.setup.surface.vertices
-    for place in places:
-        assert np.abs(vertices - place).max(axis=1).min() < 1e-12
-    for one, other in combinations((*contacts, *places), 2):
-        if not (one is contacts[0] and other is contacts[1]):
-            assert np.linalg.norm(one - other) > 0.4 * view.radius  # measured 0.65 at the least
-    # Whichever of the two a browser draws first: the floor's lines are seen through the shadow.
-    view.place(row, 0.0)
+    contacts = [scene.nodes[f"/body/contact_{name}"] for name in scenario.parameters.contacts]
+    assert all(label.visible for label in contacts)
+    setup, com = scenario.setup, scenario.ghost.body.center_of_mass
+    labels = [scene.nodes[f"/names/{whose}"] for whose in ("body", "ghost")]
+    lines = [scene.nodes[f"/names/{whose}_line"] for whose in ("body", "ghost")]
+    body_run, ghost_run = Simulation(setup), Simulation(scenario.ghost)
+    lower = set()
+    for k in range(40):
+        row, ghost = (run.advance(k * 10**8).row.copy() for run in (body_run, ghost_run))
+        ghost[2] += 0.15 * view.radius * (k - 20)  # in its turn far below the body and far above it
+        view.place(row, 0.1 * k)
+        view.show_motion(row[0:3], State(0, row).angular_momentum(setup.body.inertia), np.ones(3))
+        view.show_ghost(ghost, com, ("body: solid (true)", "ghost: bounding box"))
+        lower.add(min((0, 1), key=lambda which: labels[which].position[2]))
+        for angle in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
+            for elevation in (-0.2, 0.4, 1.2, 1.5):
+                assert not overlap(*(on_screen(label, angle, elevation) for label in labels))
+        # As a page looks at first, L's own is apart, too.
+        angle, elevation = np.arctan2(CAMERA[1], CAMERA[0]), np.arctan2(CAMERA[2], np.hypot(*CAMERA[:2]))
+        texts = [on_screen(label, angle, elevation) for label in (*labels, scene.nodes["/momentum_label"])]
+        assert not any(overlap(one, other) for one, other in combinations(texts, 2))
+        # Each leads to a point of its own body, as it lies.
+        for line, pose, own in zip(lines, (row, ghost), (setup.body.center_of_mass, com), strict=True):
+            point = (line.points[0, 1] * view.unit - pose[0:3]) @ matrix_from_quaternion(pose[3:7]) + own
+            assert np.abs(setup.surface.vertices - point).max(axis=1).min() < 1e-12
+    assert lower == {0, 1}
+    assert not any(label.visible for label in contacts)
+    view.show_ghost(None, com, ("body", "ghost"))
+    assert not any(node.visible for node in (*labels, *lines)) and all(label.visible for label in contacts)
+    view.switch("Contacts", False)
+    view.show_ghost(ghost, com, ("body", "ghost"))
+    view.show_ghost(None, com, ("body", "ghost"))
+    assert not any(label.visible for label in contacts)
+
+
+def on_screen(label: SimpleNamespace, angle: float, elevation: float) -> tuple[float, float, float, float]:
+    """Left, right, lower and upper edge of a label's text [pixels], seen from this direction [rad] at the distance that
+    a page has at first; letters are 8 pixels wide and 14 high.
+    """
+    toward = np.array([np.cos(angle) * np.cos(elevation), np.sin(angle) * np.cos(elevation), np.sin(elevation)])
+    right = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    up = np.cross(toward, right)
+    away = np.linalg.norm(CAMERA) - label.position @ toward
+    x, y = np.array([label.position @ right, label.position @ up]) / away * 400.0 / np.tan(np.radians(20.0))
+    wide = 8.0 * len(label.text)
+    vertical, horizontal = label.anchor.split("-")
+    left = x - wide if horizontal == "right" else x
+    low = y if vertical == "bottom" else y - 14.0
+    return left, left + wide, low, low + 14.0
+
+
+def overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Whether two rectangles share more than an edge."""
+    return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
+
+
+def test_the_floor_is_seen_through_the_shadow_whichever_a_browser_draws_first() -> None:
+    scene, view = ghost_view()
+    scenario = read_scene("true_or_box_tensor", {})
+    view.set_body(scenario, zoom=True)
+    view.place(np.array([*scenario.setup.initial]), 0.0)
     view.place_surroundings(False)
     assert scene.nodes["/grid/shadow"].position[2] < scene.nodes["/grid/floor"].position[2]
-    view.show_ghost(None, com, ("true", "its box"))
-    assert not any(label.visible for label in labels)
 
 
 @pytest.mark.parametrize("follower", ["ball", "explicit"])
