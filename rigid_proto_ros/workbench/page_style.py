@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""How the page is laid out on a narrow screen and on paper: the picture above, below it and not over it readouts and
-controls; on paper all of them, however far they were scrolled. What is said in the corner keeps its lines.
+"""How the page is laid out on narrow screens and on paper. On a telephone, and on any narrow window that is higher than
+wide, the picture is above and the panel below it, not over it; a narrow window that is wider than high leaves it three
+fifths of the width. On paper the whole panel is below the picture, however far it was scrolled. What is said in the
+corner keeps its lines.
 
 viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a
-long way down; it has no setting for either. A style sheet can change it, and viser passes HTML of its server's on to
+long way down; wider pages get a panel of one width, however little is left beside it. It has no setting for any of
+this. A style sheet can change it, and viser passes HTML of its server's on to
 the page, style sheets included. The rules recognise the elements by the styles that viser 1.1 gives them;
 test_workbench_screen.py fails where another version gives others.
 """
@@ -15,12 +18,26 @@ import viser
 NARROW = "36em"
 """Pages up to this width get viser's sheet at the bottom (its theme's breakpoint ``xs``)."""
 
+MEDIUM = "(min-width: 36.01em) and (max-width: 59.4em)"
+"""Pages on which the panel beside the picture would have more than 40 % of the width."""
+
 PICTURE_SHARE = 56
 """[%] Of a narrow page's height."""
+
+BESIDE_SHARE = 60
+"""[%] Of the width, of a picture that has the panel beside it."""
+
+PANEL_PIXELS = 380
+"""Width of the panel beside the picture, until a user drags its edge."""
 
 _SHEET = '.mantine-Paper-root[style*="position: fixed"][style*="max-height: 60%"]'
 _READOUTS = '[aria-label$=" panel Readouts"]'
 _PICTURE = 'div[style*="flex-grow: 1"][style*="height: 100%"]:has(canvas)'
+
+_DOCKED = f"width: {PANEL_PIXELS + 4}px"  # with its edges
+_DOCK = f'[style*="right: 0px"][style*="{_DOCKED}"]'
+_DOCKED_PICTURE = f'[style*="inset: 0px {PANEL_PIXELS + 4}px 0px 0px"]'
+_DOCKED_COLUMN = f'{_DOCK} [style*="flex-direction: column"][style*="overflow: hidden auto"]'
 
 _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
 _SCROLLED = ".mantine-ScrollArea-viewport"
@@ -36,6 +53,16 @@ STYLE = f"""<style>
   }}
   {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}) {{ order: -1; }}
   {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
+}}
+@media {MEDIUM} {{ {_DOCK} [style*="{_DOCKED}"] {{ width: 100% !important; }} }}
+@media {MEDIUM} and (orientation: landscape) {{
+  {_DOCK} {{ width: {100 - BESIDE_SHARE}% !important; }}
+  {_DOCKED_PICTURE} {{ right: {100 - BESIDE_SHARE}% !important; }}
+}}
+@media {MEDIUM} and (orientation: portrait) {{
+  {_DOCK} {{ width: 100% !important; top: {PICTURE_SHARE}% !important; }}
+  {_DOCKED_PICTURE} {{ inset: 0 0 {100 - PICTURE_SHARE}% 0 !important; }}
+  {_DOCKED_COLUMN} {{ flex-direction: row !important; }}
 }}
 @media print {{
   html, body, #root, div:has({_SCROLLED}), div:has({_CANVAS}), .mantine-ScrollArea-root, {_SCROLLED} {{

@@ -18,10 +18,9 @@ from websockets.http11 import Request, Response
 
 from ..base.errors import InputError
 from .listening import check_address
-from .page_style import lay_out
+from .page_style import PANEL_PIXELS, lay_out
 from .viser_internals import Gate, refuse_tunnels, requests_go_through
 
-PANEL_PIXELS = 380
 TITLE = "rigid_proto workbench"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "::1")
 
