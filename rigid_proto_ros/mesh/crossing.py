@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Triangles that pass through each other: of one surface, which then counts twice what it encloses twice, or of two.
 
-Both ends of a pair of nodes descend a tree of boxes together (Gottschalk, Lin, Manocha, SIGGRAPH 1996), and of two
-triangles near each other those that lie wholly on one side of the other's plane are passed over (Möller, Journal of
-Graphics Tools 2, 1997).
+Both ends of a pair of nodes descend a tree of boxes together (Gottschalk, Lin, Manocha, SIGGRAPH 1996).
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -16,6 +12,7 @@ from ..base.compilation import njit
 from .cells import FIELD, NO_BOX, least, meet, most, triangle_boxes, vertex_cells
 from .patch_pairs import apart_patches, may_cross
 from .patches import surface_patches
+from .piercing import cross, on_both_sides
 from .tree import CELLS, CELLS_BITS, along_curve, curve_place
 
 LEAF = 4
@@ -30,6 +27,13 @@ WORK_LIMIT = 100_000_000
 _BATCH = 128
 _PORTION = 512
 """Pairs of leaves looked at together: loops without a branch that depends on the mesh are several times faster."""
+
+_DE_BRUIJN = 0x09AF
+"""Times a power of two below 2¹⁶, its highest four of 16 bits tell which (Leiserson, Prokop, Randall 1998)."""
+_PAIR_OF_MARK = np.empty(LEAF * LEAF, dtype=np.int64)
+"""By these bits the pair of places in two leaves, i·2³² + j, that bit LEAF·i + j stands for."""
+for _bit in range(LEAF * LEAF):
+    _PAIR_OF_MARK[((_DE_BRUIJN << _bit) & 0xFFFF) >> 12] = (_bit // LEAF << 32) | _bit % LEAF
 
 
 @njit(cache=True, nogil=True)
@@ -81,9 +85,9 @@ def _by_patches(order: np.ndarray, patch: np.ndarray) -> tuple[np.ndarray, np.nd
 @njit(cache=True, nogil=True)
 def _tree(
     boxes: np.ndarray, corners: np.ndarray, order: np.ndarray, leaf_patch: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the triangles in ``order``, leaf by leaf: corner numbers (n, 3), boxes (leaves·LEAF, 2), and the nodes above
-    them (2·leaves − 1, 4): box, the corner that all their triangles have, or −1, and the patch that all are of, or −1.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of the triangles in ``order``, leaf by leaf: corner numbers (n, 3), lower and upper corners (leaves·LEAF,) of
+    their boxes, and the nodes above them (2·leaves − 1, 4): box, the corner that all their triangles have, or −1, and the patch that all are of, or −1.
 
     Node i has the children 2i + 1 and 2i + 2.
     """
@@ -91,8 +95,8 @@ def _tree(
     leaves = 1
     while leaves < len(leaf_patch):
         leaves *= 2
-    numbers, own = np.zeros((count, 3), np.int32), np.empty((leaves * LEAF, 2), np.int64)
-    own[:, 0], own[:, 1] = NO_BOX
+    numbers = np.zeros((count, 3), np.int32)
+    lower, upper = np.full(leaves * LEAF, NO_BOX[0]), np.full(leaves * LEAF, NO_BOX[1])
     nodes = np.full((2 * leaves - 1, 4), -1)
     for leaf in range(leaves):
         node, first = leaves - 1 + leaf, leaf * LEAF
@@ -104,8 +108,8 @@ def _tree(
         while last < first + LEAF and order[last] >= 0:
             for corner in range(3):
                 numbers[last, corner] = corners[order[last], corner]
-            own[last, 0], own[last, 1] = boxes[order[last], 0], boxes[order[last], 1]
-            nodes[node, 0], nodes[node, 1] = least(nodes[node, 0], own[last, 0]), most(nodes[node, 1], own[last, 1])
+            lower[last], upper[last] = boxes[order[last], 0], boxes[order[last], 1]
+            nodes[node, 0], nodes[node, 1] = least(nodes[node, 0], lower[last]), most(nodes[node, 1], upper[last])
             last += 1
         for corner in range(3):
             shared = numbers[first, corner]
@@ -120,57 +124,7 @@ def _tree(
         for k in range(2, 4):
             if nodes[one, k] == nodes[other, k]:
                 nodes[node, k] = nodes[one, k]
-    return numbers, own, nodes
-
-
-@njit(cache=True, nogil=True)
-def _pierces(vertices: np.ndarray, numbers: np.ndarray, i: int, j: int) -> tuple[bool, bool]:
-    """(apart, pierced): whether the corners of triangle j all lie on one side of the plane of triangle i, or in it;
-    whether one of its sides passes properly through that. Touching and coplanar cases don't count.
-    """
-    a, b, c = numbers[i, 0], numbers[i, 1], numbers[i, 2]
-    ax, ay, az = vertices[a, 0], vertices[a, 1], vertices[a, 2]
-    ux, uy, uz = vertices[b, 0] - ax, vertices[b, 1] - ay, vertices[b, 2] - az
-    wx, wy, wz = vertices[c, 0] - ax, vertices[c, 1] - ay, vertices[c, 2] - az
-    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    a, b, c = numbers[j, 0], numbers[j, 1], numbers[j, 2]
-    d0 = (vertices[a, 0] - ax) * nx + (vertices[a, 1] - ay) * ny + (vertices[a, 2] - az) * nz
-    d1 = (vertices[b, 0] - ax) * nx + (vertices[b, 1] - ay) * ny + (vertices[b, 2] - az) * nz
-    d2 = (vertices[c, 0] - ax) * nx + (vertices[c, 1] - ay) * ny + (vertices[c, 2] - az) * nz
-    low, high = min(d0, d1, d2), max(d0, d1, d2)
-    if low >= 0.0 or high <= 0.0:
-        return True, False
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    margin = 1e-9 * size * (abs(ux) + abs(uy) + abs(uz) + abs(wx) + abs(wy) + abs(wz))
-    if not (high > margin and low < -margin):
-        return False, False
-    n2 = size * size
-    for side in range(3):
-        end = (side + 1) % 3
-        ds = d0 if side == 0 else d1 if side == 1 else d2
-        dt = d1 if side == 0 else d2 if side == 1 else d0
-        if (ds > margin and dt < -margin) or (ds < -margin and dt > margin):
-            share = ds / (ds - dt)
-            s, t = numbers[j, side], numbers[j, end]
-            x = vertices[s, 0] + share * (vertices[t, 0] - vertices[s, 0]) - ax
-            y = vertices[s, 1] + share * (vertices[t, 1] - vertices[s, 1]) - ay
-            z = vertices[s, 2] + share * (vertices[t, 2] - vertices[s, 2]) - az
-            # Barycentric coordinates from the areas against the normal.
-            beta = ((y * wz - z * wy) * nx + (z * wx - x * wz) * ny + (x * wy - y * wx) * nz) / n2
-            gamma = ((uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz) / n2
-            if beta > 1e-9 and gamma > 1e-9 and beta + gamma < 1.0 - 1e-9:
-                return False, True
-    return False, False
-
-
-@njit(cache=True, nogil=True)
-def _cross(vertices: np.ndarray, numbers: np.ndarray, i: int, j: int) -> bool:
-    """Whether triangles i and j pass properly through each other."""
-    apart, first = _pierces(vertices, numbers, i, j)
-    if apart:
-        return False
-    apart, second = _pierces(vertices, numbers, j, i)
-    return not apart and (first or second)
+    return numbers, lower, upper, nodes
 
 
 @njit(cache=True, nogil=True)
@@ -183,22 +137,34 @@ def _touch(numbers: np.ndarray, i: int, j: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _near(own: np.ndarray, leaf_pairs: np.ndarray, count: int, inner: int, near: np.ndarray) -> int:
-    """Put the pairs of triangles, one of each leaf of the first ``count`` pairs, whose boxes meet into ``near``, and
-    return how many; ``inner`` nodes stand before the leaves.
+def _near(lower: np.ndarray, upper: np.ndarray, leaf_pairs: np.ndarray, count: int, inner: int, near: np.ndarray) -> int:
+    """Put the pairs of triangles, one of each leaf of the first ``count`` pairs, whose boxes meet into ``near``, as
+    i·2³² + j, and return how many; ``inner`` nodes stand before the leaves.
     """
+    marks = np.empty(count, np.int64)
+    for pair in range(count):
+        first, second = (leaf_pairs[pair, 0] - inner) * LEAF, (leaf_pairs[pair, 1] - inner) * LEAF
+        marks[pair] = 0
+        for i in range(LEAF):
+            for j in range(LEAF):
+                both = meet(lower[first + i], upper[first + i], lower[second + j], upper[second + j])
+                marks[pair] |= np.int64(both) << (LEAF * i + j)
     found = 0
     for pair in range(count):
         first, second = (leaf_pairs[pair, 0] - inner) * LEAF, (leaf_pairs[pair, 1] - inner) * LEAF
-        for i in range(first, first + LEAF):
-            for j in range(second, second + LEAF):
-                near[found, 0], near[found, 1] = i, j
-                found += meet(own[i, 0], own[i, 1], own[j, 0], own[j, 1])
+        left = marks[pair]
+        while left:
+            lowest = left & -left
+            left ^= lowest
+            near[found] = ((first << 32) | second) + _PAIR_OF_MARK[((lowest * _DE_BRUIJN) & 0xFFFF) >> 12]
+            found += 1
     return found
 
 
 @njit(cache=True, nogil=True)
-def _near_within(own: np.ndarray, leaf_patch: np.ndarray, first: int, last: int, near: np.ndarray) -> int:
+def _near_within(
+    lower: np.ndarray, upper: np.ndarray, leaf_patch: np.ndarray, first: int, last: int, near: np.ndarray
+) -> int:
     """The same for the pairs within each leaf from ``first`` to last − 1, but for those of one patch."""
     found = 0
     for leaf in range(first, last):
@@ -206,8 +172,8 @@ def _near_within(own: np.ndarray, leaf_patch: np.ndarray, first: int, last: int,
             continue
         for i in range(leaf * LEAF, (leaf + 1) * LEAF):
             for j in range(i + 1, (leaf + 1) * LEAF):
-                near[found, 0], near[found, 1] = i, j
-                found += meet(own[i, 0], own[i, 1], own[j, 0], own[j, 1])
+                near[found] = (i << 32) | j
+                found += meet(lower[i], upper[i], lower[j], upper[j])
     return found
 
 
@@ -219,20 +185,20 @@ def _count_crossings(
     left = 0
     if len(between) == 0:
         for pair in range(count):
-            i, j = near[pair, 0], near[pair, 1]
-            near[left, 0], near[left, 1] = i, j
+            i, j = near[pair] >> 32, near[pair] & 0xFFFFFFFF
+            near[left] = near[pair]
             left += (not _touch(numbers, i, j)) & (component[i] == component[j])
     else:
         for pair in range(count):
-            i, j = near[pair, 0], near[pair, 1]
-            near[left, 0], near[left, 1] = i, j
+            i, j = near[pair] >> 32, near[pair] & 0xFFFFFFFF
+            near[left] = near[pair]
             left += between[component[i], component[j]]
     found = 0
-    for pair in range(left):
-        i, j = near[pair, 0], near[pair, 1]
+    for pair in range(on_both_sides(vertices, numbers, near, left)):
+        i, j = near[pair] >> 32, near[pair] & 0xFFFFFFFF
         if len(between) == 0:
-            found += _cross(vertices, numbers, i, j)
-        elif between[component[i], component[j]] and _cross(vertices, numbers, i, j):
+            found += cross(vertices, numbers, i, j)
+        elif between[component[i], component[j]] and cross(vertices, numbers, i, j):
             found += 1
             between[component[i], component[j]] = between[component[j], component[i]] = False
     return found
@@ -316,17 +282,17 @@ def _crossings(
     that share a corner don't count.
     """
     order, leaf_patch = _by_patches(_order(boxes, chosen), patch)
-    numbers, own, nodes = _tree(boxes, corners, order, leaf_patch)
+    numbers, lower, upper, nodes = _tree(boxes, corners, order, leaf_patch)
     component = component[order]
     if len(between) > 0:
         nodes[:, 2] = -1
     leaves = (len(nodes) + 1) // 2
-    near = np.empty(((_PORTION + 4 * _BATCH) * LEAF * LEAF + 1, 2), np.int32)
+    near = np.empty((_PORTION + 4 * _BATCH) * LEAF * LEAF + 1, np.int64)
     found = visits = 0
     for first in range(0, len(leaf_patch), _PORTION):
         last = min(first + _PORTION, len(leaf_patch))
         visits += (last - first) * LEAF * LEAF
-        hits = _near_within(own, leaf_patch, first, last, near)
+        hits = _near_within(lower, upper, leaf_patch, first, last, near)
         found += _count_crossings(vertices, numbers, component, near, hits, between)
     leaf_pairs, stack = np.empty((_PORTION + 4 * _BATCH + 1, 2), np.int32), np.empty((200 * _BATCH, 2), np.int32)
     top = count = node = 0
@@ -342,7 +308,7 @@ def _crossings(
             visits += count * LEAF * LEAF
             if visits > limit:
                 return found, False
-            hits = _near(own, leaf_pairs, count, leaves - 1, near)
+            hits = _near(lower, upper, leaf_pairs, count, leaves - 1, near)
             found += _count_crossings(vertices, numbers, component, near, hits, between)
             count = 0
         if done:
