@@ -51,7 +51,7 @@ def extents(vertices: np.ndarray, corners: np.ndarray, patch: np.ndarray, count:
 
 
 @njit(cache=True, nogil=True)
-def vertex_cells(vertices: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def _vertex_cells(vertices: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Of each vertex (n,) the cell that it lies in; any number for one that no triangle of ``corners`` (m, 3) has."""
     box = extents(vertices, corners, np.zeros(len(corners), np.int32), 1)[0]
     cells = np.zeros(len(vertices), np.int64)
@@ -85,8 +85,9 @@ def meet(a_low: int, a_high: int, b_low: int, b_high: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def triangle_boxes(cells: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Lower and upper corner (m, 2) of each triangle."""
+def triangle_boxes(vertices: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Lower and upper corner (m, 2), in cells, of each triangle of ``corners`` (m, 3) over vertices (n, 3)."""
+    cells = _vertex_cells(vertices, corners)
     boxes = np.empty((len(corners), 2), np.int64)
     for t in range(len(corners)):
         a, b, c = cells[corners[t, 0]], cells[corners[t, 1]], cells[corners[t, 2]]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
-from .cells import FIELD, NO_BOX, least, meet, most, triangle_boxes, vertex_cells
+from .cells import NO_BOX, least, meet, most, triangle_boxes
 from .patch_pairs import apart_patches, may_cross
 from .patches import surface_patches
 from .piercing import cross, on_both_sides
-from .tree import CELLS, CELLS_BITS, along_curve, curve_place
+from .tree import along_curve
 
 LEAF = 4
 """Triangles in a leaf."""
@@ -23,6 +23,9 @@ SELF_LIMIT = 30_000_000
 """Pairs of boxes compared after which the search within surfaces ends, some tenths of a second."""
 WORK_LIMIT = 100_000_000
 """Pairs of boxes after which the search between surfaces ends undecided: about a second."""
+
+FEW_COMPONENTS = 64
+"""Components up to which each triangle's box is first compared with those of the other components."""
 
 _BATCH = 128
 _PORTION = 512
@@ -34,22 +37,6 @@ _PAIR_OF_MARK = np.empty(LEAF * LEAF, dtype=np.int64)
 """By these bits the pair of places in two leaves, i·2³² + j, that bit LEAF·i + j stands for."""
 for _bit in range(LEAF * LEAF):
     _PAIR_OF_MARK[((_DE_BRUIJN << _bit) & 0xFFFF) >> 12] = (_bit // LEAF << 32) | _bit % LEAF
-
-
-@njit(cache=True, nogil=True)
-def _order(boxes: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The triangles numbered ``chosen`` (k,) by the places of the centres of their ``boxes`` (m, 2) along the curve."""
-    places = np.empty(len(chosen), np.int64)
-    shift = FIELD - CELLS_BITS
-    for i in range(len(chosen)):
-        # The sum of two counts has room for one bit more.
-        middle = boxes[chosen[i], 0] + boxes[chosen[i], 1]
-        places[i] = curve_place(
-            (middle >> shift) & (CELLS - 1),
-            (middle >> (FIELD + shift)) & (CELLS - 1),
-            (middle >> (2 * FIELD + shift)) & (CELLS - 1),
-        )
-    return along_curve(places, chosen)
 
 
 @njit(cache=True, nogil=True)
@@ -87,7 +74,8 @@ def _tree(
     boxes: np.ndarray, corners: np.ndarray, order: np.ndarray, leaf_patch: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Of the triangles in ``order``, leaf by leaf: corner numbers (n, 3), lower and upper corners (leaves·LEAF,) of
-    their boxes, and the nodes above them (2·leaves − 1, 4): box, the corner that all their triangles have, or −1, and the patch that all are of, or −1.
+    their boxes, and the nodes above them (2·leaves − 1, 4): box, the corner that all their triangles have, or −1, and
+    the patch that all are of, or −1.
 
     Node i has the children 2i + 1 and 2i + 2.
     """
@@ -137,7 +125,9 @@ def _touch(numbers: np.ndarray, i: int, j: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _near(lower: np.ndarray, upper: np.ndarray, leaf_pairs: np.ndarray, count: int, inner: int, near: np.ndarray) -> int:
+def _near(
+    lower: np.ndarray, upper: np.ndarray, leaf_pairs: np.ndarray, count: int, inner: int, near: np.ndarray
+) -> int:
     """Put the pairs of triangles, one of each leaf of the first ``count`` pairs, whose boxes meet into ``near``, as
     i·2³² + j, and return how many; ``inner`` nodes stand before the leaves.
     """
@@ -281,7 +271,7 @@ def _crossings(
     first crossing of two clears their mark. Of shape (0, 0) it stands for triangles of one component, of which those
     that share a corner don't count.
     """
-    order, leaf_patch = _by_patches(_order(boxes, chosen), patch)
+    order, leaf_patch = _by_patches(along_curve(boxes, chosen), patch)
     numbers, lower, upper, nodes = _tree(boxes, corners, order, leaf_patch)
     component = component[order]
     if len(between) > 0:
@@ -325,7 +315,7 @@ def _self_crossings(
     patch = np.full(len(corners), -1, np.int32)
     if len(edges) > 0:
         patch = surface_patches(vertices, corners, edges)
-    boxes = triangle_boxes(vertex_cells(vertices, corners), corners)
+    boxes = triangle_boxes(vertices, corners)
     apart = apart_patches(vertices, corners, patch)
     chosen, within = may_cross(boxes, patch, apart), np.zeros((0, 0), np.bool_)
     return _crossings(vertices, corners, component, boxes, patch, apart, chosen, within, limit)[0]
@@ -345,16 +335,32 @@ def self_crossings(
     return int(_self_crossings(vertices, corners, component, edges, SELF_LIMIT))
 
 
+@njit(cache=True, nogil=True)
+def _crossings_between(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    component: np.ndarray,
+    boxes: np.ndarray,
+    apart: np.ndarray,
+    asked: np.ndarray,
+    limit: int,
+) -> bool:
+    """Clear those pairs of components marked in ``asked`` that cross; returns whether ``limit`` sufficed."""
+    part, wanted = component.astype(np.int32), np.zeros(len(asked), np.bool_)
+    for c in range(len(asked)):
+        wanted[c] = asked[c].any()
+    chosen = may_cross(boxes, part, apart) if len(asked) <= FEW_COMPONENTS else np.nonzero(wanted[component])[0]
+    return _crossings(vertices, triangles, component, boxes, part, apart, chosen, asked, limit)[1]
+
+
 def crossing_components(
-    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, chosen: np.ndarray, asked: np.ndarray
+    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, boxes: np.ndarray, asked: np.ndarray
 ) -> tuple[np.ndarray, bool]:
     """Which of the pairs of components marked in ``asked`` (k, k) have triangles that cross, (k, k), and whether
-    WORK_LIMIT comparisons sufficed; of the triangles numbered ``chosen``.
+    WORK_LIMIT comparisons sufficed; boxes (m, 2): the triangles', in cells.
     """
     count, left = len(asked), asked.copy()
     apart = np.zeros((count + 1, count + 1), dtype=bool)
     apart[:count, :count] = ~asked
-    boxes = triangle_boxes(vertex_cells(vertices, triangles), triangles)
-    part = component.astype(np.int32)
-    _, complete = _crossings(vertices, triangles, component, boxes, part, apart, chosen, left, WORK_LIMIT)
+    complete = _crossings_between(vertices, triangles, component, boxes, apart, left, WORK_LIMIT)
     return asked & ~left, complete

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
+from .cells import triangle_boxes
 from .crossing import crossing_components
 from .tree import LEAF, triangle_tree
 
@@ -131,25 +132,45 @@ def _shoot(
 
 
 @njit(cache=True, nogil=True)
+def _samples(component: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """SAMPLES to twice as many triangles (s,) of each component that has one near, or all that it has, and whose they
+    are (s,); component by component."""
+    count = near.shape[0]
+    size, step, places = np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count + 1, np.int64)
+    for t in range(len(component)):
+        size[component[t]] += 1
+    for c in range(count):
+        step[c] = max(1, size[c] // SAMPLES) if near[c].any() else 0
+        places[c + 1] = places[c] + ((size[c] + step[c] - 1) // step[c] if step[c] > 0 else 0)
+    samples, owners = np.empty(places[count], np.int64), np.empty(places[count], np.int64)
+    size[:] = 0
+    for t in range(len(component)):
+        c = component[t]
+        if step[c] > 0 and size[c] % step[c] == 0:
+            samples[places[c]], owners[places[c]] = t, c
+            places[c] += 1
+        size[c] += 1
+    return samples, owners
+
+
+@njit(cache=True, nogil=True)
 def _sides(
     vertices: np.ndarray,
     triangles: np.ndarray,
     component: np.ndarray,
     order: np.ndarray,
     boxes: np.ndarray,
-    samples: np.ndarray,
-    owners: np.ndarray,
     near: np.ndarray,
     reach: float,
     limit: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For samples (s,), triangle numbers of components ``owners`` (s,): how many of each component's samples are
-    outside and inside each other one, (k, k) each, and the components left undecided (k,) when ``limit`` visits didn't
-    suffice.
+    """How many of each component's samples are outside and inside each other one, (k, k) each, and the components left
+    undecided (k,) when ``limit`` visits didn't suffice.
 
     near (k, k): pairs whose boxes overlap.
     """
     count = near.shape[0]
+    samples, owners = _samples(component, near)
     outside, inside = np.zeros((count, count), np.int32), np.zeros((count, count), np.int32)
     undecided = np.zeros(count, np.bool_)
     winding, sure, answer = np.zeros(count, np.int64), np.ones(count, np.bool_), np.zeros(count, np.int8)
@@ -227,20 +248,14 @@ def component_nesting(
     np.fill_diagonal(near, False)
     if not near.any():
         return Nesting(np.zeros((count, count), dtype=bool), (), np.ones(count, dtype=bool), True)
-    order = np.argsort(component, kind="stable")
-    starts = np.searchsorted(component[order], np.arange(count + 1))
-    asked = np.nonzero(near.any(axis=1))[0]
-    picked = [order[starts[c] : starts[c + 1]][:: max(1, (starts[c + 1] - starts[c]) // SAMPLES)] for c in asked]
-    samples, owners = np.concatenate(picked), np.repeat(asked, [len(part) for part in picked])
+    cell_boxes = triangle_boxes(vertices, triangles)
     chosen = np.nonzero(near.any(axis=1)[component])[0]
-    leaf_order, boxes = triangle_tree(vertices, triangles, chosen)
+    leaf_order, boxes = triangle_tree(vertices, triangles, cell_boxes, chosen)
     reach = NEAR * float(np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)))
-    outside, within, undecided = _sides(
-        vertices, triangles, component, leaf_order, boxes, samples, owners, near, reach, WORK_LIMIT
-    )
+    outside, within, undecided = _sides(vertices, triangles, component, leaf_order, boxes, near, reach, WORK_LIMIT)
     found = (outside > 0) & (within > 0)
     found |= found.T
-    crossing, complete = crossing_components(vertices, triangles, component, chosen, near & ~found)
+    crossing, complete = crossing_components(vertices, triangles, component, cell_boxes, near & ~found)
     found |= crossing
     inside = (within > 0) & (outside == 0) & ~found & ~undecided[:, None]
     pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which patches of a surface may cross each other, and which of their triangles."""
+"""Which patches of a surface may cross each other, or components, and which of their triangles."""
 
 from __future__ import annotations
 
@@ -67,7 +67,8 @@ def may_cross(boxes: np.ndarray, patch: np.ndarray, apart: np.ndarray) -> np.nda
             outside += 1
     covers, groups = _cover(boxes, patch, patches), _cover(boxes, group, (outside + size - 1) // size)
     starts = np.zeros(patches + 1, np.int64)
-    others = np.empty((patches * (patches + len(groups)), 2), np.int64)
+    together = patches * patches - np.count_nonzero(apart[:patches, :patches])
+    others = np.empty((together + patches * len(groups) + 1, 2), np.int64)
     count = 0
     for p in range(patches):
         for q in range(patches):

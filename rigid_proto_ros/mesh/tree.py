@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
+from .cells import FIELD
 
 LEAF = 4
 """Triangles in a leaf: fewer cost more boxes, more cost tests in vain."""
@@ -32,36 +33,7 @@ def _spread(cell: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def curve_place(x: int, y: int, z: int) -> int:
-    """The place along the curve of a cell, CELLS along each axis."""
-    return _spread(x) | (_spread(y) << 1) | (_spread(z) << 2)
-
-
-@njit(cache=True, nogil=True)
-def _curve_places(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Places along the curve (k,) of the centres of the triangles numbered ``chosen`` (k,)."""
-    low, size = np.full(3, np.inf), np.full(3, -np.inf)
-    for i in range(len(chosen)):
-        for corner in range(3):
-            for k in range(3):
-                x = vertices[triangles[chosen[i], corner], k]
-                low[k], size[k] = min(low[k], x), max(size[k], x)
-    size -= low
-    places = np.empty(len(chosen), np.int64)
-    cells = np.empty(3, np.int64)
-    for i in range(len(chosen)):
-        for k in range(3):
-            centre = 0.0
-            for corner in range(3):
-                centre += (vertices[triangles[chosen[i], corner], k] - low[k]) / 3.0
-            cell = centre / size[k] * CELLS if size[k] > 0.0 else 0.0
-            cells[k] = min(max(int(cell), 0), CELLS - 1)
-        places[i] = curve_place(cells[0], cells[1], cells[2])
-    return places
-
-
-@njit(cache=True, nogil=True)
-def along_curve(places: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+def _along_curve(places: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """The numbers ``chosen`` (k,) by their places (k,) along the curve, sorted digit by digit; uses up ``places``.
 
     Of few triangles the last digit is left out: they are further apart than it tells.
@@ -88,6 +60,20 @@ def along_curve(places: np.ndarray, chosen: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
+def along_curve(boxes: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The triangles numbered ``chosen`` (k,) by the places along the curve of the centres of their ``boxes`` (m, 2), in
+    cells."""
+    places = np.empty(len(chosen), np.int64)
+    shift = FIELD - CELLS_BITS
+    for i in range(len(chosen)):
+        # The sum of two counts has room for one bit more.
+        middle = boxes[chosen[i], 0] + boxes[chosen[i], 1]
+        x, y, z = middle >> shift, middle >> (FIELD + shift), middle >> (2 * FIELD + shift)
+        places[i] = _spread(x & (CELLS - 1)) | (_spread(y & (CELLS - 1)) << 1) | (_spread(z & (CELLS - 1)) << 2)
+    return _along_curve(places, chosen)
+
+
+@njit(cache=True, nogil=True)
 def _boxes(vertices: np.ndarray, triangles: np.ndarray, order: np.ndarray, leaves: int) -> np.ndarray:
     """Lower and upper corners of all nodes (2·leaves − 1, 6); an empty node's lower corner lies above its upper one."""
     boxes = np.empty((2 * leaves - 1, 6))
@@ -107,11 +93,15 @@ def _boxes(vertices: np.ndarray, triangles: np.ndarray, order: np.ndarray, leave
     return boxes
 
 
-def triangle_tree(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(order, boxes) of the triangles numbered ``chosen`` (k,): their order (k,) along the curve, leaf after leaf, and
-    the nodes' boxes (2·leaves − 1, 6), lower and upper corner; leaf l is node leaves − 1 + l.
+@njit(cache=True, nogil=True)
+def triangle_tree(
+    vertices: np.ndarray, triangles: np.ndarray, cell_boxes: np.ndarray, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(order, boxes) of the triangles numbered ``chosen`` (k,), whose boxes in cells are ``cell_boxes`` (m, 2): their
+    order (k,) along the curve, leaf after leaf, and the nodes' boxes (2·leaves − 1, 6), lower and upper corner; leaf l
+    is node leaves − 1 + l.
     """
-    order = along_curve(_curve_places(vertices, triangles, chosen), chosen)
+    order = along_curve(cell_boxes, chosen)
     leaves = 1
     while leaves * LEAF < len(order):
         leaves *= 2

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mass_solids import box, sphere
 
+from rigid_proto_ros.mesh.cells import triangle_boxes
 from rigid_proto_ros.mesh.crossing import crossing_components, self_crossings
 from rigid_proto_ros.mesh.patches import surface_patches
 from rigid_proto_ros.mesh.topology import mesh_topology
@@ -56,7 +57,7 @@ def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
     expected = np.zeros((40, 40), dtype=bool)
     for i, j in pairs:
         expected[component[i], component[j]] = expected[component[j], component[i]] = True
-    found, complete = crossing_components(points, corners, component, np.arange(count), asked)
+    found, complete = crossing_components(points, corners, component, triangle_boxes(points, corners), asked)
     assert complete and np.array_equal(found, expected & asked)
     assert found.any() and not found.all()
 
@@ -90,7 +91,7 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
     points = soup(1000, 7)
     corners = np.arange(3000).reshape(-1, 3)
     chosen = np.arange(0, 1000, 3)
-    order, boxes = triangle_tree(points, corners, chosen)
+    order, boxes = triangle_tree(points, corners, triangle_boxes(points, corners), chosen)
     assert sorted(order.tolist()) == chosen.tolist()
     leaves = (len(boxes) + 1) // 2
     for place, triangle in enumerate(order.tolist()):
