@@ -36,14 +36,15 @@ _UNKNOWN, _OUTSIDE, _INSIDE = 0, 1, 2
 
 
 @njit(cache=True, nogil=True)
-def _may_hit(box: np.ndarray, origin: np.ndarray, inverse: np.ndarray) -> bool:
-    """Whether the ray from ``origin`` meets the box; inverse (3,): 1/direction."""
+def _may_hit(box: np.ndarray, origin: np.ndarray, inverse: np.ndarray, reach: float) -> bool:
+    """Whether the ray from ``origin`` comes within ``reach`` of the box, so that no hit is lost that isn't sure; inverse
+    (3,): 1/direction.
+    """
     near, far = 0.0, math.inf
     for k in range(3):
-        a, b = (box[k] - origin[k]) * inverse[k], (box[3 + k] - origin[k]) * inverse[k]
+        a, b = (box[k] - reach - origin[k]) * inverse[k], (box[3 + k] + reach - origin[k]) * inverse[k]
         near, far = max(near, min(a, b)), min(far, max(a, b))
-    # A little wider than the box: its own roundings must not lose a hit.
-    return near <= far * (1.0 + 1e-14) + 1e-300
+    return near <= far
 
 
 @njit(cache=True, nogil=True)
@@ -114,7 +115,7 @@ def _shoot(
         top -= 1
         node = stack[top]
         visits += 1
-        if not _may_hit(boxes[node], origin, inverse):
+        if not _may_hit(boxes[node], origin, inverse, reach):
             continue
         if node < leaves - 1:
             stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2

@@ -58,6 +58,15 @@ def test_an_overlap_of_roundings_size_is_no_warning():
     assert severities.get("overlapping_components", "info") == "info"
 
 
+def test_a_part_that_stands_on_another_one_does_not_overlap_it_however_their_heights_are_rounded():
+    """Rays begin within rounding of faces that the other part has in common; of these heights two gave an overlap."""
+    for height in np.linspace(0.1, 0.9, 41):
+        plate, (foot, triangles) = box((2.0, 2.0, height), 8), box((1.0, 1.0, 0.25), 6)
+        foot = foot + (0.37, 0.37, 0.125)  # now from 0 up
+        vertices, triangles = together(plate, (foot + (0.0, 0.0, plate[0][:, 2].max()), triangles))
+        assert body((vertices, triangles)).verdict.findings == []
+
+
 def test_a_solid_in_a_solid_says_what_each_reading_gives():
     # An edge of 2 around one of 1.
     nested = together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))
