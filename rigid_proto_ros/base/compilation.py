@@ -104,14 +104,20 @@ _USUAL = "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPyth
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def njit(*signature: Any, **options: Any) -> Callable[[_Function], _Function]:
-    """numba's, with kernels kept by ``KernelLocator``. To a type checker what it makes is the Python function."""
+def njit(*signature: Any, allocates: bool = True, **options: Any) -> Callable[[_Function], _Function]:
+    """numba's, with kernels kept by ``KernelLocator``. To a type checker what it makes is the Python function.
+
+    allocates: False where the function makes no arrays but slices of given ones, whose references nobody counts then:
+    each slice costs two atomic operations otherwise. numba refuses to compile such a function if it does allocate.
+    """
 
     def decorated(function: _Function) -> _Function:
         # NUMBA_CACHE_LOCATOR_CLASSES, which numba reads when it is handed the function (tried with 0.68).
         before = _CONFIG.CACHE_LOCATOR_CLASSES
         _CONFIG.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__},{before or _USUAL}"
         try:
+            # numba's own name (tried with 0.68); where it isn't given the caller's would count.
+            options["_nrt"] = allocates
             return numba.njit(*signature, **options)(function)
         finally:
             _CONFIG.CACHE_LOCATOR_CLASSES = before

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
 from numba import types
 from numba.core import cgutils
 
-from .compilation import INTERPRETED, intrinsic
+from .compilation import INTERPRETED, intrinsic, njit
 
 _Arrays = TypeVar("_Arrays")
 
@@ -44,3 +45,12 @@ else:
             return _without_owner(context, builder, signature.args[0], arguments[0])
 
         return arrays(arrays), code
+
+
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+def copy_numbers(of: np.ndarray, to: np.ndarray) -> None:
+    """The first numbers of one array to all of another, one by one: numba's own way with slices looks first whether the
+    two share memory, and makes room for a copy if they do.
+    """
+    for k in range(to.shape[0]):
+        to[k] = of[k]

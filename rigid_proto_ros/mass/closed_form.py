@@ -12,12 +12,15 @@ import numpy as np
 from ..base.compilation import njit
 from .tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
 
+Principal = tuple[np.ndarray, np.ndarray]
+"""Principal moments (3,) and axes (3, 3) of a tensor, as the kernel in mass/tensor.py gives them."""
+
 
 @njit(cache=True, nogil=True)
 def loaded(
     mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """Mass, COM from the (stretched) reference, inertia (3, 3) and its principal moments, ballast included.
+) -> tuple[float, np.ndarray, np.ndarray, Principal]:
+    """Mass, COM from the (stretched) reference, inertia (3, 3), its principal moments and axes, ballast included.
 
     mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
     mesh coordinates, ``stretch`` and ``reference`` (3,) in mesh coordinates bring them there. Each point mass adds by
@@ -50,7 +53,7 @@ def loaded(
         for j in range(3):
             inertia[i, j] = 0.0 - gathered[i, j]  # no -0
         inertia[i, i] = gathered[(i + 1) % 3, (i + 1) % 3] + gathered[(i + 2) % 3, (i + 2) % 3]
-    return total, moved, inertia, principal_axes_kernel(inertia)[0]
+    return total, moved, inertia, principal_axes_kernel(inertia)
 
 
 @njit(cache=True, nogil=True)
@@ -90,9 +93,9 @@ def spread_mass(
     reference: np.ndarray,
     second: np.ndarray,
     points: np.ndarray,
-) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of a mass [kg] spread over a mesh: total, COM (3,), inertia (3, 3), principal moments (3,), the scaled reference
-    (3,) and the COM from it (3,).
+) -> tuple[float, np.ndarray, np.ndarray, Principal, np.ndarray, np.ndarray]:
+    """Of a mass [kg] spread over a mesh: total, COM (3,), inertia (3, 3), its principal moments and axes, the scaled
+    reference (3,) and the COM from it (3,).
 
     measure, reference, center and center_low (3,), second (6,): the moments at unit density. scale (3,) of the mesh;
     left (3,): what of it the moments don't have in them yet. points (k, 4): ballast in mesh coordinates.
@@ -107,13 +110,13 @@ def spread_mass(
 @njit(cache=True, nogil=True)
 def given_mass(
     mass: float, center: np.ndarray, inertia: np.ndarray, scale: np.ndarray, points: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[float, np.ndarray, np.ndarray, Principal, np.ndarray, np.ndarray]:
     """The same of a given mass [kg], COM (3,) in mesh coordinates and inertia (3, 3) about it, which ``scale`` doesn't
     touch; the COM is the reference.
     """
     base = scale * center
     if points.shape[0] == 0:
-        return mass, base, inertia, principal_axes_kernel(inertia)[0], base, np.zeros(3)
+        return mass, base, inertia, principal_axes_kernel(inertia), base, np.zeros(3)
     half_trace = 0.5 * (inertia[0, 0] + inertia[1, 1] + inertia[2, 2])
     second = -inertia
     for k in range(3):

@@ -195,7 +195,7 @@ class MeshMoments:
             own, moments.measure, s, left, place, low, base, moments.second, points
         )
         warnings = ()
-        if not is_plainly_good(principal):
+        if not is_plainly_good(principal[0]):
             try:
                 warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
             except TensorError as error:

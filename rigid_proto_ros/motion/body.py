@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import Numbers, quaternion_of_axes
+from ..mass.closed_form import Principal
 from ..mass.tensor import principal_axes_kernel
 
 # Where the numbers of a body stand in its row.
@@ -29,7 +30,7 @@ LENGTH = 32  # ℓ, what displacement errors are measured by [m]; 1 where no mes
 BODY = 33
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """I⁻¹ τ of a torque x, y, z, in body axes."""
     P, m = AXES, MOMENTS
@@ -43,14 +44,14 @@ def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tupl
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def arm(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Mesh coordinates x, y, z to metres from the COM, body axes."""
     s, c = BODY_SCALE, COM
     return x * body[s] - body[c], y * body[s + 1] - body[c + 1], z * body[s + 2] - body[c + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
     x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
@@ -58,12 +59,14 @@ def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float
     return x / size, y / size, z / size
 
 
-@njit(cache=True, error_model="numpy")
-def fill_body(mass: float, com: np.ndarray, inertia: np.ndarray, scale: np.ndarray, body: np.ndarray) -> None:
-    """The row of a body (BODY,) without a size from com (3,), inertia (3, 3) and scale (3,), its tensor
-    diagonalized.
+@njit(cache=True, error_model="numpy", allocates=False)
+def fill_body(
+    mass: float, com: np.ndarray, inertia: np.ndarray, principal: Principal, scale: np.ndarray, body: np.ndarray
+) -> None:
+    """The row of a body (BODY,) without a size from com (3,), inertia (3, 3), its principal moments and axes and
+    scale (3,).
     """
-    moments, axes = principal_axes_kernel(inertia)
+    moments, axes = principal
     quaternion_of_axes(axes, body[QUATERNION : QUATERNION + 4])
     body[MASS], body[LENGTH] = mass, 1.0
     for k in range(3):
@@ -136,6 +139,6 @@ def make_body(
 ) -> Body:
     """A body of given mass properties, its tensor diagonalized once."""
     row = np.empty(BODY)
-    com, sides = (np.ascontiguousarray(numbers, dtype=float) for numbers in (center_of_mass, scale))
-    fill_body(float(mass), com, np.ascontiguousarray(inertia, dtype=float), sides, row)
+    com, tensor, sides = (np.ascontiguousarray(numbers, dtype=float) for numbers in (center_of_mass, inertia, scale))
+    fill_body(float(mass), com, tensor, principal_axes_kernel(tensor), sides, row)
     return Body(row)

@@ -58,7 +58,7 @@ _ROW = struct.Struct("=14d")
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
     """From the COM to the point of attack [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
@@ -66,7 +66,7 @@ def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
     return of_body.arm(body, load[POINT], load[POINT + 1], load[POINT + 2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
     """The force in body axes, of a load whose axes turn with the body: three numbers."""
     f = load[FORCE]
@@ -76,13 +76,13 @@ def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
     return f, load[FORCE + 1], load[FORCE + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _bound(x: float, y: float, z: float) -> float:
     """√3 times the largest component: not below the length, and without its overflow."""
     return 1.7320508075688772 * max(abs(x), abs(y), abs(z))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
     """Bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes: by |r||F| and the
     smallest moment.
@@ -95,7 +95,7 @@ def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
     return force / body[of_body.MASS], torque / body[of_body.MOMENTS]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
     """Whether both stay within MAX_ACCELERATION; an overflow to NaN doesn't."""
     linear, angular = magnitudes(load, body)
@@ -107,13 +107,13 @@ def _within_magnitude() -> Callable:
     return entry_of(is_within_magnitude, boolean(float64[::1], float64[::1]))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def is_zero(load: np.ndarray) -> bool:
     """Whether there is neither force nor torque."""
     return not load[FORCE : FORCE + 6].any()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def share_of(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
     """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r
     Fᵀ of a world force.
@@ -136,7 +136,7 @@ def share_of(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
     share[TORQUE_BODY], share[TORQUE_BODY + 1], share[TORQUE_BODY + 2] = tx, ty, tz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
     """What an impulse does to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])

@@ -64,7 +64,7 @@ K, C, REST, PUSHES = 9, 10, 11, 12
 STRING = 13
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def begin_body(
     p: np.ndarray,
     body: np.ndarray,
@@ -90,7 +90,7 @@ def begin_body(
     p[LENGTH] = body[of_body.LENGTH]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def begin_problem(p: np.ndarray, loads: np.ndarray, row: np.ndarray) -> None:
     """Complete the body's part p with loads and the start, as far as they go without a string."""
     P, mass = PRINCIPAL_AXES, p[MASS]
@@ -117,7 +117,7 @@ def begin_problem(p: np.ndarray, loads: np.ndarray, row: np.ndarray) -> None:
     p[TRANSLATES] = 1.0 if pushes else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def begin_string(
     p: np.ndarray, body: np.ndarray, string: np.ndarray, begin_ns: int, end_ns: int, row: np.ndarray, now_ns: int
 ) -> None:

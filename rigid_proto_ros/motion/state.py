@@ -86,7 +86,7 @@ class State:
         return digest.hexdigest()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def fill_initial_row(
     position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray, row: np.ndarray
 ) -> bool:
@@ -106,7 +106,7 @@ def fill_initial_row(
     return x != 0.0 or y != 0.0 or z != 0.0 or w != 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
     """½ m|v|² + ½ ωᵀIω [J] of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
@@ -118,7 +118,7 @@ def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
     return 0.5 * mass * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def angular_momentum(row: np.ndarray, inertia: np.ndarray) -> tuple[float, float, float]:
     """L = R I ω about the COM, world axes [N m s], likewise."""
     x, y, z = row[10], row[11], row[12]

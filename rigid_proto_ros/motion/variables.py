@@ -31,7 +31,7 @@ LOW = 15  # (7,) low words of attitude and displacement, kept by those integrato
 STORED = 22
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def damping_functions(z: float) -> tuple[float, float]:
     """φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 + e⁻ᶻ)/z², z ≥ 0, to rounding."""
     if z == 0.0:
@@ -46,7 +46,7 @@ def damping_functions(z: float) -> tuple[float, float]:
     return phi1, (1.0 - phi1) / z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def to_variables(row: np.ndarray, p: np.ndarray, y: np.ndarray) -> None:
     """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
     P, Q = of.PRINCIPAL_AXES, of.PRINCIPAL_QUATERNION
@@ -59,7 +59,7 @@ def to_variables(row: np.ndarray, p: np.ndarray, y: np.ndarray) -> None:
     y[HEAT] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def to_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray) -> None:
     """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = of.PRINCIPAL_AXES, of.PRINCIPAL_QUATERNION
@@ -74,7 +74,7 @@ def to_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray) -> Non
     row[3], row[4], row[5], row[6] = multiply(y[0], y[1], y[2], y[3], -p[Q], -p[Q + 1], -p[Q + 2], p[Q + 3])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def to_good_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray, limit: float) -> bool:
     """``to_row``; returns whether no number of the row is beyond ``limit`` or no number at all."""
     to_row(y, p, elapsed, row)

@@ -12,7 +12,7 @@ from numba import boolean, float64, int64, types
 
 from ..base.compilation import njit
 from ..base.simd import aligned
-from ..base.uncounted_arrays import uncounted
+from ..base.uncounted_arrays import copy_numbers, uncounted
 from ..motion import problem as pr
 from ..motion.body import BODY, INERTIA, MASS
 from ..motion.integrators.integrator import Integrator
@@ -88,7 +88,7 @@ _SAMPLING = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
 _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _fly(
     settings: np.ndarray,
     times: np.ndarray,
@@ -121,32 +121,34 @@ def _fly(
     row = f[fl.ROW : fl.ROW + 13]
     if not b.initial_row(settings, row):
         return 0, -1
-    states[0, :13], states[0, 13] = row, 0.0
+    copy_numbers(row, states[0, :13])
+    states[0, 13] = 0.0
     g = settings[b.GRAVITY : b.GRAVITY + 3]
     begin(body[MASS], body[INERTIA : INERTIA + 9], g, states[0], context)
-    f[fl.START : fl.START + 13] = row
-    f[fl.BODY : fl.BODY + BODY] = body
+    copy_numbers(row, f[fl.START : fl.START + 13])
+    copy_numbers(body, f[fl.BODY : fl.BODY + BODY])
     damping = (settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING])
     pr.begin_body(f[fl.COMMON : fl.COMMON + pr.SIZE], body, g, damping[0], damping[1], gyroscopic)
     f[fl.ACCURACY], f[fl.DEGREE] = settings[b.ACCURACY], times[b.DEGREE]
     n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
     n[fl.CHOOSES] = 1 if chooses else 0
     for c in range(count):
-        rows_ns[c, : fl.COMMAND] = commands[c]
-        rows[c, :LOAD] = loads[c]
+        copy_numbers(commands[c], rows_ns[c, : fl.COMMAND])
+        copy_numbers(loads[c], rows[c, :LOAD])
     n[fl.DUE_END] = count
     fl.begin_segment(f, n, rows, methods)
     for sample in range(sample_ns.shape[0]):
         if fl.fly(f, n, rows_ns, rows, events, methods, sample_ns[sample]) != fl.REACHED:
             return 0, -1
-        states[sample, :13], states[sample, 13] = row, 0.0
+        copy_numbers(row, states[sample, :13])
+        states[sample, 13] = 0.0
         stop = which_is_met(stops, states[sample], context)
         if stop >= 0:
             return sample + 1, stop
     return sample_ns.shape[0], -1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _one(
     i: int,
     settings: np.ndarray,
@@ -233,7 +235,7 @@ def _fly_block(
             continue
         status[i] = 1
         end_ns[i] = sample_ns[reached - 1]
-        finals[i, :] = states[reached - 1, :13]
+        copy_numbers(states[reached - 1], finals[i])
         measure_flight(measures, states, others, sample_ns, watched, reached, context, measured[i])
 
 
@@ -249,7 +251,7 @@ def _compiled() -> Callable:
         types.Tuple(_ROOM),
     )
     signature = types.void(int64, int64, *block)
-    return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_block)
+    return njit(signature, cache=True, nogil=True, error_model="numpy", allocates=False)(_fly_block)
 
 
 @cache

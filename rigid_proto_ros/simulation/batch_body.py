@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
-from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
+from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import COM, LENGTH, MASS, fill_body
@@ -77,9 +77,12 @@ def _points_with_mass(ballast: np.ndarray) -> tuple[np.ndarray, bool]:
     return points, True
 
 
+_Made = tuple[float, np.ndarray, np.ndarray, Principal, bool]
+
+
 @njit(cache=True, error_model="numpy")
-def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, bool]:
-    """Mass, COM (3,), inertia (3, 3) and whether the given numbers are plainly good."""
+def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> _Made:
+    """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are plainly good."""
     given = settings[GIVEN_TENSOR : GIVEN_TENSOR + 6]
     inertia = np.empty((3, 3))
     inertia[0, 0], inertia[1, 1], inertia[2, 2] = given[0], given[3], given[5]
@@ -93,13 +96,11 @@ def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> tuple[
     if points.shape[0] > 0:
         good = good and is_plainly_good(principal_axes_kernel(inertia)[0])
     total, com, gathered, principal, _, _ = given_mass(mass, center, inertia, s, points)
-    return total, com, gathered, good and is_plainly_good(principal)
+    return total, com, gathered, principal, good and is_plainly_good(principal[0])
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(
-    s: np.ndarray, settings: np.ndarray, points: np.ndarray, constants: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, bool]:
+def _spread(s: np.ndarray, settings: np.ndarray, points: np.ndarray, constants: np.ndarray) -> _Made:
     """The same for a model whose mass is spread over a mesh."""
     mass = settings[BODY_MASS]
     if not mass > 0.0:
@@ -117,10 +118,10 @@ def _spread(
     total, com, inertia, principal, _, _ = spread_mass(
         mass, constants[MEASURE], s, left, center, low, reference, second, points
     )
-    return total, com, inertia, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal)
+    return total, com, inertia, principal, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal[0])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarray, body: np.ndarray) -> bool:
     """Fill ``body`` (BODY,) from settings (SETTINGS,), ballast (k, 4) and a mesh's constants; False when
     the simulation has to check it.
@@ -133,9 +134,9 @@ def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarr
     if not good:
         return False
     if constants[MODEL] == EXPLICIT:
-        mass, com, inertia, good = _explicit(s, settings, points)
+        mass, com, inertia, principal, good = _explicit(s, settings, points)
     else:
-        mass, com, inertia, good = _spread(s, settings, points, constants)
+        mass, com, inertia, principal, good = _spread(s, settings, points, constants)
     if not good:
         return False
     diagonal = 0.0
@@ -143,13 +144,13 @@ def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarr
         com[k] = exact_quotient(com[k], s[k]) * s[k]
         side = constants[EXTENT + k] * s[k]
         diagonal += side * side
-    fill_body(mass, com, inertia, s, body)
+    fill_body(mass, com, inertia, principal, s, body)
     if constants[HAS_SURFACE] != 0.0:
         body[LENGTH] = 0.5 * math.sqrt(diagonal)
     return math.isfinite(body[MASS] + body[COM] + body[COM + 1] + body[COM + 2] + body[LENGTH])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def initial_row(settings: np.ndarray, row: np.ndarray) -> bool:
     """The state row (13,) at time 0; False when the orientation has no length."""
     return fill_initial_row(

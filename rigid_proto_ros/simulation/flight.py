@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.uncounted_arrays import copy_numbers
 from ..motion import body as of_body
 from ..motion import problem as pr
 from ..motion.integrators import control as ctl
@@ -84,14 +85,7 @@ REACHED, FAILED, NO_KERNEL = range(3)
 """How a call came back. NO_KERNEL: the segment's method must be compiled first."""
 
 
-@njit(cache=True, error_model="numpy")
-def _copy(of: np.ndarray, first: int, count: int, to: np.ndarray, at: int) -> None:
-    """Numbers from ``first`` on to ``at`` and on; numba's own way with slices looks first whether they share memory."""
-    for k in range(count):
-        to[at + k] = of[first + k]
-
-
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def begin_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
     """Begin a segment at START: what acts is summed afresh, in the order in which it began, and the
     method is chosen.
@@ -105,17 +99,17 @@ def begin_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.n
     begin_variables(f, n, methods)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def segment_problem(f: np.ndarray, n: np.ndarray, row: np.ndarray, time_ns: int, p: np.ndarray) -> None:
     """The problem p of a segment under SUMS and the string that begins with the state ``row``."""
-    _copy(f, COMMON, pr.SIZE, p, 0)
+    copy_numbers(f[COMMON:], p)
     pr.begin_problem(p, f[SUMS : SUMS + LOADS_SIZE], row)
     if n[TIED] != 0:
         body, string = f[BODY : BODY + of_body.BODY], f[STRING : STRING + pr.STRING]
         pr.begin_string(p, body, string, n[STRING_BEGIN_NS], n[STRING_END_NS], row, time_ns)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
     """Begin a segment whose PROBLEM is made."""
     p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
@@ -139,7 +133,7 @@ def begin_variables(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> None:
     n[SEGMENTS] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def commit_until(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; whether all were good."""
     # A step that waits and goes on beyond that leaves nothing to commit.
@@ -160,19 +154,19 @@ def commit_until(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: in
     return good
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def sample(f: np.ndarray, n: np.ndarray, methods: np.ndarray, at_ns: int, row: np.ndarray) -> bool:
     """The state at ``at_ns``, less than one step after the last committed one, into row; commits nothing.
     Whether it is good.
     """
     if at_ns == n[START_NS]:
-        _copy(f, START, 13, row, 0)
+        copy_numbers(f[START:], row)
         return True
     p, y = f[PROBLEM : PROBLEM + pr.SIZE], f[VARIABLES : VARIABLES + STORED]
     rest_ns = at_ns - n[COMMITTED_NS]
     if rest_ns > 0:
         trial = f[TRIAL : TRIAL + STORED]
-        _copy(y, 0, STORED, trial, 0)
+        copy_numbers(y, trial)
         y = trial
         control, following = f[CONTROL : CONTROL + ctl.SIZE], f[FOLLOWING : FOLLOWING + STORED]
         if not reach(methods[n[METHOD]], y, p, control, following, f[ROOM:], rest_ns):
@@ -183,7 +177,7 @@ def sample(f: np.ndarray, n: np.ndarray, methods: np.ndarray, at_ns: int, row: n
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def advance_segment(f: np.ndarray, n: np.ndarray, methods: np.ndarray, until_ns: int) -> int:
     """Go on in the segment to ``until_ns``: full steps, then one shorter step that ends exactly there, on a copy."""
     n[WAITS] = 0 if is_provided(methods, n[METHOD]) else 1
@@ -214,17 +208,17 @@ def accelerations_now(f: np.ndarray, n: np.ndarray) -> tuple[float, ...]:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def last_good_state(f: np.ndarray, n: np.ndarray, row: np.ndarray) -> None:
     """The state at the last committed step, into row."""
     if n[COMMITTED_NS] == n[START_NS]:
-        _copy(f, START, 13, row, 0)
+        copy_numbers(f[START:], row)
         return
     y, p = f[VARIABLES : VARIABLES + STORED], f[PROBLEM : PROBLEM + pr.SIZE]
     to_good_row(y, p, (n[COMMITTED_NS] - n[START_NS]) * 1e-9, row, MAX_SPEED)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def stop_in_last_good_state(f: np.ndarray, n: np.ndarray) -> None:
     """Stay where the last good step ended, or at NOW_NS where that is later."""
     row = f[TRIAL : TRIAL + 13]
@@ -233,17 +227,17 @@ def stop_in_last_good_state(f: np.ndarray, n: np.ndarray) -> None:
     for k in range(13):
         good = good and np.isfinite(row[k])
     if good:
-        f[ROW : ROW + 13] = row
+        copy_numbers(row, f[ROW : ROW + 13])
         n[NOW_NS] = n[COMMITTED_NS]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def steps_of_segment(f: np.ndarray, n: np.ndarray) -> int:
     """Steps committed in the segment."""
     return n[TAKEN] + int(f[CONTROL + ctl.STEPS])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def evaluations_of_segment(f: np.ndarray, n: np.ndarray, methods: np.ndarray) -> int:
     """Evaluations of the equations of motion in them."""
     # The step that ends a segment takes the series of the one that waits.
@@ -251,19 +245,19 @@ def evaluations_of_segment(f: np.ndarray, n: np.ndarray, methods: np.ndarray) ->
     return n[TAKEN] * methods[n[METHOD], COST] + int(counted)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def finish_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
     """Keep the segment's counts and begin another from the state at NOW_NS."""
     n[STEPS_BEFORE] += steps_of_segment(f, n)
     n[EVALUATIONS_BEFORE] += evaluations_of_segment(f, n, methods)
     f[WORK_BEFORE] += f[WORK]
     f[LOST_BEFORE] += f[LOST]
-    _copy(f, ROW, 13, f, START)
+    copy_numbers(f[ROW:], f[START : START + 13])
     n[START_NS] = n[NOW_NS]
     begin_segment(f, n, loads, methods)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def cut_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.ndarray) -> None:
     """End the segment at NOW_NS by the step that sampling there took, and begin another."""
     if n[NOW_NS] > n[COMMITTED_NS] and methods[n[METHOD], SLEEPS] == 0:
@@ -271,21 +265,22 @@ def cut_segment(f: np.ndarray, n: np.ndarray, loads: np.ndarray, methods: np.nda
     finish_segment(f, n, loads, methods)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _write(n: np.ndarray, events: np.ndarray, what: int, load_id: int, row: int) -> None:
     event = events[n[EVENTS]]
     event[EVENT_NS], event[WHAT], event[LOAD_ID], event[ROW_OF] = n[NOW_NS], what, load_id, row
     n[EVENTS] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _keep(times: np.ndarray, loads: np.ndarray, kept: int, row: int) -> None:
     """Let the load of a row that acts go on as row ``kept``, which is not after it."""
     if kept != row:
-        times[kept], loads[kept] = times[row], loads[row]
+        copy_numbers(times[row], times[kept])
+        copy_numbers(loads[row], loads[kept])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def end_due(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray) -> bool:
     """End what ends at NOW_NS or should have before; whether anything did."""
     kept = 0
@@ -304,7 +299,7 @@ def end_due(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndar
     return ended
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def end_slot(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray, slot: int) -> None:
     """End what acts in a slot, if anything does."""
     ended = False
@@ -318,7 +313,7 @@ def end_slot(n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.nda
         n[ACTING] -= 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def end_all(n: np.ndarray, times: np.ndarray, events: np.ndarray) -> None:
     """End everything that acts."""
     for row in range(n[ACTING]):
@@ -326,24 +321,23 @@ def end_all(n: np.ndarray, times: np.ndarray, events: np.ndarray) -> None:
     n[ACTING] = 0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def end_of_held(n: np.ndarray, begin_ns: int) -> int:
     """When a held wrench that began at ``begin_ns`` ends."""
     return max(begin_ns + n[TIMEOUT_NS], n[NOW_NS]) if n[TIMEOUT_NS] != 0 else NEVER
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _begin(n: np.ndarray, times: np.ndarray, loads: np.ndarray, body: np.ndarray, row: int, end_ns: int) -> None:
     """Let the load of a row act from NOW_NS until ``end_ns``, as the last of those that act."""
     to = n[ACTING]
-    if to != row:
-        times[to], loads[to] = times[row], loads[row]
+    _keep(times, loads, to, row)
     times[to, AT_NS], times[to, END_NS], times[to, ID] = n[NOW_NS], end_ns, n[LOAD_IDS]
     share_of(loads[to, :LOAD], body, loads[to, SHARE:])
     n[ACTING] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, events: np.ndarray, row: int) -> None:
     """Apply the command of a row at NOW_NS. Rows before it may be taken by loads that act."""
     kind, body = times[row, KIND], f[BODY : BODY + of_body.BODY]
@@ -372,7 +366,7 @@ def apply(f: np.ndarray, n: np.ndarray, times: np.ndarray, loads: np.ndarray, ev
     _write(n, events, DONE, load_id, row)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def next_event_ns(n: np.ndarray, times: np.ndarray) -> int:
     """When the next load ends or command acts, or the string's free end arrives."""
     event_ns = times[n[DUE], AT_NS] if n[DUE] < n[DUE_END] else NEVER
@@ -383,7 +377,7 @@ def next_event_ns(n: np.ndarray, times: np.ndarray) -> int:
     return event_ns
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def fly(
     f: np.ndarray,
     n: np.ndarray,

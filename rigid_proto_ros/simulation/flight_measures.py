@@ -22,7 +22,7 @@ body, all zero for that of the first spin.
 """
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def count_flips(
     measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray
 ) -> float:
@@ -50,7 +50,7 @@ def count_flips(
     return float(flips)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _extreme(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray) -> float:
     sign = 1.0 if measure[KIND] == LARGEST else -1.0
     found = -math.inf
@@ -70,7 +70,7 @@ def _first(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _largest_difference(code: int, states: np.ndarray, others: np.ndarray, watched: np.ndarray, reached: int) -> float:
     """Over the watched samples."""
     largest = 0.0
@@ -80,7 +80,7 @@ def _largest_difference(code: int, states: np.ndarray, others: np.ndarray, watch
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def measure_flight(
     measures: np.ndarray,
     states: np.ndarray,

@@ -14,6 +14,7 @@ import numpy as np
 from ..base.compilation import njit
 from ..base.elementary import inverse_tangent_of
 from ..base.rotation import rotate
+from ..base.uncounted_arrays import copy_numbers
 from ..motion.state import angular_momentum, kinetic_energy
 
 QUANTITIES = {
@@ -57,29 +58,29 @@ STATE = 14
 MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10, 13, 27, 28, 31
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _momentum(row: np.ndarray, context: np.ndarray) -> tuple[float, float, float]:
     return angular_momentum(row, context[INERTIA : INERTIA + 9])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _kinetic(row: np.ndarray, context: np.ndarray) -> float:
     return kinetic_energy(row, context[MASS], context[INERTIA : INERTIA + 9])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _potential(row: np.ndarray, context: np.ndarray) -> float:
     g = GRAVITY
     fallen = context[g] * row[0] + context[g + 1] * row[1] + context[g + 2] * row[2]
     return row[13] - context[MASS] * fallen
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _length(x: float, y: float, z: float) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -89,19 +90,19 @@ def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     return 2.0 * inverse_tangent_of(_length(x, y, z), abs(w))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def begin(mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray, context: np.ndarray) -> None:
     """Fill the context (CONTEXT,) from mass, tensor (9,), gravity (3,) and the state row (STATE,) at time 0."""
     context[MASS] = mass
-    context[INERTIA : INERTIA + 9] = inertia
-    context[GRAVITY : GRAVITY + 3] = gravity
-    context[START : START + STATE] = row
+    copy_numbers(inertia, context[INERTIA : INERTIA + 9])
+    copy_numbers(gravity, context[GRAVITY : GRAVITY + 3])
+    copy_numbers(row, context[START : START + STATE])
     context[START_ENERGY] = _kinetic(row, context) + _potential(row, context)
     lx, ly, lz = _momentum(row, context)
     context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = lx, ly, lz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     """The quantity NAMES[code] of a state row (STATE,)."""
     if code < 13:
@@ -132,7 +133,7 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     return inverse_tangent_of(across, lx * ax + ly * ay + lz * az)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
     """The difference number ``code`` of DIFFERENCES between two state rows."""
     if code == 0:
@@ -149,13 +150,13 @@ def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
 STOP_CODE, STOP_SIGN, STOP_LIMIT = range(3)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def met(condition: np.ndarray, row: np.ndarray, context: np.ndarray) -> bool:
     """Whether a condition (code, sign, limit) holds: the quantity is above the limit (sign 1) or below it (−1)."""
     return condition[STOP_SIGN] * (quantity(int(condition[STOP_CODE]), row, context) - condition[STOP_LIMIT]) > 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def which_is_met(conditions: np.ndarray, row: np.ndarray, context: np.ndarray) -> int:
     """Number of the first condition (k, 3) that holds, or −1."""
     for k in range(conditions.shape[0]):

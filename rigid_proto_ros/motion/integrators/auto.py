@@ -56,7 +56,7 @@ RADIANS_A_STEP = 1.5
 """That a step of a series covers: measured 1 to 3.5 from accuracy 1e-12 to 1e-3."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def steady_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     """Closed form for a body that doesn't spin, or whose spin nothing changes for want of the gyroscopic term."""
     for done in range(n):
@@ -81,13 +81,13 @@ SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(7, 11)
 """Kinds of segments, as the table above has them; each is one of auto's methods."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _vector(p: np.ndarray, at: int) -> bool:
     """Whether any of three numbers isn't zero."""
     return p[at] != 0.0 or p[at + 1] != 0.0 or p[at + 2] != 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def fastest_swing(p: np.ndarray) -> float:
     """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against
     the smallest moment.
@@ -96,7 +96,7 @@ def fastest_swing(p: np.ndarray) -> float:
     return math.sqrt(p[of.STIFFNESS] * (1.0 / p[of.MASS] + (x * x + y * y + z * z) / p[of.MOMENTS]))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
     turns = _vector(y, 4) or _vector(p, of.TORQUE_BODY) or p[of.HAS_WORLD_TORQUE] != 0.0
     accelerated = _vector(p, of.ACCELERATION_ADDED) or _vector(p, of.ACCELERATION_BODY)
@@ -107,7 +107,7 @@ def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
     return ON_STIFF_STRING if fastest_swing(p) > FASTEST_STRING else ON_STRING
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def kind_of_segment(p: np.ndarray, y: np.ndarray, accuracy: float) -> int:
     """Which of the kinds a segment with problem p from variables y on is, at this accuracy."""
     spins = _vector(y, 4)

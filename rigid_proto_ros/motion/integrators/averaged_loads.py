@@ -48,7 +48,7 @@ DIRECT = 4.0
 """c: measured, 3 at most where little else shows."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def mean_rates(
     A: float, B: float, C: float, P: float, Q: float, m1: float, L: float, E2: float
 ) -> tuple[float, float, float]:
@@ -60,26 +60,26 @@ def mean_rates(
     return math.pi * math.sqrt(gcb * P / (A * B * C)) / (2.0 * K), turning, math.pi * W / (2.0 * K)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _length(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _growth(at_rate: tuple[float, ...], of_momentum: float, of_energy: float) -> float:
     """|D| from rates of L and 2E; at_rate: ∂Ω_ψ/∂L, ∂Ω_ψ/∂2E, ∂Ω_p/∂L, ∂Ω_p/∂2E, g."""
     turning = abs(at_rate[0] * of_momentum + at_rate[1] * of_energy)
     return turning + at_rate[4] * abs(at_rate[2] * of_momentum + at_rate[3] * of_energy)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _largest_growth(at_rate: tuple[float, ...], of_momentum: float, of_energy: float) -> float:
     """|D| at most where the rates of L and 2E are at most these, whatever their signs."""
     turning = abs(at_rate[0]) * of_momentum + abs(at_rate[1]) * of_energy
     return turning + at_rate[4] * (abs(at_rate[2]) * of_momentum + abs(at_rate[3]) * of_energy)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _slowest(turning: float, circling: float, m1: float) -> float:
     """Ω in world axes: the smallest |Ω_ψ + kΩ_p|, each over the share that the harmonic k has in the motion, q^(|k|/2)
     with q Jacobi's nome.
@@ -93,7 +93,7 @@ def _slowest(turning: float, circling: float, m1: float) -> float:
     return slowest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def averaged_error(y: np.ndarray, p: np.ndarray, strongest: float) -> tuple[float, float]:
     """(a [1/s²], b [1/s]): a step of h seconds errs at most ½ a h² + b h to first order in the loads, of which κ is
     ``strongest`` [rad/s²]; infinite where that isn't known.

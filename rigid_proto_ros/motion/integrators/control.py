@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.compilation import njit
-from ..variables import STORED
+from ...base.uncounted_arrays import copy_numbers
 from .error_measure import FLOOR
 
 ACCURACY = 0  # local error rate asked for [1/s]
@@ -37,14 +37,7 @@ LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
 
 
-@njit(cache=True, error_model="numpy")
-def copy_variables(of: np.ndarray, to: np.ndarray) -> None:
-    """Number by number: numba would look first whether the two share memory."""
-    for k in range(STORED):
-        to[k] = of[k]
-
-
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def accept(control: np.ndarray, length_ns: int) -> None:
     """Let a step of this length wait for its commitment, its allowance no less than the floor."""
     control[ACCEPTED_NS] = length_ns
@@ -52,7 +45,7 @@ def accept(control: np.ndarray, length_ns: int) -> None:
         control[FLOOR_BINDS] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def commit(control: np.ndarray, y: np.ndarray, following: np.ndarray, room_ns: int) -> int:
     """Commit the step that waits, which ends in ``following``, in y if it fits into ``room_ns``; returns its length
     [ns], 0 where it goes beyond.
@@ -60,12 +53,12 @@ def commit(control: np.ndarray, y: np.ndarray, following: np.ndarray, room_ns: i
     length = int(control[ACCEPTED_NS])
     if length > room_ns:
         return 0
-    copy_variables(following, y)
+    copy_numbers(following, y)
     count(control)
     return length
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def count(control: np.ndarray) -> None:
     """The step that waits is committed."""
     control[ELAPSED_NS] += control[ACCEPTED_NS]

@@ -18,7 +18,7 @@ from .. import problem as of
 from ..string import NO_DIRECTION
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def undamped_torque(qx: float, qy: float, qz: float, qw: float, p: np.ndarray) -> tuple[float, float, float]:
     """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
     tx, ty, tz = p[of.TORQUE_BODY], p[of.TORQUE_BODY + 1], p[of.TORQUE_BODY + 2]
@@ -35,7 +35,7 @@ def undamped_torque(qx: float, qy: float, qz: float, qw: float, p: np.ndarray) -
     return tx, ty, tz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def torque(
     qx: float, qy: float, qz: float, qw: float, wx: float, wy: float, wz: float, p: np.ndarray
 ) -> tuple[float, float, float]:
@@ -45,7 +45,7 @@ def torque(
     return tx - c * wx, ty - c * wy, tz - c * wz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def angular_acceleration(
     wx: float, wy: float, wz: float, tx: float, ty: float, tz: float, p: np.ndarray
 ) -> tuple[float, float, float]:
@@ -55,7 +55,7 @@ def angular_acceleration(
     return (tx - g * (c - b) * wy * wz) / a, (ty - g * (a - c) * wz * wx) / b, (tz - g * (b - a) * wx * wy) / c
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def added_acceleration(
     qx: float, qy: float, qz: float, qw: float, ux: float, uy: float, uz: float, p: np.ndarray
 ) -> tuple[float, float, float]:
@@ -66,7 +66,7 @@ def added_acceleration(
     return ax + (p[G] - c * ux), ay + (p[G + 1] - c * uy), az + (p[G + 2] - c * uz)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def knot(
     qx: float,
     qy: float,
@@ -91,7 +91,7 @@ def knot(
     return p[S] + dx + bx, p[S + 1] + dy + by, p[S + 2] + dz + bz, ux + vx, uy + vy, uz + vz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def string_pull(
     qx: float,
     qy: float,
@@ -133,7 +133,7 @@ def string_pull(
     return fx, fy, fz, ry * bz - rz * by, rz * bx - rx * bz, rx * by - ry * bx, work, heat
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def accelerations(
     qx: float,
     qy: float,
@@ -167,7 +167,7 @@ def accelerations(
     return ex, ey, ez, ax, ay, az, work, heat
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p[of.BILATERAL] != 0.0 or p[of.HAS_STRING] == 0.0:
@@ -179,7 +179,7 @@ def stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float]:
     return length - p[of.REST_LENGTH], (ax * vx + ay * vy + az * vz) / length
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def tension_margin(x: float, rate: float, p: np.ndarray) -> float:
     """Positive exactly while the string pulls: min(k x, k x + c x')."""
     spring = p[of.STIFFNESS] * x

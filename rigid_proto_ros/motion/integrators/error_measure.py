@@ -25,7 +25,7 @@ FLOOR = 32.0 * 2.0**-52
 _Three = tuple[float, float, float]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
     """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into
     the segment.
@@ -33,7 +33,7 @@ def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, 
     return scales_of((y[4], y[5], y[6]), (y[10], y[11], y[12]), p, elapsed)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def scales_of(w: _Three, u: _Three, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
     """The same at ω = w and the added velocity u."""
     spin = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -50,7 +50,7 @@ def scales_of(w: _Three, u: _Three, p: np.ndarray, elapsed: float) -> tuple[floa
     return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def heavier(
     ending: tuple[float, float, float, float], weights: tuple[float, float, float, float]
 ) -> tuple[tuple[float, float, float, float], bool]:
@@ -65,7 +65,7 @@ _SQUARED = 1e140
 """Up to this number, and down to one over it, squares and their sums stay well within a double."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def length_of(x: float, y: float, z: float, w: float) -> float:
     """√(x² + y² + z² + w²), scaled by a power of two where squares would over- or underflow."""
     square = x * x + y * y + z * z + w * w
@@ -79,7 +79,7 @@ def length_of(x: float, y: float, z: float, w: float) -> float:
     return scale * math.sqrt(x * x + y * y + z * z + w * w)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def size(e: np.ndarray, attitude: float, spin: float, place: float, speed: float) -> float:
     """The measure of a small difference e (≥ 13,) of variables."""
     a = attitude * length_of(e[0], e[1], e[2], e[3])
@@ -90,7 +90,7 @@ def size(e: np.ndarray, attitude: float, spin: float, place: float, speed: float
     return max(a, speed * length_of(e[10], e[11], e[12], 0.0))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def jump_of_displacement(p: np.ndarray, spin: float, speed: float) -> float:
     """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
     much too early or late.

@@ -63,7 +63,7 @@ _WEIGHTS_8 = (
 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def free_step(
     qx: float,
     qy: float,
@@ -117,7 +117,7 @@ def free_step(
     return qx, qy, qz, qw, math.ldexp(u, e), math.ldexp(v, e), math.ldexp(w, e)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def circulation(i1: float, i2: float, i3: float, wx: float, wy: float, wz: float) -> tuple[float, float]:
     """ω_p [1/s] and m₁ (0 on the separatrix, at most 1) of the free motion with angular velocity w,
     moments i1 ≤ i2 ≤ i3.
@@ -131,7 +131,7 @@ def circulation(i1: float, i2: float, i3: float, wx: float, wy: float, wz: float
     return math.sqrt(swing / (A * i2 * C)), abs(C - A) * abs(side) / swing
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _circulate(A: float, B: float, C: float, w1: float, w2: float, w3: float, h: float) -> tuple[float, ...]:
     """The turn r xyzw (not normalized) over h, and w after it."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
@@ -154,7 +154,7 @@ def _circulate(A: float, B: float, C: float, w1: float, w2: float, w3: float, h:
     return tx, ty, tz, tw, v1, v2, v3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _even_turn(w1: float, w2: float, w3: float, h: float) -> tuple[float, float, float, float]:
     """Turn by |w| h about w."""
     size = math.sqrt(w1 * w1 + w2 * w2 + w3 * w3)
@@ -163,14 +163,14 @@ def _even_turn(w1: float, w2: float, w3: float, h: float) -> tuple[float, float,
     return w1 * s, w2 * s, w3 * s, c
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _third(w3: float, twist: float, beta: float, rate: float, m: float, t: float) -> float:
     """w₃ after t, from the short-time sn, cn, dn; ``twist`` is (B−A)/C w₁w₂."""
     s, c, d = sn_cn_dn(rate * t, m, 1.0)
     return (w3 * d - twist * (s / rate) * c) / (1.0 - beta * s * s)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _short(
     A: float, B: float, C: float, w1: float, w2: float, w3: float, P: float, rate: float, m: float, h: float
 ) -> tuple[float, float, float, float]:
@@ -214,7 +214,7 @@ def _short(
     return w1 + d1, w2 + d2, w3 + d3, h * total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _long(
     A: float, B: float, C: float, w1: float, w2: float, w3: float, P: float, Q: float, rate: float, h: float
 ) -> tuple[float, float, float, float]:
@@ -261,7 +261,7 @@ def _long(
     return v1, v2, v3, psi + E2 / L * (beyond / rate)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def precession_terms(
     A: float, B: float, C: float, P: float, Q: float, L: float, E2: float, m: float, k1: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -276,7 +276,7 @@ def precession_terms(
     return kappa, W, nu, f_a, f_b, 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> float:
     """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion hangs on its last digits."""
     g, g_low = two_sum(C, -B)
@@ -291,7 +291,7 @@ def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> f
     return distance
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, float]:
     """sn and cn of Gauss's transformed modulus."""
     s = sn * (1.0 + k1) / (1.0 + dn)
@@ -300,7 +300,7 @@ def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, flo
     return s / size, c / size
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _added_by_phase(s0: float, s: float, s1: float, c1: float, modulus1: float, kappa: float, nu: float) -> float:
     """∫ from u₀ to u₀ + u less ∫ from 0 to u of sn²/(1 + ν sn²): s₀, s, s₁ are sn of u₀, u and u₀ + u, c₁
     cn of the last.
@@ -312,7 +312,7 @@ def _added_by_phase(s0: float, s: float, s1: float, c1: float, modulus1: float, 
     return product if abs(angle) < 1e-9 else inverse_tangent(angle) / root
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _third_kind(s: float, c: float, modulus1: float, nu: float) -> float:
     """∫ sin²/(1 + ν sin²)/√(1 − κ² sin²) from 0 to φ."""
     cc, ss = c * c, s * s

@@ -12,7 +12,7 @@ from ..variables import damping_functions
 from .equations import undamped_torque
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def push(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
@@ -23,7 +23,7 @@ def push(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
     return tx, ty, tz, ax + p[G], ay + p[G + 1], az + p[G + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def kick(y: np.ndarray, p: np.ndarray, h: float, pushed: tuple[float, ...]) -> None:
     """Let ``push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
     angular, linear = p[of.DAMPING_ANGULAR], p[of.DAMPING_LINEAR]
@@ -39,7 +39,7 @@ def kick(y: np.ndarray, p: np.ndarray, h: float, pushed: tuple[float, ...]) -> N
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def drift_freely(y: np.ndarray, h: float) -> None:
     """Move the added displacement on with its velocity for h seconds, in place."""
     for k in range(3):

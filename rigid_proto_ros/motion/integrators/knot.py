@@ -19,7 +19,7 @@ from ..problem import ATTACH, REST_LENGTH, STRING_START
 from ..variables import LOW
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _difference(a: float, a_low: float, b: float, c: float, c_low: float, d: float) -> tuple[float, float]:
     """a b − c d as a pair, b and d doubles."""
     x, e = two_product(a, b)
@@ -32,7 +32,7 @@ Knot = tuple[float, float, float, float, float]
 """From the free end to the knot (3,) [m, world], its length l, and l − rest length [m]."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float, float, float, float]:
     """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m
     and not of 1e-16 m.
@@ -61,7 +61,7 @@ def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float, float,
     return a1, a2, a3, length + low, (length - p[REST_LENGTH]) + low
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _moved(
     y: np.ndarray,
     p: np.ndarray,
@@ -94,13 +94,13 @@ def _moved(
     return fast_two_sum(s, low + y[LOW + 4 + k] + (g1 + g2 + g3))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def moved_pair(y: np.ndarray, out: np.ndarray, at: int, low: int, change: float) -> None:
     """out = y + change for the variable ``at`` with its low word."""
     out[at], out[low] = two_sum(y[at], change + y[low])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def unit_attitude(out: np.ndarray) -> None:
     """Attitude and low words scaled to unit length."""
     excess, low = -1.0, 0.0

@@ -35,43 +35,43 @@ STRETCH, _RATE = 128, 129
 COLUMNS = 136
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _four(x: float) -> Packed:
     """Four times the number x."""
     return filled(x, 4)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _vector(a: float, b: float, c: float, d: float) -> Packed:
     """Four numbers side by side. What was stored one by one and is loaded together has to wait until it is written."""
     return joined(filled(a, 1), filled(b, 1), filled(c, 1), filled(d, 1))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _triple(array: np.ndarray, at: int) -> Packed:
     return _vector(array[at], array[at + 1], array[at + 2], 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _dot(a: Packed, b: Packed) -> float:
     """Of the first three components."""
     ab = a * b
     return number(ab, 0) + number(ab, 1) + number(ab, 2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _cross(a: Packed, b: Packed) -> Packed:
     return arranged(a, (1, 2, 0, 3)) * arranged(b, (2, 0, 1, 3)) - arranged(a, (2, 0, 1, 3)) * arranged(b, (1, 2, 0, 3))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _each_four_times(v: Packed) -> tuple[Packed, Packed, Packed]:
     """The first three numbers of v, each four times."""
     x, y, z = component(v, 0), component(v, 1), component(v, 2)
     return joined(x, x, x, x), joined(y, y, y, y), joined(z, z, z, z)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Packed, Packed]:
     """Columns of R, or of a coefficient of it, from the products x q, y q and z q; one: 1 for R itself, 0
     for its derivatives.
@@ -88,7 +88,7 @@ def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Pa
     return x + _vector(one, 0.0, 0.0, 0.0), y + _vector(0.0, one, 0.0, 0.0), z + _vector(0.0, 0.0, one, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Packed) -> None:
     """Coefficient k of the variables; each vector's fourth number gives way to the next one's first."""
     at = k * COLUMNS
@@ -99,7 +99,7 @@ def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Pa
     c[k, _HEAT] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> None:
     """What products take of coefficient k of q, ω and (a, l)."""
     at = k * COLUMNS
@@ -112,7 +112,7 @@ def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> N
     store(c, at + _REPEATED, joined(q, q, q, span))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def distance_series(c: np.ndarray, degree: int) -> None:
     """Fill in the knot's distance for a string that doesn't pull, whose motion needs it not."""
     for k in range(1, degree + 1):
@@ -124,7 +124,7 @@ def distance_series(c: np.ndarray, degree: int) -> None:
         c[k, DISTANCE] = (0.5 * square + ends) / c[0, DISTANCE]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _heat_at_the_end(c: np.ndarray, k: int) -> float:
     """Coefficient k of |a'|², for a string without length."""
     heat = 0.0
@@ -134,7 +134,7 @@ def _heat_at_the_end(c: np.ndarray, k: int) -> float:
     return heat
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _turned_by_the_world(p: np.ndarray, x: Packed, y: Packed, z: Packed) -> Packed:
     """Rᵀ τ_w + vee(M R) from R's columns."""
     torque = _triple(p, of.TORQUE_WORLD)
@@ -148,7 +148,7 @@ def _turned_by_the_world(p: np.ndarray, x: Packed, y: Packed, z: Packed) -> Pack
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _turned_over(x: Packed, y: Packed, z: Packed) -> tuple[Packed, Packed, Packed]:
     """Rows of the matrix with these columns."""
     return (
@@ -158,14 +158,14 @@ def _turned_over(x: Packed, y: Packed, z: Packed) -> tuple[Packed, Packed, Packe
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
     """The sum of x, y, z, weighed by the components of v."""
     v1, v2, v3 = _each_four_times(v)
     return x * v1 + y * v2 + z * v3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def motion_series(  # noqa: C901 - the recurrences of one order, in their order; a call in between costs more than they do
     y: np.ndarray, p: np.ndarray, knot: Knot, degree: int, taut: bool, c: np.ndarray
 ) -> None:
@@ -280,7 +280,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
         r1, r2, r3 = _columns(xs, ys, zs, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def motion_at(c: np.ndarray, p: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
     """Take the variables y, those that c is the series of, h seconds on."""
     columns = 15 if p[of.HAS_STRING] != 0.0 else 13 if p[of.TRANSLATES] != 0.0 else 7
@@ -299,7 +299,7 @@ def motion_at(c: np.ndarray, p: np.ndarray, degree: int, h: float, y: np.ndarray
     unit_attitude(y)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def stretch_at(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> tuple[float, float]:
     """x = l − rest length, and its rate, h seconds on."""
     a, b = filled(0.0, 4), filled(0.0, 4)

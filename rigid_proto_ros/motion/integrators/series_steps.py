@@ -17,8 +17,9 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import aligned, filled, joined
+from ...base.uncounted_arrays import copy_numbers
 from ..problem import HAS_STRING, STIFFNESS
-from ..variables import ATTITUDE, HEAT
+from ..variables import ATTITUDE, HEAT, STORED
 from . import control as ctl
 from .error_measure import (
     WEIGHINGS,
@@ -50,7 +51,7 @@ is more here.
 """
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def degree_of_motion(degree: int) -> int:
     """The degree of a series of the whole motion, where that of the spin alone would be ``degree``."""
     return min(degree + _HIGHER, MAX_DEGREE)
@@ -63,7 +64,7 @@ def workspace(degree: int) -> np.ndarray:
     return aligned((2 * (degree_of_motion(degree) + 2) + 1, COLUMNS))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def allowed_length(
     c: np.ndarray, degree: int, weights: tuple[float, float, float, float], accuracy: float, part: float
 ) -> float:
@@ -78,7 +79,7 @@ def allowed_length(
     return length_for(log2_growth(c, ATTITUDE, COLUMNS, degree, of_row), accuracy, degree, part)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part: float) -> float:
     """h [s] after which the series of the knot's place errs as much. It turns with the body, and attitude by half the
     angle: of the degree N its remainder is up to 2ᴺ times that of the attitude's series.
@@ -87,7 +88,7 @@ def known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part
     return length_for(log2_growth(c, A_KNOT, COLUMNS, degree, of_row), accuracy, degree, part)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _lay_out(
     y: np.ndarray, p: np.ndarray, control: np.ndarray, weights: tuple[float, float, float, float], c: np.ndarray
 ) -> int:
@@ -134,7 +135,7 @@ def _lay_out(
             # One switch a step: each multiplies what the step has erred before it.
             return before_ns
         if parts == 1:
-            ctl.copy_variables(y, last)
+            copy_numbers(y, last[:STORED])
             control[ctl.SWITCH] = switch
         _move(series, p, degree, switch, law, last)
         start, series = last, c[degree + 2 : 2 * (degree + 2)]
@@ -146,18 +147,18 @@ def _lay_out(
     return length_ns if length_ns * 1e-9 > gone else length_ns + 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _reach(p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
     """Take the variables at the beginning of the step that is laid out ``time_ns`` into it."""
     degree, t = degree_of_motion(int(control[ctl.DEGREE])), time_ns * 1e-9
     if t <= control[ctl.SWITCH]:
         _move(c, p, degree, t, control[ctl.LAW], out)
     else:
-        ctl.copy_variables(c[2 * (degree + 2)], out)
+        copy_numbers(c[2 * (degree + 2)], out)
         _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control[ctl.LAST_START], control[ctl.LAST_LAW], out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _move(c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, out: np.ndarray) -> None:
     if law == PASSES:
         pass_by(out, p, h, out)
@@ -169,7 +170,7 @@ def _move(c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, out: 
         out[HEAT] += 0.5 * p[STIFFNESS] * (before - after) * (before + after)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray) -> bool:
     """Lay out the next step and take it into ``following``; returns whether there is one."""
     elapsed = control[ctl.ELAPSED_NS]
@@ -179,7 +180,7 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
         length = _lay_out(y, p, control, weights, c)
         if length < 1:
             return False
-        ctl.copy_variables(y, following)
+        copy_numbers(y, following)
         _reach(p, control, c, length, following)
         good = is_good(following)
         # The errors of velocities are measured by those at the end: where they fall within the step, that counts.
@@ -190,7 +191,7 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
     return good
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def steps(
     y: np.ndarray,
     p: np.ndarray,

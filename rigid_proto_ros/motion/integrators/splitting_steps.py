@@ -61,7 +61,7 @@ ROUNDING = 64.0 * 2.0**-52
 """Accuracy over |ω| below which the rounding of long free steps could show: an exact step errs some ε|ω|h."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _length(p: np.ndarray, at: int, count: int) -> float:
     square = 0.0
     for k in range(at, at + count):
@@ -69,7 +69,7 @@ def _length(p: np.ndarray, at: int, count: int) -> float:
     return math.sqrt(square)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _strongest(p: np.ndarray) -> float:
     """κ [rad/s²]: no attitude gives the loads a larger angular acceleration."""
     T, I = of.TORQUE_BODY, of.MOMENTS
@@ -78,7 +78,7 @@ def _strongest(p: np.ndarray) -> float:
     return math.sqrt(x * x + y * y + z * z) + turning / p[I]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _averaged(y: np.ndarray, p: np.ndarray, accuracy: float, strongest: float, most: float) -> float:
     """The longest step [s] whose error, with loads averaged over the free motion, is PART of the accuracy at most; 0
     where that isn't known. most: what the error is at most over h² [1/s²].
@@ -93,7 +93,7 @@ def _averaged(y: np.ndarray, p: np.ndarray, accuracy: float, strongest: float, m
     return min((1.0 - SECOND_ORDER) * 2.0 * left / growing, second) if growing > 0.0 else second
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
     """The longest step [s] whose error is bounded by the accuracy times itself."""
     strongest, spin = _strongest(p), _length(y, SPIN, 3)
@@ -113,7 +113,7 @@ def step_length(y: np.ndarray, p: np.ndarray, accuracy: float) -> float:
     return h
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def splitting_pays(p: np.ndarray, y: np.ndarray, accuracy: float) -> bool:
     """Whether loads are so weak against the spin that steps are cheaper than those of a series."""
     spin = _length(y, SPIN, 3)

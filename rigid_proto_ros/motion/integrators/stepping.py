@@ -58,13 +58,13 @@ def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> No
         table[number, ADDRESS] = address_of(kernel, ADAPTIVE_STEPS if way == ADAPTIVE else STEPS)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def is_provided(table: np.ndarray, number: int) -> bool:
     """Whether the method's kernel can be called."""
     return table[number, WAY] == NOTHING or table[number, ADDRESS] != 0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def commit(
     method: np.ndarray,
     y: np.ndarray,
@@ -91,7 +91,7 @@ def commit(
     return 0, 0, True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def reach(
     method: np.ndarray,
     y: np.ndarray,

@@ -28,7 +28,7 @@ OVERDAMPED = 4.0
 """Of a string's damping rate c/m to its swing √(k/m): twice the damping ratio, 2 being critical."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def damping_and_motion(p: np.ndarray, y: np.ndarray, taut: bool) -> tuple[float, float]:
     """The fastest damping [1/s] of a segment with problem p from variables y on, and the rate of the motion beside it
     [rad/s]. taut: the string counts.
@@ -60,7 +60,7 @@ def damping_and_motion(p: np.ndarray, y: np.ndarray, taut: bool) -> tuple[float,
     return fastest, motion
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def damping_is_stiff(p: np.ndarray, y: np.ndarray, taut: bool) -> bool:
     """Whether some damping is so much faster than the motion beside it that it would set the length of explicit steps.
 

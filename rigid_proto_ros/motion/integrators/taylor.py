@@ -34,41 +34,41 @@ VARIABLES_AT = _Q
 """Where q, ω, d and u begin, one behind the other."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _four(x: float) -> Packed:
     """Four times the number x."""
     return filled(x, 4)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _triple(array: np.ndarray, at: int, last: float) -> Packed:
     """Three numbers of an array and ``last``."""
     return joined(filled(array[at], 1), filled(array[at + 1], 1), filled(array[at + 2], 1), filled(last, 1))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _spread(v: Packed) -> tuple[Packed, Packed, Packed]:
     return arranged(v, (0, 0, 0, 0)), arranged(v, (1, 1, 1, 1)), arranged(v, (2, 2, 2, 2))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _axes(q: Packed) -> tuple[Packed, Packed, Packed]:
     """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighed by the components of v is q ⊗ v."""
     return arranged(q, (3, 2, 5, 4)), arranged(q, (6, 3, 0, 5)), arranged(q, (1, 4, 3, 6))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def variables_of(y: np.ndarray) -> Packed:
     """q, ω, d and u, four numbers each. Kept so from step to step, nothing waits until it is written."""
     return joined(load(y, 0, _four(0.0)), _triple(y, 4, 0.0), _triple(y, 7, 0.0), _triple(y, 10, 0.0))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _put_triple(array: np.ndarray, at: int, vector: Packed) -> None:
     array[at], array[at + 1], array[at + 2] = number(vector, 0), number(vector, 1), number(vector, 2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def put_variables(variables: Packed, y: np.ndarray) -> None:
     """Put them into y (≥ 13,)."""
     store(y, 0, component(variables, 0))
@@ -77,14 +77,14 @@ def put_variables(variables: Packed, y: np.ndarray) -> None:
     _put_triple(y, 10, component(variables, 3))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def scales_at(variables: Packed, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
     """Weights of errors at the variables, ``elapsed`` seconds into the segment (integrators/error_measure.py)."""
     w = number(variables, 4), number(variables, 5), number(variables, 6)
     return scales_of(w, (number(variables, 12), number(variables, 13), number(variables, 14)), p, elapsed)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def series(variables: Packed, p: np.ndarray, degree: int, c: np.ndarray) -> None:
     """Coefficients c (degree + 1, COLUMNS) of the motion from these variables: q, ω, d, u."""
     translates = p[of.TRANSLATES] != 0.0
@@ -165,7 +165,7 @@ def series(variables: Packed, p: np.ndarray, degree: int, c: np.ndarray) -> None
     store(c, row + _D, paired(d, u))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like: Packed) -> Packed:
     """Σ cₖ hᵏ to k = degree, 4 or more, of the numbers from ``at`` on in rows of ``columns``: every fourth power by
     itself, each from the smallest term (Horner), so that none waits for another; the largest term comes last.
@@ -194,7 +194,7 @@ def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like:
     return load(c, at, like) + ((a * fourth + e * square) + (b + f * square) * h)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def sum_series(c: np.ndarray, degree: int, h: float) -> Packed:
     """The variables h seconds on, with a unit quaternion; degree: 4 or more."""
     sums = power_sum(c, _Q, COLUMNS, degree, h, filled(0.0, 16))
@@ -204,7 +204,7 @@ def sum_series(c: np.ndarray, degree: int, h: float) -> Packed:
     return joined(q, component(sums, 1), component(sums, 2), component(sums, 3))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def are_good(variables: Packed) -> bool:
     """Finite and no runaway."""
     return largest(variables) <= MAX_SPEED

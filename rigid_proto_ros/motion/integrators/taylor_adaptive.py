@@ -42,7 +42,7 @@ def degree_for(accuracy: float) -> int:
     return min(max(round(8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)), 6), MAX_DEGREE)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def log2_growth(c: np.ndarray, at: int, columns: int, degree: int, weights: Packed) -> float:
     """log₂ σ from the last three coefficients: of the largest k-th root of a bound on their measure. at: where a row's
     variables begin, of ``columns`` numbers; weights: of each of them.
@@ -54,7 +54,7 @@ def log2_growth(c: np.ndarray, at: int, columns: int, degree: int, weights: Pack
     return max(growth, rough_log2(2.0 * largest(load(c, last, weights) * weights)) * (1.0 / degree))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def length_for(log2_growth: float, accuracy: float, degree: int, part: float) -> float:
     """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less."""
     share, least = rough_log2(part * accuracy) - log2_growth, rough_log2(part * FLOOR)
@@ -73,13 +73,13 @@ def workspace(degree: int) -> np.ndarray:
     return aligned((degree + 1, COLUMNS))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def _weights_of_row(weights: tuple[float, float, float, float]) -> Packed:
     attitude, spin, place, speed = weights
     return joined(filled(attitude, 4), filled(spin, 4), filled(place, 4), filled(speed, 4))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", allocates=False)
 def steps(
     y: np.ndarray,
     p: np.ndarray,
