@@ -218,21 +218,21 @@ def _blueprint(flights: Sequence[TrackedFlight], tensors: Sequence[DrawnTensor])
                 rrb.TimeSeriesView(origin="/" + _plot(number, k), name=one.title)
                 for k, one in enumerate(flight.residuals)
             ),
-            name=f"left over of {flight.name}, in standard deviations",
+            name=f"Residuals of {flight.name} in standard deviations",
         )
         for number, flight in enumerate(flights, 1)
     ]
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
-                rrb.Spatial3DView(origin="/" + e.WORLD, name="measured, and the fitted flight as a ghost"),
+                rrb.Spatial3DView(origin="/" + e.WORLD, name="Measured motion, and the fitted one as a ghost"),
                 rrb.Vertical(
                     rrb.Spatial3DView(
                         origin="/" + ELLIPSOIDS,
-                        name="ellipsoids of inertia, tracked frame",
+                        name="Inertia ellipsoids in the tracked frame",
                         eye_controls=_before_the_row(tensors),
                     ),
-                    rrb.TextDocumentView(origin="/" + REPORT, name="what the motion tells"),
+                    rrb.TextDocumentView(origin="/" + REPORT, name="Mass properties identified"),
                 ),
                 column_shares=[1, 1],
             ),

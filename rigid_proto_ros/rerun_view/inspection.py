@@ -170,7 +170,7 @@ def _blueprint(inspection: Inspection) -> Any:
         rrb.Horizontal(
             rrb.Spatial3DView(origin="/world", name=inspection.body.mesh.name, eye_controls=eye),
             rrb.Vertical(
-                rrb.TextDocumentView(origin="/report", name="mass properties"),
+                rrb.TextDocumentView(origin="/report", name="Mass properties"),
                 rrb.BarChartView(origin="/differences", name=f"worst principal moment off by: {names}"),
             ),
             column_shares=[2, 1],

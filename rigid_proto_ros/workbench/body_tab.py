@@ -134,7 +134,8 @@ class BodyTab:
             return None
         scale = scenario.setup.body.scale
         present = float(np.prod(np.abs(scale))) ** (1.0 / 3.0)
-        return {"scale": (scale * (factor * self._base_scale / present)).tolist()}
+        # The root's rounding would stand in what is shown and refused: 999999999999.9991 for 1e12.
+        return {"scale": [float(f"{x:.14g}") for x in scale * (factor * self._base_scale / present)]}
 
     def _mass_factor(self, _: Mapping[str, Any]) -> float:
         scenario = self._scenes.scenario

@@ -110,7 +110,7 @@ class MotionArrows:
 
 def length_text(metres: float) -> str:
     """A round length with its unit."""
-    for unit, name in ((1e3, "km"), (1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm")):
+    for unit, name in ((1e3, "km"), (1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")):
         if metres >= unit * (1.0 - 1e-9):
             return f"{metres / unit:.3g} {name}"
     return f"{metres:.3g} m"

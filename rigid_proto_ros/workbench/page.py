@@ -184,7 +184,8 @@ class Page:
             self.link.listen()
             self._open.set()
 
-    async def _on_disconnect(self, _: viser.ClientHandle) -> None:
+    async def _on_disconnect(self, client: viser.ClientHandle) -> None:
+        self.pointer.left(client.client_id)
         await asyncio.sleep(GRACE_S)
         if not self.server.get_clients() and self._open.is_set():
             self._open.clear()

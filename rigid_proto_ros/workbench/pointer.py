@@ -217,6 +217,11 @@ class Pointer:
         wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
         asyncio.get_running_loop().call_later(wait_s, self._release, drag)
 
+    def left(self, client_id: int) -> None:
+        """A page has gone, perhaps without a word: a string that it held would be held for ever."""
+        if self._drag is not None and self._drag.client_id == client_id:
+            self.let_go()
+
     def _release(self, drag: _Drag) -> None:
         self._hand.do(ScriptCommand(0, "string_release"))
         if self._drag is drag:

@@ -170,6 +170,16 @@ def test_a_factors_box_holds_the_factor_itself_and_its_slider_the_logarithm(flow
     assert factor() == before and float(box.value) == pytest.approx(before, rel=1e-3)
 
 
+def test_a_size_is_set_to_the_digit_and_one_refused_is_told_as_it_was_typed(flown: FlownPage) -> None:
+    for factor in ("1e-6", "0.3", "7", "1"):
+        flown.set("Size ×", factor)
+    assert list(flown.page.scenes.scenario.setup.body.scale) == [1.0, 1.0, 1.0]
+    flown.set("Size ×", "0.3")
+    flown.set("Size ×", "1e12")
+    flown.until(lambda: flown.said, "a refusal")
+    assert "got [1000000000000.0, " in flown.said[0] and "<= 1e+09" in flown.said[0]
+
+
 def test_the_ballast_form_shows_the_prepared_weight_at_its_place(flown: FlownPage) -> None:
     flown.do(lambda: flown.link.set_parameters({"ballast.tip": [0.0, 0.0, 0.0, 0.07]}))
     flown.wait_until_still()

@@ -93,6 +93,25 @@ def test_a_release_taken_together_with_the_last_target_is_sent_again_and_nobody_
     assert not hand.pointer.dragging
 
 
+def test_a_page_that_goes_while_it_pulls_leaves_the_string_to_the_others() -> None:
+    hand = Hand(paused=False)
+
+    async def pulling() -> None:
+        hand.pointer.grab(1, np.array([0.0, 0.0, 0.07]), np.array([0.0, 0.0, 0.1]))
+        hand.link.fly(0.05)
+        hand.pointer.left(2)  # somebody else
+        assert hand.pointer.dragging
+        hand.pointer.left(1)
+        assert not hand.pointer.dragging
+        await asyncio.sleep(0.1)
+        hand.link.fly(0.01)
+        assert hand.link.simulation.string is None
+        hand.pointer.grab(2, np.array([0.0, 0.0, 0.07]), np.array([0.0, 0.0, 0.1]))
+        assert hand.pointer.dragging
+
+    asyncio.run(pulling())
+
+
 def test_what_is_done_together_in_flight_is_one_message_and_waits_for_nothing() -> None:
     hand = Hand(paused=False)
 
