@@ -33,18 +33,35 @@ class Status:
         self._heard_s = -1e9
         self._silent_since = ""
         self._waits_from_s: float | None = None
-        self._troubles: dict[str, float] = {}
+        # Troubles are counted from the report before the first one that is still shown.
+        self._since: Mapping[str, str] = {}
+        self._since_s = self._report_s = 0.0
+        self._trouble_until_s = self._slow_until_s = -1e9
 
     def report(self, values: Mapping[str, str], now_s: float) -> None:
         """A report of /diagnostics."""
         last, self._last = self._last, values
+        last_s, self._report_s = self._report_s, now_s
         self.received(now_s)
-        if last:
-            said = command_warnings(last, values)
-            lost_s = increase("real_time_lost_s", last, values)
-            if lost_s > SLOW:
-                said.append(f"this machine is too slow: {lost_s:.2g} s behind real time")
-            self._troubles |= dict.fromkeys(said, now_s + SHOWN_S)
+        if not last:
+            return
+        slow = increase("real_time_lost_s", last, values) > SLOW
+        if slow or command_warnings(last, values):
+            if now_s >= self._trouble_until_s:
+                self._since, self._since_s = last, last_s
+            self._trouble_until_s = now_s + SHOWN_S
+            if slow:
+                self._slow_until_s = self._trouble_until_s
+
+    def _troubles(self, now_s: float) -> list[str]:
+        """One line a kind, however long it has been going on."""
+        if now_s >= self._trouble_until_s:
+            return []
+        said = command_warnings(self._since, self._last)
+        if now_s < self._slow_until_s:
+            lost_s, span_s = increase("real_time_lost_s", self._since, self._last), self._report_s - self._since_s
+            said.append(f"this machine is too slow: in the last {span_s:.0f} s it fell {lost_s:.2g} s behind real time")
+        return said
 
     def received(self, now_s: float) -> None:
         """The node has said something."""
@@ -71,9 +88,8 @@ class Status:
         elif choice and choice != last.get("integrator"):
             state += f", method {choice}"
         text = f"`{self._target}` is {state.replace('flying', 'simulating', 1)}"
-        self._troubles = {said: until_s for said, until_s in self._troubles.items() if until_s > now_s}
         warnings = [last["warning"]] if last.get("warning") else []
-        return "".join([text, *(f"  \n⚠ {said}" for said in (*warnings, *self._troubles))])
+        return "".join([text, *(f"  \n⚠ {said}" for said in (*warnings, *self._troubles(now_s)))])
 
     def _waiting(self, now_s: float) -> str:
         if self._waits_from_s is None:

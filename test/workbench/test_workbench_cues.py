@@ -130,7 +130,16 @@ def test_a_body_at_rest_has_no_arrows() -> None:
 
 
 @pytest.mark.parametrize(
-    "metres, text", [(2.5e-7, "250 nm"), (5e-5, "50 µm"), (0.002, "2 mm"), (0.05, "5 cm"), (0.5, "50 cm"), (20.0, "20 m"), (5e3, "5 km")]
+    "metres, text",
+    [
+        (2.5e-7, "250 nm"),
+        (5e-5, "50 µm"),
+        (0.002, "2 mm"),
+        (0.05, "5 cm"),
+        (0.5, "50 cm"),
+        (20.0, "20 m"),
+        (5e3, "5 km"),
+    ],
 )
 def test_lengths_are_written_with_the_unit_that_suits_them(metres: float, text: str) -> None:
     assert length_text(metres) == text

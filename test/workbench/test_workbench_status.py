@@ -47,7 +47,10 @@ def test_states_published_late_are_no_matter_of_the_pages_user() -> None:
     [
         ({"refused_total": 3, "refused_frame": 2, "refused_stamp": 1}, "3 commands refused (frame 2, stamp 1)"),
         ({"sequence_gaps": 1}, "1 message lost on the way"),
-        ({"overruns": 9, "real_time_lost_s": 0.4}, "this machine is too slow: 0.4 s behind real time"),
+        (
+            {"overruns": 9, "real_time_lost_s": 0.4},
+            "this machine is too slow: in the last 1 s it fell 0.4 s behind real time",
+        ),
         ({"warning": "step too coarse"}, "step too coarse"),
     ],
 )
@@ -61,6 +64,18 @@ def test_a_trouble_is_shown_long_enough_to_be_read_and_then_no_more() -> None:
     for second, report in enumerate([CALM, refused, *[refused] * 20]):
         status.report(report, float(second))
         assert ("1 command refused" in status.text(float(second))) == (1 <= second < 1 + SHOWN_S)
+
+
+def test_a_trouble_that_goes_on_is_one_line_with_its_sum() -> None:
+    status = Status("/rigid_body")
+    for second in range(21):
+        lost = {"real_time_lost_s": str(0.3 * second), "refused_total": str(second), "refused_frame": str(second)}
+        status.report({**CALM, **lost}, float(second))
+    lines = status.text(20.0).splitlines()
+    assert [line.strip() for line in lines[1:]] == [
+        "⚠ 20 commands refused (frame 20)",
+        "⚠ this machine is too slow: in the last 20 s it fell 6 s behind real time",
+    ]
 
 
 def test_a_node_that_is_gone_is_said_with_what_to_do_until_it_is_back() -> None:
