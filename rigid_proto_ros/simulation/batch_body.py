@@ -68,6 +68,8 @@ def _points_with_mass(ballast: np.ndarray) -> tuple[np.ndarray, bool]:
                 return ballast, False
         if ballast[k, 0] > 0.0:
             count += 1
+    if count == ballast.shape[0]:
+        return ballast, True
     points = np.empty((count, 4))
     at = 0
     for k in range(ballast.shape[0]):
@@ -90,7 +92,7 @@ def _explicit(s: np.ndarray, settings: np.ndarray, points: np.ndarray) -> _Made:
     inertia[0, 2] = inertia[2, 0] = given[2]
     inertia[1, 2] = inertia[2, 1] = given[4]
     mass = settings[GIVEN_MASS]
-    center = settings[GIVEN_CENTER : GIVEN_CENTER + 3].copy()
+    center = settings[GIVEN_CENTER : GIVEN_CENTER + 3]
     good = 0.0 < mass < math.inf
     # Without ballast the tensor that comes out is the one given.
     if points.shape[0] > 0:
@@ -111,10 +113,8 @@ def _spread(s: np.ndarray, settings: np.ndarray, points: np.ndarray, constants: 
         for k in range(3):
             uniform = uniform and abs(s[k]) == abs(s[0])
             left[k] = math.copysign(abs(s[0]), s[k])
-    reference = constants[REFERENCE : REFERENCE + 3].copy()
-    center = constants[CENTER : CENTER + 3].copy()
-    low = constants[CENTER_LOW : CENTER_LOW + 3].copy()
-    second = constants[SECOND : SECOND + 6].copy()
+    reference, center = constants[REFERENCE : REFERENCE + 3], constants[CENTER : CENTER + 3]
+    low, second = constants[CENTER_LOW : CENTER_LOW + 3], constants[SECOND : SECOND + 6]
     total, com, inertia, principal, _, _ = spread_mass(
         mass, constants[MEASURE], s, left, center, low, reference, second, points
     )
@@ -126,7 +126,7 @@ def make_body_row(settings: np.ndarray, ballast: np.ndarray, constants: np.ndarr
     """Fill ``body`` (BODY,) from settings (SETTINGS,), ballast (k, 4) and a mesh's constants; False when
     the simulation has to check it.
     """
-    s = settings[SCALE : SCALE + 3].copy()
+    s = settings[SCALE : SCALE + 3]
     for k in range(3):
         if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
             return False
