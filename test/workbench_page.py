@@ -75,6 +75,7 @@ class Page:
     def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
         self._fingers = None
+        self.scene: dict = {}  # that its tests begin with
         self.page.set_default_timeout(PATIENCE_S * 1e3)
         self.page.add_init_script(
             f"const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), {DRAWN_MS})"
@@ -229,6 +230,10 @@ class Ear(RosClient):
         from rigid_proto_ros.scene.scene_file import read_scene_text
 
         return read_scene_text(self.until(lambda: self.heard("scene", last=1), "a scene")[-1]["data"]).values
+
+    def until_scene(self, condition) -> dict:
+        """Wait until the parameters in force meet a condition; returns them."""
+        return self.until(lambda: condition(values := self.values()) and [values], "a scene as asked for")[0]
 
     def until_value(self, name: str, condition):
         """Wait until a parameter meets a condition; returns it."""

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The interactive page in a real browser: what hands do to the picture is what the node receives.
 
-One node, one page server and one browser for all tests; each begins with the teapot at rest at the world's origin.
+One node, one page server and one browser for all tests; each begins with the teapot at rest at the world's origin,
+whatever scene the one before it, which may have failed, has left.
 """
 
 from __future__ import annotations
@@ -78,13 +79,24 @@ def linked_page(bench, browser, ear) -> Page:
 def shared_page(linked_page, ear) -> Page:
     ear.event("poke")
     assert ear.set_named({"gravity": [0.0, 0.0, 0.0]})[0][0]
+    linked_page.scene = ear.until_scene(lambda values: values["gravity"] == [0.0, 0.0, 0.0])
     return linked_page
+
+
+def restore_scene(page: Page, ear: Ear) -> None:
+    """The scene of the beginning again, if a test has left another one."""
+    values = ear.values()
+    changed = {name: value for name, value in page.scene.items() if values.get(name) != value}
+    if changed:
+        assert ear.set_named(changed, atomically=True)[0][0]
+        ear.until_scene(lambda values: all(values.get(name) == value for name, value in changed.items()))
 
 
 @pytest.fixture
 def page(shared_page, ear) -> Page:
     """The page with the body at rest at the origin, in the middle of the picture, and the Play tab open."""
     ear.trigger("string/release")
+    restore_scene(shared_page, ear)
     shared_page.tab("Play")
     put_at_rest(shared_page, ear)
     return shared_page
@@ -388,14 +400,11 @@ def drag_message(phase: str, start: tuple, end: tuple) -> bytes:
 
 
 def test_one_click_shows_a_lesson_with_body_and_ghost_and_the_angle_between_them(page, ear) -> None:
-    before = ear.values()
     page.button(START)
     ear.until_value("ghost.inertia_model", lambda model: model == "bounding_box")
     page.until(lambda: re.search(r"[1-9]\d*° apart", page.text), "the angle between body and ghost")
-    now = ear.values()
-    restore = {name: value for name, value in before.items() if now[name] != value}
-    assert ear.set_named(restore, atomically=True)[0][0]
-    ear.until_value("mesh", lambda mesh: mesh == "teapot")
+    restore_scene(page, ear)
+    assert read_scene("teapot", {}).parameters.mesh == ear.values()["mesh"]
 
 
 def test_a_killed_node_is_said_on_the_page_which_goes_on_with_the_next_one(page, bench) -> None:
