@@ -90,8 +90,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def _without_unused_libraries() -> None:
     """Let numba find neither SciPy's BLAS, cffi nor other packages' extensions, as where they aren't installed: no
-    kernel of this package has a use for them, and looking for them takes three tenths of a command's start. For processes
-    that run nobody else's kernels.
+    kernel of this package has a use for them, and looking for them takes three tenths of a command's start. For
+    processes that run nobody else's kernels.
     """
     # The modules that look for them, when the first kernel is called (tried with numba 0.68).
     modules: dict[str, Any] = sys.modules

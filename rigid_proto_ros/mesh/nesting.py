@@ -37,8 +37,8 @@ _UNKNOWN, _OUTSIDE, _INSIDE = 0, 1, 2
 
 @njit(cache=True, nogil=True)
 def _may_hit(box: np.ndarray, origin: np.ndarray, inverse: np.ndarray, reach: float) -> bool:
-    """Whether the ray from ``origin`` comes within ``reach`` of the box, so that no hit is lost that isn't sure; inverse
-    (3,): 1/direction.
+    """Whether the ray from ``origin`` comes within ``reach`` of the box, so that no hit is lost that isn't sure;
+    inverse (3,): 1/direction.
     """
     near, far = 0.0, math.inf
     for k in range(3):
