@@ -1,18 +1,40 @@
 # SPDX-License-Identifier: MIT
 """Error-free transformations: a sum or product of two doubles as an unevaluated pair high + low.
 
-Two-sum after Knuth (TAOCP 2, 4.2.2), two-product after Dekker (Numer. Math. 18, 1971) with Veltkamp's split, pair
-arithmetic after Hida, Li and Bailey (QD, 2001). A pair carries about 104 bits. Nothing here may be compiled with
-fastmath: the whole point is the rounding error that algebra says is zero.
+Two-sum after Knuth (TAOCP 2, 4.2.2), two-product by a fused multiply-add (Ogita, Rump and Oishi, SIAM J. Sci. Comput.
+26, 2005), pair arithmetic after Hida, Li and Bailey (QD, 2001). A pair carries about 104 bits. Nothing here may be
+compiled with fastmath: the whole point is the rounding error that algebra says is zero.
 """
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
+from typing import Any
+
 import numpy as np
+from llvmlite import ir
+from numba import float64
 
-from .compilation import njit
+from .compilation import INTERPRETED, intrinsic, njit
 
-_SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
+
+def _fused_exactly(a: float, b: float, c: float) -> float:
+    if not all(map(math.isfinite, (a, b, c))):
+        return a * b + c
+    return float(Fraction(a) * Fraction(b) + Fraction(c))
+
+
+def _fused_by_the_processor(_typing_context: Any, _a: Any, _b: Any, _c: Any) -> tuple:
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
+        # Where the processor has no such operation LLVM calls fma of the C library, which rounds once, too.
+        return builder.fma(*arguments)
+
+    return float64(float64, float64, float64), code
+
+
+fused_multiply_add = _fused_exactly if INTERPRETED else intrinsic(_fused_by_the_processor)
+"""a b + c, rounded once."""
 
 
 @njit(cache=True)
@@ -32,15 +54,9 @@ def fast_two_sum(a: float, b: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def two_product(a: float, b: float) -> tuple[float, float]:
-    """a b = high + low, exactly, while |a|, |b| < 1e300 and |a b| > 1e-290 or zero."""
+    """a b = high + low, exactly, while |a b| > 1e-290 or zero."""
     high = a * b
-    t = _SPLITTER * a
-    a1 = t - (t - a)
-    a2 = a - a1
-    t = _SPLITTER * b
-    b1 = t - (t - b)
-    b2 = b - b1
-    return high, ((a1 * b1 - high) + a1 * b2 + a2 * b1) + a2 * b2
+    return high, fused_multiply_add(a, b, -high)
 
 
 @njit(cache=True)
