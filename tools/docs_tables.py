@@ -231,6 +231,7 @@ _TOOLS = {
     "pinocchio": "Pinocchio, RKMK4",
     "bullet": "Bullet",
     "scipy": "SciPy, DOP853",
+    "heyoka": "heyoka.py, Taylor series compiled for each system",
     "diffrax": "diffrax",
 }
 
