@@ -8,33 +8,10 @@ compiled with fastmath: the whole point is the rounding error that algebra says 
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
-from numba import float64
 
-from .compilation import INTERPRETED, intrinsic, njit
-
-
-def _fused_exactly(a: float, b: float, c: float) -> float:
-    if not all(map(math.isfinite, (a, b, c))):
-        return a * b + c
-    return float(Fraction(a) * Fraction(b) + Fraction(c))
-
-
-def _fused_by_the_processor(_typing_context: Any, _a: Any, _b: Any, _c: Any) -> tuple:
-    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
-        # Where the processor has no such operation LLVM calls fma of the C library, which rounds once, too.
-        return builder.fma(*arguments)
-
-    return float64(float64, float64, float64), code
-
-
-fused_multiply_add = _fused_exactly if INTERPRETED else intrinsic(_fused_by_the_processor)
-"""a b + c, rounded once."""
+from .compilation import njit
+from .simd import fused_multiply_add
 
 
 @njit(cache=True)

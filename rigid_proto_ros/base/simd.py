@@ -2,13 +2,15 @@
 """Vectors of doubles in processor registers, for compiled kernels: several numbers go through each operation at once.
 
 Operations are those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one:
-the bits are those of the same operations on single numbers.
+the bits are those of the same operations on single numbers. The one fused operation, of single numbers, is asked for.
 """
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -233,3 +235,20 @@ overload(operator.add)(_operation("fadd"))
 overload(operator.sub)(_operation("fsub"))
 overload(operator.mul)(_operation("fmul"))
 overload(operator.truediv)(_operation("fdiv"))
+
+
+def _fused_exactly(a: float, b: float, c: float) -> float:
+    if not all(map(math.isfinite, (a, b, c))):
+        return a * b + c
+    return float(Fraction(a) * Fraction(b) + Fraction(c))
+
+
+@_operation_on_vectors(_fused_exactly)
+def fused_multiply_add(_typing_context: Any, _a: Any, _b: Any, _c: Any) -> tuple:
+    """a b + c, rounded once."""
+
+    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
+        # Where the processor has no such operation LLVM calls fma of the C library, which rounds once, too.
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), code
