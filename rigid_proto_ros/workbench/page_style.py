@@ -34,9 +34,10 @@ _SHEET = '.mantine-Paper-root[style*="position: fixed"][style*="max-height: 60%"
 _READOUTS = '[aria-label$=" panel Readouts"]'
 _PICTURE = 'div[style*="flex-grow: 1"][style*="height: 100%"]:has(canvas)'
 
-_DOCKED = f"width: {PANEL_PIXELS + 4}px"  # with its edges
-_DOCK = f'[style*="right: 0px"][style*="{_DOCKED}"]'
-_DOCKED_PICTURE = f'[style*="inset: 0px {PANEL_PIXELS + 4}px 0px 0px"]'
+# Of any width: dragging its edge changes that, and so does viser on a window that was a telephone's.
+_DOCK = '[style*="position: absolute; top: 0px; bottom: 0px; right: 0px; width: "]'
+_DOCKED_ROW = f'{_DOCK} [style*="flex-direction: row; position: relative; width: "]'
+_DOCKED_PICTURE = '[style*="position: absolute; inset: 0px "]:has(canvas)'
 _DOCKED_COLUMN = f'{_DOCK} [style*="flex-direction: column"][style*="overflow: hidden auto"]'
 
 _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
@@ -54,7 +55,7 @@ STYLE = f"""<style>
   {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}) {{ order: -1; }}
   {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
 }}
-@media {MEDIUM} {{ {_DOCK} [style*="{_DOCKED}"] {{ width: 100% !important; }} }}
+@media {MEDIUM} {{ {_DOCKED_ROW} {{ width: 100% !important; }} }}
 @media {MEDIUM} and (orientation: landscape) {{
   {_DOCK} {{ width: {100 - BESIDE_SHARE}% !important; }}
   {_DOCKED_PICTURE} {{ right: {100 - BESIDE_SHARE}% !important; }}

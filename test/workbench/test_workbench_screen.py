@@ -166,16 +166,15 @@ def test_between_telephone_and_desktop_the_picture_has_most_of_the_window_and_al
     browser_page, width, height
 ) -> None:
     page = browser_page
+    # viser gives the panel another width where the window was a telephone's before.
+    page.set_viewport_size(PHONE)
+    until(lambda: _sheet(page) is not None, "viser's bottom sheet")
     page.set_viewport_size({"width": width, "height": height})
-    # A window that was a telephone's keeps viser's sheet with the panel until the page is loaded anew.
-    page.reload()
     share = 0.56 if height > width else 0.6
 
     def laid_out() -> bool:
         canvas = page.locator("canvas").first.bounding_box()
         panel = page.locator(".mantine-Paper-root", has=page.get_by_role("tab", name="Play")).first.bounding_box()
-        if canvas is None or panel is None:
-            return False
         if height > width:
             apart = panel["y"] >= canvas["y"] + canvas["height"] - 1.0 and canvas["width"] == width
             return apart and canvas["height"] >= share * height - 1.0
