@@ -20,13 +20,26 @@ MODULES = {
 }
 ORDER = (
     *("base", "mesh", "mass", "motion", "simulation", "messages", "scene", "session"),
-    *("rerun_view", "ros", "workbench", "sweep", "identify", "export", "cli"),
+    *("rerun_view", "ros", "workbench", "sweep", "identify", "export", "robots", "cli"),
 )
 """Folders in the order of imports: each knows only those before it."""
 STRANGERS = {
     "sweep": ("rerun_view", "ros", "workbench"),
     "identify": ("rerun_view", "ros", "workbench", "sweep"),
     "export": ("ros", "workbench", "sweep", "identify"),
+    "robots": (
+        "motion",
+        "simulation",
+        "messages",
+        "scene",
+        "session",
+        "rerun_view",
+        "ros",
+        "workbench",
+        "sweep",
+        "identify",
+        "export",
+    ),
 }
 """Folders that stand before one in the order but that it doesn't know all the same."""
 ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")

@@ -209,8 +209,8 @@ def _models(body: MeshBody, mass: float | None, density: float | None) -> dict[s
 def _inertials(path: Path) -> dict[str, Candidate]:
     """The links of a robot file that have an inertial."""
     from ..identify.comparison import Candidate
-    from ..mass.robot_files import read_robot
     from ..mass.tensor import check_tensor
+    from ..robots.reading import read_robot
 
     found = {}
     for link in read_robot(path):

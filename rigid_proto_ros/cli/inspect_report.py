@@ -14,9 +14,9 @@ from ..mass.tensor import principal_axes, six_from_tensor
 from .terminal import SEVERITY_STYLES, Text, line, table
 
 if TYPE_CHECKING:
-    from ..mass.diagnosis import LinkDiagnosis
-    from ..mass.robot_fix import FixedLink
-    from ..mass.robot_lump import Lump
+    from ..robots.composite_inertia import Lump
+    from ..robots.diagnosis import LinkDiagnosis
+    from ..robots.fix import FixedLink
 
 _STATUS_STYLES = {"ok": "green", "off": "bold red"}
 SHOWN_ZERO = 5e-7

@@ -20,9 +20,9 @@ from ..mass.tensor import principal_axes, six_from_tensor
 from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links, print_lump
 
 if TYPE_CHECKING:
-    from ..mass.diagnosis import LinkDiagnosis, Options
-    from ..mass.robot_fix import FixedLink
-    from ..mass.robot_lump import Lump
+    from ..robots.composite_inertia import Lump
+    from ..robots.diagnosis import LinkDiagnosis, Options
+    from ..robots.fix import FixedLink
 
 _COMPARES = ("link", "fix", "total_mass", "tolerance")
 _LUMPS = ("joint", "as_scene")
@@ -113,7 +113,7 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
 
 def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
     """``inspect [MESH] --compare ROBOT``: 0 when every link checked is right to the tolerance, otherwise 1."""
-    from ..mass.diagnosis import OFF, OK, UNKNOWN, compare_robot  # XML and all: only who compares pays for it
+    from ..robots.diagnosis import OFF, OK, UNKNOWN, compare_robot  # XML and all: only who compares pays for it
 
     _check(args, mesh, scale)
     chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
@@ -137,7 +137,7 @@ def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass
 def lump(args: argparse.Namespace) -> int:
     """``inspect --lump ROBOT``: the robot as one body, printed, and written as a scene where it is asked for."""
     from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
-    from ..mass.robot_lump import lump_robot
+    from ..robots.composite_inertia import lump_robot
 
     for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback"):
         if getattr(args, flag):
@@ -176,7 +176,7 @@ def _lump_as_dict(args: argparse.Namespace, whole: Lump) -> dict:
 
 def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
     """Write the scene, and beside it the mesh, which carries the picture alone; returns what was written."""
-    from ..mass.robot_lump import obj_text
+    from ..robots.composite_inertia import obj_text
     from ..scene.scenario import scene_text
 
     with whole_file("--as-scene", name) as scene:
@@ -216,7 +216,7 @@ def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> No
 
 
 def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
-    from ..mass.diagnosis import LIMIT, Options
+    from ..robots.diagnosis import LIMIT, Options
 
     both = mass.by_link.keys() & density.by_link.keys()
     if both:
@@ -240,8 +240,8 @@ def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
 
 def _fix(args: argparse.Namespace, options: Options) -> int:
     """Write OUT; 0 when no link is off any longer, otherwise 1."""
-    from ..mass.diagnosis import OFF
-    from ..mass.robot_fix import fix_robot
+    from ..robots.diagnosis import OFF
+    from ..robots.fix import fix_robot
 
     data, links = fix_robot(Path(args.compare), options, link=args.link)
     with whole_file("--fix", args.fix) as path:

@@ -12,7 +12,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.export import mjcf_inertial, quaternion_wxyz, sdf_inertial, urdf_inertial
 from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
-from rigid_proto_ros.mass.robot_files import read_robot
+from rigid_proto_ros.robots.reading import read_robot
 
 BODIES = {
     "lopsided": moved(prism([[1, 0], [0.2, 0.8], [-0.9, 0.3], [-0.1, -0.7]], 1.3, 0.5, 3), (0.3, -0.2, 5.0), 4),
@@ -101,7 +101,7 @@ def test_the_com_frame_has_no_offset_and_says_where_the_mesh_goes(properties):
 def test_quaternions_of_half_turns_and_others_give_the_rotation_back(seed):
     from mass_solids import rotation
 
-    from rigid_proto_ros.mass.robot_files import rotation_from_wxyz
+    from rigid_proto_ros.robots.reading import rotation_from_wxyz
 
     for R in (rotation(seed), np.diag([1.0, -1, -1]), np.diag([-1.0, 1, -1]), np.diag([-1.0, -1, 1]), np.eye(3)):
         assert rotation_from_wxyz(quaternion_wxyz(R)) == pytest.approx(R, abs=1e-15)

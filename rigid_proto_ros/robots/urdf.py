@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from .robot_files import (
+from .reading import (
     COLLISION,
     VISUAL,
     LinkInertial,

@@ -17,7 +17,7 @@ from ..base.errors import InputError
 from ..base.files import read_bounded
 from ..base.rotation import matrix_from_quaternion
 from ..mesh.locate import Search
-from .robot_xacro import expand_xacro
+from .xacro import expand_xacro
 
 MAX_BYTES = 50_000_000
 VISUAL, COLLISION = "visual", "collision"
@@ -168,8 +168,8 @@ def robot_root(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...
 
 def links_of(root: ElementTree.Element, path: Path) -> list[LinkInertial]:
     """The links below the root of a robot file that have an inertial or a shape; raises InputError as read_robot."""
-    from .robot_mjcf import read_mjcf
-    from .robot_urdf import read_sdf, read_urdf
+    from .mjcf import read_mjcf
+    from .urdf import read_sdf, read_urdf
 
     readers: dict[str, Callable[[ElementTree.Element, Path], list[LinkInertial]]] = {
         "robot": read_urdf,

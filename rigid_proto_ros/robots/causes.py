@@ -8,10 +8,10 @@ import itertools
 import numpy as np
 
 from ..base.errors import InputError
+from ..mass.properties import MassProperties
+from ..mass.tensor import six_from_tensor
 from .link_shapes import LinkShapes
-from .properties import MassProperties
-from .robot_files import Shape
-from .tensor import six_from_tensor
+from .reading import Shape
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""

@@ -14,9 +14,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ..base.errors import InputError, one_of
-from .robot_files import floats, rotation_from_wxyz
-from .robot_mjcf import Model, element_rotation, mjcf_model
-from .robot_urdf import sdf_pose, urdf_pose
+from .mjcf import Model, element_rotation, mjcf_model
+from .reading import floats, rotation_from_wxyz
+from .urdf import sdf_pose, urdf_pose
 
 TURNS, SLIDES, FIXED, OTHER = "turns", "slides", "fixed", "other"
 

@@ -12,13 +12,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ..base.errors import InputError
+from ..mass.properties import MassProperties
+from ..mass.tensor import check_tensor
 from ..mesh.hull import box_surface
 from ..mesh.locate import Search
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
-from .properties import MassProperties
-from .robot_files import COLLISION, VISUAL, LinkInertial, Shape, links_of, robot_root
-from .robot_tree import Pose, link_poses
-from .tensor import check_tensor
+from .poses import Pose, link_poses
+from .reading import COLLISION, VISUAL, LinkInertial, Shape, links_of, robot_root
 
 SEGMENTS = 48
 """Corners of a round shape's circle: what a picture needs, for no mass is taken of it."""

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from mass_solids import box
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
-from test_inertia_doctor import words
+from test_causes import words
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.diagnosis import Options, compare_robot
-from rigid_proto_ros.mass.link_shapes import LinkShapes, primitive_solid
-from rigid_proto_ros.mass.robot_files import Shape, printed_steps, rotation_from_rpy
+from rigid_proto_ros.robots.diagnosis import Options, compare_robot
+from rigid_proto_ros.robots.link_shapes import LinkShapes, primitive_solid
+from rigid_proto_ros.robots.reading import Shape, printed_steps, rotation_from_rpy
 
 CUBE = CUBE_VERTICES - 0.5  # about its centre: inertia m/6 on the diagonal
 SIXTH = 1.0 / 6.0
@@ -280,7 +280,7 @@ def test_xacro_is_found_beside_the_python_that_runs(tmp_path, monkeypatch):
 
 
 def test_each_meshs_hull_is_made_once_a_link(tmp_path, monkeypatch):
-    from rigid_proto_ros.mass import link_shapes
+    from rigid_proto_ros.robots import link_shapes
 
     calls = []
     hull = link_shapes.convex_hull

@@ -12,9 +12,9 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.diagnosis import Options, compare_robot
-from rigid_proto_ros.mass.robot_files import read_robot
-from rigid_proto_ros.mass.robot_fix import fix_robot
+from rigid_proto_ros.robots.diagnosis import Options, compare_robot
+from rigid_proto_ros.robots.fix import fix_robot
+from rigid_proto_ros.robots.reading import read_robot
 
 BAR = (CUBE_VERTICES - 0.5) * [0.1, 0.2, 0.3]
 INERTIAL = re.compile(rb"<inertial\b.*?(?:</inertial>|/>(?=\s*<(?:/body|geom|inertial)))", re.DOTALL)

@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, did_you_mean
+from ..mass.from_mesh import MeshBody, mesh_body
+from ..mass.properties import MassProperties
+from ..mass.tensor import check_tensor
 from ..mesh.locate import Search, resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
-from .from_mesh import MeshBody, mesh_body
-from .inertia_causes import LIMIT, explain_center, explain_inertia
+from .causes import LIMIT, explain_center, explain_inertia
 from .link_shapes import LinkShapes, primitive_solid
-from .properties import MassProperties
-from .robot_files import COLLISION, VISUAL, LinkInertial, Shape, read_robot
-from .tensor import check_tensor
+from .reading import COLLISION, VISUAL, LinkInertial, Shape, read_robot
 
 WATER = 1000.0
 """kg/m³ of a link of which no mass is known."""

@@ -13,9 +13,9 @@ from mesh_files import CUBE_VERTICES, stl
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
-from rigid_proto_ros.mass.link_shapes import primitive_solid
-from rigid_proto_ros.mass.robot_lump import lump_robot
 from rigid_proto_ros.mesh.reading import Mesh
+from rigid_proto_ros.robots.composite_inertia import lump_robot
+from rigid_proto_ros.robots.link_shapes import primitive_solid
 
 TENSOR = 'ixx="0.03" ixy="0.001" ixz="-0.002" iyy="0.02" iyz="0.003" izz="0.025"'
 

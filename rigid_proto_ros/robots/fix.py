@@ -16,11 +16,11 @@ from xml.parsers import expat
 
 from ..base.errors import InputError
 from ..base.files import read_bounded
+from ..mass.export import is_flat, quaternion_wxyz
+from ..mass.properties import MassProperties
+from ..mass.tensor import principal_axes, six_from_tensor
 from .diagnosis import MISSING, OFF, UNKNOWN, LinkDiagnosis, Options, Robot
-from .export import is_flat, quaternion_wxyz
-from .properties import MassProperties
-from .robot_files import MAX_BYTES, LinkInertial, is_xacro, links_of, parse_xml
-from .tensor import principal_axes, six_from_tensor
+from .reading import MAX_BYTES, LinkInertial, is_xacro, links_of, parse_xml
 
 _SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")

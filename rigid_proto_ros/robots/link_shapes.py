@@ -10,12 +10,12 @@ from itertools import product
 import numpy as np
 
 from ..base.errors import InputError
+from ..mass.from_mesh import MeshBody
+from ..mass.moments import referenced_vertices, solid_moments
+from ..mass.properties import MassProperties
+from ..mass.verdict import COUNTED_TWICE, WARNING
 from ..mesh.hull import convex_hull
-from .from_mesh import MeshBody
-from .moments import referenced_vertices, solid_moments
-from .properties import MassProperties
-from .robot_files import Shape
-from .verdict import COUNTED_TWICE, WARNING
+from .reading import Shape
 
 
 def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarray]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.files import read_bounded
-from .robot_files import (
+from .reading import (
     COLLISION,
     MAX_BYTES,
     VISUAL,
