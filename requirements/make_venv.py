@@ -141,9 +141,8 @@ class Progress:
         """(status, output) of a process, when it has ended."""
         while self.live:
             packages = len(list(VENV.glob("lib/python3*/site-packages/*.dist-info")))
-            kernels = len(list((ROOT / "rigid_proto_ros").glob("**/__pycache__/*.nbc")))
             seconds = time.monotonic() - self.start
-            line = "{}: {} packages, {} compiled kernels, {:.0f} s".format(self.text, packages, kernels, seconds)
+            line = "{}: {} packages, {:.0f} s".format(self.text, packages, seconds)
             print("\r\033[K" + line[:100], end="", flush=True)
             try:
                 output = process.communicate(timeout=0.5)[0]
@@ -252,8 +251,8 @@ def install_beside_ros(python, stage):
         requirements = ["numpy" if normalized(re.split("[<>=]", line)[0]) == "numpy" else line for line in requirements]
     if old_numpy:
         # It asks for numpy 2 and runs with 1.26: tools/fresh_machine tries it.
-        requirements = [line for line in requirements if not line.startswith(("rerun-sdk", "pyarrow", "pygfx"))]
-        # pyarrow 26 refuses numpy 1, and so does pygfx: no films there.
+        requirements = [line for line in requirements if not line.startswith(("rerun-sdk", "pyarrow"))]
+        # pyarrow 26 refuses numpy 1.
         requirements += ["attrs", "pillow", "psutil>=7", "pyarrow>=18,<22", "typing_extensions"]
     limits.write_text("\n".join(lines) + "\n", encoding="utf-8")
     install(python, "-c", limits, *requirements)

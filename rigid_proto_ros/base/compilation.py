@@ -3,7 +3,7 @@
 
 numba keeps compiled code on disk and compiles anew when the file of a function has changed, but not when a file has
 that this one imports from, though its functions are compiled in. After an update the old numbers would go on for ever.
-So a kernel of this package also counts as changed when any file has that its own imports, directly or not.
+So a kernel of this package is kept under the content of its file and of all that this imports, directly or not.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ import functools
 import hashlib
 import os
 import re
+import shutil
 import sys
+import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -27,7 +30,6 @@ try:
     import numba
     from numba import config
     from numba.core import event
-    from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
     from numba.extending import intrinsic as numba_intrinsic
 finally:
     if not _MEASURED:
@@ -77,12 +79,48 @@ def _source(file: str) -> tuple[bytes, list[str]]:
 _exists = functools.cache(os.path.isfile)
 
 
-def _stamp(own: Callable[[], object], file: str) -> tuple[object, bytes]:
-    return own(), source_stamp(file)
+UNUSED_S = 30 * 86400
+"""Kernels of sources that nobody has run for so long are removed when their module's are compiled anew [s]."""
+
+
+@functools.cache
+def kernel_folder(file: str) -> str:
+    """The folder of a source file's kernels, made and writable: named by the content of the file and of all that it
+    imports, so that every checkout, build and installation of the same sources shares it, and none meets another's.
+
+    It lies in NUMBA_CACHE_DIR, in the user's cache folder, or, where neither can be written to, beside the package.
+    """
+    module = os.path.relpath(file, PACKAGE).removesuffix(".py").replace(os.sep, ".")
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    user = base if os.path.isabs(base) else os.path.join(os.path.expanduser("~"), ".cache")
+    usual = (os.path.join(user, "rigid_proto_ros", "kernels"), os.path.join(PACKAGE, "__pycache__", "kernels"))
+    for place in filter(None, (_CONFIG.CACHE_DIR, *usual)):
+        folder = os.path.join(place, f"{module}-{source_stamp(file).hex()[:20]}")
+        try:
+            if not os.path.isdir(folder):
+                os.makedirs(folder, exist_ok=True)
+                _remove_unused(place, f"{module}-")
+            os.utime(folder)
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            continue
+        return folder
+    raise OSError(f"no folder for compiled kernels can be written to: {', '.join(usual)}")
+
+
+def _remove_unused(place: str, prefix: str) -> None:
+    before = time.time() - UNUSED_S
+    for entry in os.scandir(place):
+        if entry.name.startswith(prefix) and entry.stat().st_mtime < before:
+            shutil.rmtree(entry.path, ignore_errors=True)
 
 
 class KernelLocator:
-    """Where numba itself would keep a kernel of this package, with a stamp that knows what the kernel imports."""
+    """Tells numba where a kernel of this package is kept, and which state of the sources it is of."""
+
+    def __init__(self, file: str, line: int) -> None:
+        # numba reads these two names where it warns of what can't be kept.
+        self._py_file, self._lineno = file, line
 
     @classmethod
     def from_function(cls, function: Callable, file: str) -> Any:
@@ -90,12 +128,27 @@ class KernelLocator:
         path = os.path.realpath(file)
         if not path.startswith(PACKAGE + os.sep):
             return None
-        for usual in (UserProvidedCacheLocator, InTreeCacheLocator, UserWideCacheLocator):
-            locator = usual.from_function(function, file)
-            if locator is not None:
-                locator.get_source_stamp = functools.partial(_stamp, locator.get_source_stamp, path)
-                return locator
-        return None
+        try:
+            kernel_folder(path)
+        except OSError:
+            return None
+        return cls(path, function.__code__.co_firstlineno)
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return kernel_folder(self._py_file)
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder again where somebody has removed it meanwhile."""
+        os.makedirs(self.get_cache_path(), exist_ok=True)
+
+    def get_source_stamp(self) -> bytes:
+        """State of the sources; where another one is found on the disk, numba compiles anew."""
+        return source_stamp(self._py_file)
+
+    def get_disambiguator(self) -> str:
+        """Tells apart functions of one name in one file."""
+        return str(self._lineno)
 
 
 _USUAL = "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator,ZipCacheLocator"

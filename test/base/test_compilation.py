@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Kernels kept on disk are those of the present sources."""
 
+import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import rigid_proto_ros
@@ -63,6 +65,29 @@ def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_h
         )
         said.append(ran.stdout.split())
     assert said == [["0.0", "0"], ["0.0", "1"], ["42.0", "0"]]
+
+
+def test_a_copy_elsewhere_finds_the_kernels_of_the_same_sources_and_old_ones_are_removed(tmp_path):
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    said = []
+    for checkout, added in (("one", 1), ("two", 1), ("two", 2), ("one", 1)):
+        base = tmp_path / checkout / "package" / "base"
+        base.mkdir(parents=True, exist_ok=True)
+        shutil.copy(compilation.__file__, base)
+        (base / "inner.py").write_text(INNER.format(added))
+        call = CALL.replace("outer", "inner")
+        command = [sys.executable, "-B", "-c", call]
+        ran = subprocess.run(command, cwd=base.parents[1], env=environment, capture_output=True, text=True, check=True)
+        said.append(ran.stdout.split())
+    # Value, and whether it came from the disk: neither of two versions drives out the other.
+    assert said == [["2", "0"], ["2", "1"], ["3", "0"], ["2", "1"]]
+    kept = sorted((tmp_path / "cache" / "rigid_proto_ros" / "kernels").iterdir())
+    assert len(kept) == 2
+    for folder in kept:
+        os.utime(folder, (1.0, time.time() - compilation.UNUSED_S - 60.0))
+    (base / "inner.py").write_text(INNER.format(3))
+    subprocess.run(command, cwd=base.parents[1], env=environment, check=True, capture_output=True)
+    assert len(list(kept[0].parent.iterdir())) == 1
 
 
 def test_every_kernel_of_the_package_is_kept_that_way():
