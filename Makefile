@@ -50,7 +50,6 @@ lint: setup ## ruff and mypy
 
 pictures: setup run ## fly, and draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
-	.venv/bin/rigid_proto simulate t_handle --duration 9 --video docs/flight.gif --size 640x360 --fps 20 --from 3 --to 9
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) test/workbench_pictures.py docs/workbench.png --compare docs/true_against_box.png
 

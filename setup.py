@@ -25,13 +25,11 @@ ROS = [
 ]
 MCAP = ["mcap>=1.2,<2"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
-# Motion for other tools: tables, glTF, USD, films.
+# Motion for other tools: tables, glTF, USD.
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
-# Films; pygfx needs a Vulkan driver.
-VIDEO = ["pygfx>=0.17", "imageio-ffmpeg>=0.5"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
 # Mass and tensor from recorded motion; zstandard comes with mcap.
-IDENTIFY = ["scipy>=1.11", *MCAP]
+IDENTIFY = ["scipy>=1.11", "rosbags>=0.10", *MCAP]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 # COLLADA and 3MF files through trimesh, the hull, and the union of overlapping parts.
@@ -81,9 +79,9 @@ setup(
         *((f"{SHARE}/{folder}", found) for folder in ("launch",) if (found := sorted(glob(f"{folder}/*.py")))),
     ],
     python_requires=">=3.11",
-    install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0"],
+    install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0", "msgspec>=0.19"],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *VIDEO, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
         "rerun": RERUN,
@@ -92,7 +90,6 @@ setup(
         "sweep": SWEEP,
         "identify": IDENTIFY,
         "export": EXPORT,
-        "video": VIDEO,
         "terminal": TERMINAL,
         "test": TEST,
     },

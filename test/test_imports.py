@@ -59,9 +59,6 @@ ALLOWED = {
     "PIL": ("rerun_view",),
     "pygltflib": ("export.gltf",),
     "pxr": ("export.usd",),
-    "pygfx": ("export.film",),
-    "rendercanvas": ("export.film",),  # comes with pygfx
-    "imageio_ffmpeg": ("export.film",),
     "scipy": ("mesh.hull", "sweep.sampling", "identify"),
     "distributed": ("sweep.cluster",),
     "matplotlib": ("sweep.plot",),

@@ -148,14 +148,14 @@ def test_make_target_exists(command: str) -> None:
 def test_rigid_proto_commands_run(
     in_a_copy: Path, ros_environment: dict[str, str], capsys: pytest.CaptureFixture, whole: bool
 ) -> None:
-    """Sweeps fly thousands of rows and films draw every picture, so they are for the long run."""
+    """Sweeps fly thousands of rows, so they are for the long run."""
     pytest.importorskip("rerun")
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):
         if command.startswith(STAYS_UP) or " demo" in command:
             continue
-        if not whole and (command.startswith(SWEEP) or "--video" in command):
+        if not whole and command.startswith(SWEEP):
             continue
         if "--publish" in command:
             sent = subprocess.run(
@@ -168,8 +168,8 @@ def test_rigid_proto_commands_run(
             )
             assert sent.returncode == 0, (command, sent.stderr)
             continue
-        if (words(command)[1] == "snapshot" or "--video" in command) and not os.path.isdir("/usr/share/vulkan/icd.d"):
-            continue  # snapshot's and the films' own tests say what is missing
+        if words(command)[1] == "snapshot" and not os.path.isdir("/usr/share/vulkan/icd.d"):
+            continue  # snapshot's own tests say what is missing
         assert rigid_proto(words(command)[1:]) == 0, (command, capsys.readouterr().err)
 
 
@@ -417,9 +417,9 @@ def test_picture_is_there_and_small() -> None:
     picture = SOURCE / "docs" / "flight.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert 20_000 < picture.stat().st_size < 300_000
-    film = picture.with_suffix(".gif")
-    assert film.read_bytes().startswith(b"GIF89a")
-    assert 20_000 < film.stat().st_size < 2_000_000
+    moving = picture.with_suffix(".gif")
+    assert moving.read_bytes().startswith(b"GIF89a")
+    assert 20_000 < moving.stat().st_size < 2_000_000
 
 
 def test_frames_of_the_reference_are_read_and_are_what_it_says() -> None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError, one_of
 from ..base.files import output_file
 from ..base.progress import Progress
-from .options import pixels
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
@@ -22,7 +21,6 @@ ENDINGS = {
     "parquet": (".parquet",),
     "gltf": (".glb",),
     "usd": (".usda", ".usdc"),
-    "video": (".mp4", ".gif"),
 }
 """Options that take a file, and how its name may end."""
 
@@ -31,18 +29,14 @@ HELP = {
     "parquet": "write the states as a table",
     "gltf": "write the motion for Blender, Unreal, three.js and others that read glTF",
     "usd": "write the motion, with mass properties, for Omniverse, Houdini and others that read USD",
-    "video": "write a film, without a display; needs a Vulkan driver (mesa-vulkan-drivers works without a GPU)",
 }
 
 PARTS = ("ghost", "string", "trail")
 
 FOR = {
     "tolerance": ("gltf", "usd"),
-    "fps": ("gltf", "usd", "video"),
+    "fps": ("gltf", "usd"),
     "with": ("gltf", "usd"),
-    "size": ("video",),
-    "from": ("video",),
-    "to": ("video",),
 }
 """Options, and the files that they are of."""
 
@@ -63,12 +57,9 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
         "--fps",
         type=float,
         metavar="N",
-        help="with --gltf or --usd: N evenly spaced key frames a second; with --video: pictures a second (default 30)",
+        help=f"{use['fps']}: N evenly spaced key frames a second",
     )
     group.add_argument("--with", metavar="PART,..", help=f"{use['with']}: draw {', '.join(PARTS)} too")
-    group.add_argument("--size", metavar="WxH", help=f"{use['size']}: pixels (default 960x540)")
-    group.add_argument("--from", type=float, metavar="T", help=f"{use['from']}: simulated time [s] at which it begins")
-    group.add_argument("--to", type=float, metavar="T", help=f"{use['to']}: simulated time [s] at which it ends")
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
@@ -102,10 +93,6 @@ def _check_library(name: str) -> None:
         from ..export.usd import check_usd
 
         check_usd()
-    elif name == "video":
-        from ..export.film import check_film
-
-        check_film()
 
 
 def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
@@ -122,19 +109,6 @@ def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
     for part in _parts(args):
         if part not in PARTS:
             raise InputError("--with", part, one_of(part, PARTS))
-    for option in ("from", "to"):
-        given = getattr(args, option)
-        if given is not None and not (math.isfinite(given) and 0.0 <= given <= 1e9):
-            raise InputError(f"--{option}", given, "seconds from 0 to 1e9")
-    if args.size is not None:
-        _film_size(args)
-
-
-def _film_size(args: argparse.Namespace) -> tuple[int, int]:
-    width, height = pixels(args.size or "960x540", 64)
-    if width % 2 or height % 2:
-        raise InputError("--size", args.size, "even numbers of pixels, which video codecs need")
-    return width, height
 
 
 def _parts(args: argparse.Namespace) -> list[str]:
@@ -161,8 +135,6 @@ def write_exports(
                 say(f"{files[name]}: {len(record.times_ns)} states")
     if "gltf" in files or "usd" in files:
         _write_animations(args, files, record, source, say)
-    if "video" in files:
-        _write_film(args, files["video"], record, source, say)
 
 
 def _write_animations(
@@ -190,16 +162,3 @@ def _write_animations(
                 report += write_usd(files[name], record, made, args.fps, "trail" in parts)
         for line in report:
             say(f"{files[name]}: {line}")
-
-
-def _write_film(
-    args: argparse.Namespace, file: str, record: FlightRecord, source: StateSource | None, say: Callable[[str], None]
-) -> None:
-    from ..export.film import film_motion, write_film
-
-    fps = args.fps or 30.0
-    begin_s, end_s = (getattr(args, option) for option in ("from", "to"))
-    motion = film_motion(record, source, fps, begin_s, end_s)
-    with Progress(f"drawing {file}", unit="pictures") as progress:
-        write_film(file, record, motion, fps, _film_size(args), progress.fraction)
-    say(f"{file}: {len(motion.times_ns)} pictures, {fps:g} a second")
