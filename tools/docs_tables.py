@@ -261,8 +261,11 @@ def lesson_table() -> str:
 
 
 def lesson_to_try(name: str) -> str:
-    """A lesson's sentences, as the workbench shows them."""
-    return "\n".join(f"{number}. {sentence}" for number, sentence in enumerate(lesson(name).sentences, 1))
+    """A lesson's question and sentences, as the workbench shows them."""
+    one = lesson(name)
+    choices = " ".join(f"**{letter}** {choice}" for letter, choice in zip("ABC", one.choices, strict=True))
+    steps = "\n".join(f"{number}. {sentence}" for number, sentence in enumerate(one.sentences, 1))
+    return f"Guess first: {one.question}\\\n{choices}\n\n{steps}"
 
 
 def bodies() -> str:

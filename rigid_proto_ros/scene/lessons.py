@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Lessons: the bundled scenes, each with a title, three sentences of what to try and what to see, and why.
+"""Lessons: the bundled scenes, each with a title, a question to answer first, three sentences of what to try and what
+to see, and why.
 
-All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the three
-sentences, the reason, and how to run it. Pages and documents take it from there.
+All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the question
+with its choices A, B, C and the answer's letter, the three sentences, the reason, and how to run it. Pages and documents
+take it from there.
 """
 
 from __future__ import annotations
@@ -16,15 +18,21 @@ from ..base.errors import InputError
 
 SENTENCES = 3
 
+_QUESTION = re.compile(r"Question: (.+\?) A: (.+) B: (.+) C: (.+) Answer: ([ABC])\.")
+
 
 @dataclass(frozen=True)
 class Lesson:
-    """name: of the scene. sentences: what to try and what to see. reason: why, in a paragraph. commands: how to run it.
-    script: name of the bundled example that goes with it, or empty.
+    """name: of the scene. question: what is asked first, with its choices; answer: the number of the right one.
+    sentences: what to try and what to see. reason: why, in a paragraph. commands: how to run it. script: name of the
+    bundled example that goes with it, or empty.
     """
 
     name: str
     title: str
+    question: str
+    choices: tuple[str, ...]
+    answer: int
     sentences: tuple[str, ...]
     reason: str
     commands: str
@@ -51,12 +59,27 @@ def read_lesson(path: Path) -> Lesson:
             break
         head.append(line.removeprefix("#").strip())
     paragraphs = [" ".join(part.split("\n")) for part in "\n".join(head).split("\n\n")]
-    if len(paragraphs) < 5:
-        accepted = "a comment of five paragraphs: licence, title, three sentences, reason, how to run it"
+    if len(paragraphs) < 6:
+        accepted = "a comment of six paragraphs: licence, title, question, three sentences, reason, how to run it"
         raise InputError(str(path), f"{len(paragraphs)} paragraphs", accepted)
-    _, title, trials, *reasons, commands = paragraphs
+    _, title, asked, trials, *reasons, commands = paragraphs
+    question = _QUESTION.fullmatch(asked)
+    if question is None:
+        raise InputError(str(path), asked[:80], "Question: ...? A: ... B: ... C: ... Answer: A, B or C.")
     sentences = tuple(re.split(r"(?<=[.!?]) (?=[A-Z])", trials))
     if len(sentences) != SENTENCES:
         raise InputError(str(path), f"{len(sentences)} sentences", f"{SENTENCES} on what to try and what to see")
     script = re.search(r"msg_examples/(\w+)\.yaml", commands)
-    return Lesson(path.stem, title, sentences, " ".join(reasons), commands, script[1] if script else "", path)
+    text, *choices, letter = question.groups()
+    return Lesson(
+        path.stem,
+        title,
+        text,
+        tuple(choices),
+        "ABC".index(letter),
+        sentences,
+        " ".join(reasons),
+        commands,
+        script[1] if script else "",
+        path,
+    )

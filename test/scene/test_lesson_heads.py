@@ -9,14 +9,19 @@ from rigid_proto_ros.base.bundled import example_names, scene_names
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.scene.lessons import lesson, lessons, read_lesson
 
+HEAD = "# SPDX\n#\n# Title\n#\n# {question}\n#\n# One. Two.\n#\n# Why.\n#\n# Run it.\nrigid_body: {{}}\n"
 
-def test_every_bundled_scene_is_a_lesson_with_a_title_three_sentences_and_a_reason() -> None:
+
+def test_every_bundled_scene_is_a_lesson_with_a_title_a_question_three_sentences_and_a_reason() -> None:
     found = {one.name: one for one in lessons()}
     assert sorted(found) == scene_names()
     assert len({one.title for one in found.values()}) == len(found)
     for name, one in found.items():
         assert 8 < len(one.title) < 60, name
         assert not one.title.endswith("."), name
+        assert one.question.endswith("?"), name
+        assert len(set(one.choices)) == 3, name
+        assert one.answer in range(3), name
         assert all(20 < len(sentence) < 200 for sentence in one.sentences), name
         assert one.sentences[-1].endswith("."), name
         assert len(one.reason) > 60, name
@@ -27,8 +32,11 @@ def test_a_scene_without_a_lessons_head_is_told_what_is_missing(tmp_path) -> Non
     with pytest.raises(InputError, match="scene"):
         lesson("no_such")
     path = tmp_path / "x.yaml"
-    path.write_text("# SPDX\n#\n# Title\n#\n# One. Two.\n#\n# Why.\n#\n# Run it.\nrigid_body: {}\n")
+    path.write_text(HEAD.format(question="Question: Up? A: Yes. B: No. C: Both. Answer: A."))
     with pytest.raises(InputError, match="2 sentences"):
+        read_lesson(path)
+    path.write_text(HEAD.format(question="Question: Up or down?"))
+    with pytest.raises(InputError, match="A: "):
         read_lesson(path)
     path.write_text("# Title\nrigid_body: {}\n")
     with pytest.raises(InputError, match="paragraphs"):
