@@ -3,8 +3,8 @@
 to see, and why.
 
 All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the question
-with its choices A, B, C and the answer's letter, the three sentences, the reason, and how to run it. Pages and documents
-take it from there.
+with its choices A, B, C and the answer's letter, the three sentences, the reason, and how to run it. Pages and
+documents take it from there.
 """
 
 from __future__ import annotations
