@@ -86,10 +86,12 @@ class Flusher:
             finished.wait(TIMEOUT_S)
 
     def serve(self, port: int, memory_limit: str) -> str:
-        """Host the live stream; returns its address."""
-        self.server = LiveServer(port, memory_limit)
-        self.mailbox.mark(-1, "live", self.server.open_run(self.run_id, self.run_name))
-        return self.server.address
+        """Host the live stream; returns its address. Raises PortTakenError."""
+        server = LiveServer(port, memory_limit)
+        stream = server.open_run(self.run_id, self.run_name)
+        self.server = server
+        self.mailbox.mark(-1, "live", stream)
+        return server.address
 
     def close(self) -> None:
         """Send the rest, finish the file, end the thread."""

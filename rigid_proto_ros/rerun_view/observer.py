@@ -21,7 +21,7 @@ import numpy as np
 
 from ..base.errors import InputError, is_missing
 from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
-from .ports import choose_port
+from .ports import serve_on_port
 
 if TYPE_CHECKING:
     from .flusher import Flusher
@@ -222,18 +222,21 @@ class RerunObserver(Observer):
         return self._flusher
 
     def _open_server(self, viewer: str, rerun_port: int | None, web_port: int | None, memory_limit: str) -> None:
-        port = choose_port("rerun_port", rerun_port, DEFAULT_RERUN_PORT)
-        web = choose_port("web_port", web_port, DEFAULT_WEB_PORT) if viewer == "web" else 0
-        self.live_address = self._begin().serve(port, memory_limit)
+        flusher = self._begin()
+        self.live_address = serve_on_port(
+            "rerun_port", rerun_port, DEFAULT_RERUN_PORT, lambda port: flusher.serve(port, memory_limit)
+        )
         self._report(f"live stream: {self.live_address}")
-        self._open_viewer(viewer, web)
+        self._open_viewer(viewer, web_port)
 
-    def _open_viewer(self, viewer: str, web_port: int) -> None:
+    def _open_viewer(self, viewer: str, web_port: int | None) -> None:
         from . import viewers
 
         try:
             if viewer == "web":
-                process, self.web_address = viewers.serve_web(web_port, self.live_address)
+                process, self.web_address = serve_on_port(
+                    "web_port", web_port, DEFAULT_WEB_PORT, lambda port: viewers.serve_web(port, self.live_address)
+                )
                 self._processes.append(process)
                 self._report(f"viewer: {self.web_address}")
             elif viewer == "native" and viewers.has_display():

@@ -3,9 +3,14 @@
 
 from __future__ import annotations
 
+import os
 import socket
+from collections.abc import Callable
+from typing import TypeVar
 
 from ..base.errors import InputError
+
+_Served = TypeVar("_Served")
 
 LOOPBACK = "127.0.0.1"
 PORTS_TRIED = 64
@@ -24,21 +29,43 @@ def is_free(port: int) -> bool:
     return True
 
 
-def choose_port(field: str, asked: int | None, default: int) -> int:
-    """The port to serve on: ``asked`` if it is free, else the first free one from ``default`` on.
+class PortTakenError(OSError):
+    """Another process took the port between the look at it and the server's own attempt."""
 
-    Raises InputError where ``asked`` is given and taken, or no port near the default is free.
+
+def serve_on_port(field: str, asked: int | None, default: int, serve: Callable[[int], _Served]) -> _Served:
+    """What ``serve(port)`` returns for ``asked``, or for the first port from ``default`` on where it can serve.
+
+    ``serve`` raises PortTakenError where another process was faster. Raises InputError where ``asked`` is given and
+    taken, or no port near the default is free.
     """
-    if asked is not None:
-        if not 1 <= asked <= 65535:
-            raise InputError(field, asked, "a TCP port, 1 to 65535")
-        if not is_free(asked):
-            raise InputError(field, asked, f"a port on {LOOPBACK} that no other program listens on")
-        return asked
-    for port in range(default, min(default + PORTS_TRIED, 65536)):
+    if asked is not None and not 1 <= asked <= 65535:
+        raise InputError(field, asked, "a TCP port, 1 to 65535")
+    candidates = range(default, min(default + PORTS_TRIED, 65536)) if asked is None else [asked]
+    for port in candidates:
         if is_free(port):
-            return port
+            try:
+                return serve(port)
+            except PortTakenError:
+                continue
+    if asked is not None:
+        raise InputError(field, asked, f"a port on {LOOPBACK} that no other program listens on")
     raise InputError(field, default, f"one of the {PORTS_TRIED} ports from {default} on to be free on {LOOPBACK}")
+
+
+def listens(process_id: int, port: int) -> bool:
+    """Whether this process listens on an IPv4 port; where there is no /proc, whether any does."""
+    if not os.path.isfile("/proc/net/tcp"):
+        return not is_free(port)
+    with open("/proc/net/tcp", encoding="ascii") as table:
+        rows = [line.split() for line in table][1:]
+    # Columns 1, 3 and 9: local address, state (0A is listening), and the socket's inode.
+    sockets = {f"socket:[{row[9]}]" for row in rows if row[3] == "0A" and int(row[1].partition(":")[2], 16) == port}
+    folder = f"/proc/{process_id}/fd"
+    try:
+        return any(os.readlink(f"{folder}/{name}") in sockets for name in os.listdir(folder))
+    except OSError:
+        return False  # it has ended, or closed one meanwhile
 
 
 def any_free_port() -> int:

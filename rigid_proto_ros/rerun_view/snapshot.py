@@ -18,10 +18,13 @@ from ..base.errors import InputError, one_of
 from ..base.files import output_file
 from ..session.recorded_session import RecordedSession
 from . import entities as e
-from .ports import LOOPBACK, any_free_port
+from .ports import LOOPBACK, PortTakenError, is_free, listens, serve_on_port
 from .reader import drawn_times, read_session
 from .rrd_file import whole_part
 from .viewers import ViewerProcess, open_headless
+
+FIRST_PORT = 19876
+"""Where the search for a port begins: away from those that nodes and viewers serve on."""
 
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0
@@ -111,16 +114,25 @@ def _check_between(ends_ns: tuple[int, int] | None, at_s: float) -> None:
 @contextmanager
 def headless_viewer(width: int, height: int) -> Iterator[Any]:
     """A viewer without a window, on loopback, ended on leaving; yields its ``ViewerClient``."""
-    port = any_free_port()
     with tempfile.TemporaryFile() as log:
         try:
-            process = open_headless(port, width, height, log.fileno())
+            port, process = serve_on_port("snapshot", None, FIRST_PORT, lambda port: _start(port, width, height, log))
         except FileNotFoundError as error:
             raise InputError("snapshot", str(error)) from error
         try:
             yield _connected(f"rerun+http://{LOOPBACK}:{port}/proxy", process, log)
         finally:
             process.stop()
+
+
+def _start(port: int, width: int, height: int, log: Any) -> tuple[int, ViewerProcess]:
+    process = open_headless(port, width, height, log.fileno())
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while process.running and time.monotonic() < deadline and not listens(process.process.pid, port):
+        time.sleep(0.05)
+    if not process.running and not is_free(port):
+        raise PortTakenError(f"port {port} was taken by another program")
+    return port, process
 
 
 def _connected(address: str, process: ViewerProcess, log: Any) -> Any:

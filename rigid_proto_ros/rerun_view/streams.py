@@ -21,7 +21,7 @@ from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from .layout import Subject
-from .ports import LOOPBACK
+from .ports import LOOPBACK, PortTakenError
 from .rrd_file import end_without_index
 from .sent_layout import SentLayout
 
@@ -168,10 +168,21 @@ class LiveServer:
         self.address = f"rerun+http://{LOOPBACK}:{port}/proxy"
 
     def open_run(self, recording_id: str, name: str) -> LiveStream:
-        """A stream for a new run. The server lives as long as the first one, which is therefore kept."""
+        """A stream for a new run. The server lives as long as the first one, which is therefore kept.
+
+        Raises PortTakenError where the first one finds that another process listens on the server's port.
+        """
         if self._host is None:
-            self._host = LiveStream(recording_id, self._sink, name)
-            return self._host
+            host = LiveStream(recording_id, self._sink, name)
+            try:
+                # A server that can't listen says so to nobody but who waits for what was sent.
+                host.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            except RuntimeError as error:
+                host.layout.close()
+                host.close()
+                raise PortTakenError(_last_line(error)) from error
+            self._host = host
+            return host
         # Viewers keep the layout from run to run.
         return LiveStream(recording_id, rr.GrpcSink(self.address), name, self._host.layout)
 

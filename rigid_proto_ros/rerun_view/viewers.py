@@ -9,14 +9,17 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from urllib.parse import quote
 
 from ..base.child_processes import end_with_this_thread
 from ..base.errors import is_missing
-from .ports import LOOPBACK, any_free_port
+from .ports import LOOPBACK, PortTakenError, listens
 
 STOP_TIMEOUT_S = 1.0
+START_TIMEOUT_S = 30.0
+"""What a busy machine may take to start a viewer that takes .3 s alone [s]."""
 
 
 def viewer_program() -> str | None:
@@ -73,18 +76,26 @@ class ViewerProcess:
 def serve_web(web_port: int, stream_address: str) -> tuple[ViewerProcess, str]:
     """Serve the web viewer on loopback; returns its process and the address to open, which shows the stream.
 
-    A process of its own because the library's server inside this one would listen on all interfaces.
+    A process of its own because the library's server inside this one would listen on all interfaces. Raises
+    PortTakenError where another process listens there, and OSError where the viewer doesn't start.
     """
     process = ViewerProcess(
-        *("--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(web_port)),
-        *("--port", str(any_free_port()), stream_address),
+        *("--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(web_port), "--port", "auto", stream_address)
     )
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while not listens(process.process.pid, web_port):
+        if not process.running:
+            raise PortTakenError(f"port {web_port} was taken by another program")
+        if time.monotonic() > deadline:
+            process.stop()
+            raise OSError(f"the web viewer didn't start within {START_TIMEOUT_S:g} s")
+        time.sleep(0.02)
     return process, f"http://{LOOPBACK}:{web_port}/?url={quote(stream_address, safe='')}"
 
 
 def open_native(stream_address: str) -> ViewerProcess:
     """Open the native viewer's window on the stream."""
-    return ViewerProcess("--bind", LOOPBACK, "--port", str(any_free_port()), "--connect", stream_address)
+    return ViewerProcess("--bind", LOOPBACK, "--port", "auto", "--connect", stream_address)
 
 
 def open_headless(port: int, width: int, height: int, log: int = subprocess.DEVNULL) -> ViewerProcess:

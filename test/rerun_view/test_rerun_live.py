@@ -85,13 +85,40 @@ def test_a_taken_default_port_moves_on_and_a_taken_asked_one_is_refused():
         taken.bind((ports.LOOPBACK, 0))
         taken.listen()
         port = taken.getsockname()[1]
-        assert ports.choose_port("rerun_port", None, port) > port
+        assert ports.serve_on_port("rerun_port", None, port, lambda served: served) > port
         with pytest.raises(InputError, match="rerun_port"):
-            ports.choose_port("rerun_port", port, 1)
+            ports.serve_on_port("rerun_port", port, 1, lambda served: served)
         with pytest.raises(InputError, match="web_port"):
             RerunObserver(viewer="web", web_port=port)
     with pytest.raises(InputError, match="viewer"):
         RerunObserver(viewer="holodeck")
+
+
+@pytest.mark.parametrize("field", ["rerun_port", "web_port"])
+def test_who_loses_the_race_for_a_port_serves_on_the_next_one_and_prints_that(monkeypatch, field):
+    lines = []
+    with socket.socket() as taken:
+        taken.bind((ports.LOOPBACK, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        # As if the other process had come just after the look.
+        monkeypatch.setattr(ports, "is_free", lambda _: True)
+        with pytest.raises(InputError, match=field):
+            RerunObserver(viewer="web", **{"rerun_port": None, "web_port": None, field: port})
+        monkeypatch.setattr(f"rigid_proto_ros.rerun_view.observer.DEFAULT_{field.upper()}", port)
+        observer = RerunObserver(viewer="web", report=lines.append)
+        try:
+            addresses = [observer.live_address, observer.web_address]
+            served = [int(address.split(":")[2].split("/")[0]) for address in addresses]
+            assert port not in served and min(abs(other - port) for other in served) < ports.PORTS_TRIED
+            assert b"html" in wait_for(lambda: _page(observer.web_address)).lower()
+            assert all(
+                ports.listens(pid, at)
+                for pid, at in zip((os.getpid(), observer._processes[0].process.pid), served, strict=True)
+            )
+            assert all(any(address in line for line in lines) for address in addresses)
+        finally:
+            observer.close()
 
 
 def test_everything_served_listens_on_loopback_only_and_ends_with_close():
