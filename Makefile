@@ -65,9 +65,6 @@ bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU a
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
 
-interfaces: setup ## typed messages beside the standard ones, into .venv; needs a C++ compiler
-	$(PY) tools/build_interfaces.py interfaces/rigid_proto_interfaces
-
 soak: setup ## an hour of random commands, guests and changes; MINUTES=5 for the short form
 	$(ROS) $(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
 

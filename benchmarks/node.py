@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the node costs, in real processes: CPU, rate, jitter, latency, start-up, memory, floods, several bodies, skipped work.
+"""What the node costs, in real processes: CPU, rate, jitter, latency, start-up, memory, floods, skipped work.
 
     python benchmarks/node.py [--short] [--only start_up,processor,...] [--out FOLDER]
 
@@ -45,7 +45,6 @@ def main() -> None:
         "recording": recording,
         "viewers": viewers,
         "flood": flood,
-        "bodies": bodies,
     }
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--short", action="store_true", help="a tenth of the time, for a look")
@@ -193,24 +192,6 @@ def diagnostics() -> dict[str, str]:
     """The node's newest counters."""
     with client("diagnostics") as process:
         return result_of(process)
-
-
-def bodies(note, seconds: float) -> None:
-    """Cost of each further body at 100 Hz, with nobody listening."""
-    folder = Path(tempfile.mkdtemp())
-    scenes = []
-    for k in range(64):
-        scenes.append(folder / f"body_{k}.yaml")
-        scenes[k].write_text(f"/**:\n  ros__parameters:\n    {SPIN.replace(':=', ': ')}\n", encoding="utf-8")
-    shares = {}
-    for count in (1, 2, 4, 8, 16, 32, 64):
-        with Process("-m", "rigid_proto_ros.ros.main", "--bodies", *map(str, scenes[:count])) as process:
-            process.wait_until_flying()
-            time.sleep(2.0)
-            shares[count] = process.cpu_share(seconds)
-            note(f"{count} bodies at 100 Hz in one process", "cpu", shares[count], "%")
-            note(f"{count} bodies at 100 Hz in one process", "rss", process.memory_mb(), "MB")
-    note("each further body at 100 Hz", "cpu", (shares[64] - shares[1]) / 63, "%")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from rigid_proto_ros.base.bundled import scene_path
-from rigid_proto_ros.ros.warm_up import compile_flight, compile_integrators
+from rigid_proto_ros.live.warm_up import compile_flight, compile_integrators
 from rigid_proto_ros.scene.offline import read_scene
 
 

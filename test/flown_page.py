@@ -203,7 +203,7 @@ class FlownPage(PageInProcess):
     """A user at the page, by its own callbacks. All times are simulated."""
 
     def __init__(self, lesson: str = "", anew: bool = False) -> None:
-        from rigid_proto_ros.ros.warm_up import warm_up
+        from rigid_proto_ros.live.warm_up import warm_up
 
         warm_up(make_scenario({}).setup)  # compiled on the page's thread, kernels would let its socket time out
         super().__init__(lesson, anew)

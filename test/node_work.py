@@ -18,10 +18,9 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
+from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.ros.node import RigidBodyNode
-from rigid_proto_ros.ros.physics_thread import PhysicsThread
-from rigid_proto_ros.ros.warm_up import warm_up
 
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 12.0], "publish_rate": 500.0}
 STATES = ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom", "/rigid_body/imu")
@@ -33,8 +32,7 @@ def main(scenario: str) -> None:
     rclpy.init()
     counts: Counter[str] = Counter()
     parameters = dict(SPIN) if scenario != "at_rest" else {"publish_rate": 500.0}
-    thread = PhysicsThread()
-    node = RigidBodyNode(thread, parameters)
+    node = RigidBodyNode(parameters)
     node.states.pack_all(warm_up(node.loop.scenario.setup))
     count_publications(counts)
     messages = count_messages(counts)
@@ -42,7 +40,7 @@ def main(scenario: str) -> None:
     executor.add_node(node)
     listener = rclpy.create_node("listener")
     if scenario == "described":
-        print(json.dumps(descriptions(node, thread, executor, listener, counts)), flush=True)
+        print(json.dumps(descriptions(node, executor, listener, counts)), flush=True)
         os._exit(0)
     publisher = listener.create_publisher(WrenchStamped, "/rigid_body/wrench", QoSProfile(depth=100))
     if scenario == "listened_to":
@@ -50,20 +48,20 @@ def main(scenario: str) -> None:
             listener.create_subscription(message_type, f"/rigid_body/{topic}", lambda m: None, 10, raw=True)
         while publisher.get_subscription_count() == 0 or not all(map(subscribers(node), STATES[:3])):
             time.sleep(0.02)
-    thread.start([node.loop])
+    node.live.start()
     while steps_and_time(node)[1] < 1e9:
         executor.spin_once(timeout_sec=0.05)
     messages.clear()
     before, counts_before = look(node, counts)
-    wrenches_before = node.intake.received["wrench"]
+    wrenches_before = node.live.commands.received["wrench"]
     while steps_and_time(node)[1] - before[1] < 1e9 or (
-        scenario == "listened_to" and node.intake.received["wrench"] < wrenches_before + 30
+        scenario == "listened_to" and node.live.commands.received["wrench"] < wrenches_before + 30
     ):
         if scenario == "listened_to":
             publisher.publish(cdr.wrench_stamped(0, "world", (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0)))
         time.sleep(0.02)
     after, counts = look(node, counts)
-    thread.stop()
+    node.live.stop()
     print(
         json.dumps(
             {
@@ -72,7 +70,7 @@ def main(scenario: str) -> None:
                 "simulated_ns": after[1] - before[1],
                 "publications": {topic: counts[topic] - counts_before[topic] for topic in STATES},
                 "message_objects": dict(messages),
-                "wrenches": node.intake.received["wrench"],
+                "wrenches": node.live.commands.received["wrench"],
             }
         )
     )
@@ -81,14 +79,14 @@ def main(scenario: str) -> None:
     rclpy.try_shutdown()
 
 
-def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
+def descriptions(node, executor, listener, counts: Counter) -> dict:
     """Masses in the robot descriptions that subscribers who come and go get, and the publish calls after each."""
     topic = "/rigid_body/robot_description"
     latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     heard: list[float] = []
     masses, calls = [], []
     executor.add_node(listener)
-    thread.start([node.loop])
+    node.live.start()
 
     def until(condition) -> None:
         deadline = time.monotonic() + 60.0
@@ -119,7 +117,7 @@ def descriptions(node, thread, executor, listener, counts: Counter) -> dict:
         listener.destroy_subscription(subscription)
         until(lambda: not subscribers(node)(topic))
         heard.clear()
-    thread.stop()
+    node.live.stop()
     return {"masses": masses, "calls": calls}
 
 

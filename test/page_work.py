@@ -13,10 +13,9 @@ from geometry_msgs.msg import PoseStamped
 from node_work import SPIN, count_publications, steps_and_time
 from rclpy.executors import SingleThreadedExecutor
 
+from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.ros.diagnostics import Reports
 from rigid_proto_ros.ros.node import RigidBodyNode
-from rigid_proto_ros.ros.physics_thread import PhysicsThread
-from rigid_proto_ros.ros.warm_up import warm_up
 from rigid_proto_ros.workbench.ros_link import RosLink
 
 COUNTED_S = 1.2
@@ -27,8 +26,7 @@ def main() -> None:
     """One listener to the pose from first to last; the page's link comes and goes."""
     rclpy.init()
     counts: Counter[str] = Counter()
-    thread = PhysicsThread()
-    node = RigidBodyNode(thread, SPIN)
+    node = RigidBodyNode(SPIN)
     node.states.pack_all(warm_up(node.loop.scenario.setup))
     count_publications(counts)
     executor = SingleThreadedExecutor()
@@ -36,9 +34,9 @@ def main() -> None:
     spinning = threading.Thread(target=executor.spin, daemon=True)
     listener = rclpy.create_node("listener")
     listener.create_subscription(PoseStamped, "/rigid_body/pose", lambda m: None, 10, raw=True)
-    thread.start([node.loop])
+    node.live.start()
     spinning.start()
-    reports = Reports([node.diagnostics])
+    reports = Reports(node.diagnostics)
     reports.start()
 
     def count(twist_listeners: int) -> dict:
@@ -57,7 +55,7 @@ def main() -> None:
     found["open"] = count(1)
     link.stop_listening()
     found["after"] = count(0)
-    thread.stop()
+    node.live.stop()
     reports.stop()
     executor.shutdown(timeout_sec=1.0)
     print(json.dumps(found))

@@ -202,8 +202,8 @@ def test_every_ros_package_that_the_code_imports_is_declared() -> None:
         for name in imported
         if name.startswith(("rclpy", "ament")) or name.endswith(("_msgs", "_srvs", "_interfaces"))
     }
-    # builtin_interfaces comes with every message package; the other two are served where they are installed.
-    assert used - {"builtin_interfaces", "simulation_interfaces", "rigid_proto_interfaces"} <= declared
+    # builtin_interfaces comes with every message package; the other one is served where it is installed.
+    assert used - {"builtin_interfaces", "simulation_interfaces"} <= declared
 
 
 def scene_parameters(name: str) -> dict:

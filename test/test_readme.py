@@ -53,7 +53,7 @@ NOT_RUN = {
     "eval",
 }
 SWEEP = "rigid_proto sweep"
-STAYS_UP = ("rigid_proto up", "rigid_proto workbench", "rigid_body_node --bodies")
+STAYS_UP = ("rigid_proto up", "rigid_proto workbench")
 
 
 def blocks(path: Path, *languages: str) -> list[str]:

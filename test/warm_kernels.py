@@ -17,8 +17,8 @@ from sweep_studies import POKES, study
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main as rigid_proto
+from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.ros.warm_up import warm_up
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.sweep.chunk import run_chunk
 

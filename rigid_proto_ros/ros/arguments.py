@@ -7,22 +7,17 @@ from __future__ import annotations
 
 import argparse
 import math
-import re
 import textwrap
 from collections.abc import Callable
-from pathlib import Path
 
-from ..base.bundled import scene_names
-from ..base.command_line import Parser, complete, completes
+from ..base.command_line import Parser, complete
 from ..base.errors import InputError, did_you_mean
 from ..scene.offline import scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
-from ..scene.scene_file import scene_file, typed_value
+from ..scene.scene_file import typed_value
 from ..scene.script import MAX_TIME_S
 
 NODE_NAME = "rigid_body"
-
-_NODE_NAME_FORM = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 _WITH_VALUE = (
     *("-p", "--param", "--params-file", "-r", "--remap"),
@@ -37,31 +32,21 @@ EXAMPLES = (
     ("rigid_body_node", "simulate the bundled T-handle"),
     ("rigid_body_node --ros-args --params-file config/hammer.yaml -p viewer:=web", "a scene, with a live view"),
     ("rigid_body_node --ros-args -p mesh:=part.obj -p scale:=0.001 -r __node:=part", "a mesh in mm, as the node /part"),
-    ("rigid_body_node --bodies hammer book config/t_handle.yaml", "three bodies in one process, a node each"),
 )
 
 
 def own_arguments(argv: list[str]) -> argparse.Namespace:
-    """``bodies``: the files behind ``--bodies``; ``until``: seconds, or None. Everything else outside ``--ros-args ...
+    """``until``: seconds, or None. Everything else outside ``--ros-args ...
     [--]`` ends the process: --help with 0, what isn't known with 2 and the nearest option. Options inside that rcl
     wouldn't know are refused, too.
     """
     parser = Parser(
         prog="rigid_body_node",
-        usage="rigid_body_node [--bodies SCENE ...] [--until S] "
-        "[--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
+        usage="rigid_body_node [--until S] [--ros-args [--params-file SCENE.yaml] [-p NAME:=VALUE] ...]",
         description="Simulate a rigid body as a ROS 2 node until Ctrl-C. A scene is a ROS parameter file.",
         examples=EXAMPLES,
     )
-    bodies = parser.add_argument(
-        "--bodies",
-        nargs="+",
-        default=[],
-        metavar="SCENE",
-        help="several bodies: scene files or bundled names, a node each",
-    )
     parser.add_argument("--until", type=_seconds, metavar="S", help="end when simulated time reaches this many seconds")
-    completes(bodies, lambda _: scene_names())
     own, ros = _split(argv[1:])
     for word in ros:
         _check_ros_option(word)
@@ -190,26 +175,3 @@ def remapped_node_name(argv: list[str], name: str = NODE_NAME) -> str:
             elif assigned and left == "__ns":
                 namespace = right.strip("/")
     return f"{namespace}/{name}" if namespace else name
-
-
-def read_bodies(files: list[str]) -> dict[str, dict[str, object]]:
-    """The parameters given by each file of ``--bodies``, under the name of its node, which is that of the file.
-
-    Raises InputError for a file that can't be read, a name that no node can have, or two equal ones.
-    """
-    bodies: dict[str, dict[str, object]] = {}
-    for file in files:
-        path = scene_file(file)
-        name = _node_name_of(path)
-        if name in bodies:
-            raise InputError("--bodies", file, f"files with different names; {name} is used twice")
-        bodies[name] = scene_values(path, print)
-    return bodies
-
-
-def _node_name_of(path: Path) -> str:
-    """The file's stem with other characters than [A-Za-z0-9_] as _; raises InputError if that names no node."""
-    name = re.sub(r"[^A-Za-z0-9_]", "_", path.stem)
-    if not _NODE_NAME_FORM.match(name) or len(name) > 255:
-        raise InputError("--bodies", str(path), "a file whose name begins with a letter or _, as node names do")
-    return name

@@ -31,7 +31,7 @@ MANY = 2
 """Publishers where the middleware doesn't count them: gaps can't be told from several senders then."""
 
 
-class Unserved(CallbackGroup):
+class ManualCallbackGroup(CallbackGroup):
     """A callback group whose entities no executor may serve."""
 
     def can_execute(self, entity: object) -> bool:  # noqa: ARG002 (rclpy calls it so)

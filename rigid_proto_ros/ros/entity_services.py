@@ -11,9 +11,8 @@ import numpy as np
 
 from ..base.errors import CommandRefused
 from ..base.rotation import transposed_times
+from ..live.live_simulation import LiveSimulation
 from ..simulation.commands import SetState
-from .physics_thread import Call
-from .simulation_loop import SimulationLoop
 
 SERVICES = (
     ("GetEntities", "get_entities"),
@@ -26,16 +25,14 @@ SERVICES = (
 
 
 class EntityServices:
-    """Answers for the body of one loop. name: the entity's; world_frame: that of its states. messages: the modules
-    simulation_interfaces.msg.
-    """
+    """Answers for one body. messages: the modules simulation_interfaces.msg."""
 
-    def __init__(self, loop: SimulationLoop, call: Call, messages: Any, name: str, world_frame: str) -> None:
-        self._loop = loop
-        self._call = call
+    def __init__(self, live: LiveSimulation, messages: Any) -> None:
+        self._loop = live.loop
+        self._call = live.call
         self._messages = messages
-        self._name = name
-        self._world_frame = world_frame
+        self._name = live.name
+        self._world_frame = live.frames[0]
 
     def features(self) -> list[int]:
         """What is supported of it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
@@ -14,6 +14,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
+from ..base.rotation import Vector
+from ..live.pacing import Stamps
 from ..messages import cdr
 from ..messages.session_messages import applied_bytes
 from ..motion.body import Body
@@ -21,24 +23,22 @@ from ..motion.loads import Load
 from ..simulation.commands import WrenchCommand
 from ..simulation.observer import BodySnapshot, Observer
 from . import qos
-from .pacing import Stamps
+from .frames_on_body import FramesOnBody
 from .robot_description import RobotDescription
-from .static_frames import StaticFrames
 
 WARNING_S = 1.0
 """Between two warnings of one reason, wall time."""
 
 
 class EventPublisher(Observer):
-    """An observer that publishes; its methods run on the physics thread, and are rare."""
+    """An observer that publishes; its methods run on the physics thread, and are rare. stamps: set before the first."""
 
     def __init__(
         self,
         node: Node,
         body_frame: str,
         mesh_path: Callable[[], str],
-        static_frames: StaticFrames,
-        stamps: Stamps,
+        contacts: Mapping[str, Vector],
     ) -> None:
         def publisher(message_type: type, topic: str, profile: QoSProfile) -> Publisher:
             return node.create_publisher(
@@ -46,8 +46,8 @@ class EventPublisher(Observer):
             )
 
         self._logger = node.get_logger()
-        self._static_frames = static_frames
-        self._stamps = stamps
+        self.stamps = Stamps()
+        self._frames_on_body = FramesOnBody(node, body_frame, contacts)
         self._body_frame = body_frame
         self._mesh_frame = f"{body_frame}/mesh"
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
@@ -64,7 +64,7 @@ class EventPublisher(Observer):
     def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
         """The latched inertia: COM in scaled mesh coordinates, tensor about it in mesh axes."""
         message = InertiaStamped()
-        message.header.stamp.sec, message.header.stamp.nanosec = self._stamps.of(time_ns)
+        message.header.stamp.sec, message.header.stamp.nanosec = self.stamps.of(time_ns)
         message.header.frame_id = self._mesh_frame
         inertia, I = message.inertia, body.inertia
         inertia.m = body.mass
@@ -73,7 +73,7 @@ class EventPublisher(Observer):
         inertia.iyy, inertia.iyz, inertia.izz = float(I[1, 1]), float(I[1, 2]), float(I[2, 2])
         self._inertia.publish(message)
         self._description.body_changed(body)
-        self._static_frames.body_changed(time_ns, body)
+        self._frames_on_body.publish(self.stamps.of(time_ns), body)
 
     def applied(self, time_ns: int, _command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
         """A wrench or poke as it took effect: about the COM in the body's frame, which TF knows. What its sender said
@@ -81,7 +81,7 @@ class EventPublisher(Observer):
         """
         if self._applied.get_subscription_count():
             self._applied.publish(
-                applied_bytes(time_ns + self._stamps.offset_ns, self._body_frame, load, body, attitude)
+                applied_bytes(time_ns + self.stamps.offset_ns, self._body_frame, load, body, attitude)
             )
 
     def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002 (an observer gets it)

@@ -57,19 +57,6 @@ INTERFACES = (
     ),
     _topic(
         SUBSCRIBED,
-        "~/body_wrench",
-        "rigid_proto_interfaces/BodyWrench",
-        "as `~/wrench`, with point and slot in fields of their own, where rigid_proto_interfaces is installed",
-    ),
-    _topic(
-        SUBSCRIBED,
-        "~/body_poke",
-        "rigid_proto_interfaces/BodyWrench",
-        "as `~/poke`, with point, duration, impulse and slot in fields of their own, where rigid_proto_interfaces is "
-        "installed",
-    ),
-    _topic(
-        SUBSCRIBED,
         "~/string/target",
         "geometry_msgs/PointStamped",
         "position of the string's free end; the first message ties the string, which is released `string.timeout` "
@@ -152,7 +139,7 @@ INTERFACES = (
         PUBLISHED,
         "/tf_static",
         "tf2_msgs/TFMessage",
-        "frames of mesh and contacts at the body, where tf2_msgs is installed; those of others are read from it, too",
+        "frames of mesh and contacts at the body, where tf2_msgs is installed",
     ),
     _service(
         "~/reset",

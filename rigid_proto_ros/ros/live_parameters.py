@@ -13,17 +13,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
-from ..base.errors import CommandRefused, InputError
+from ..base.errors import InputError
+from ..live.live_simulation import LiveSimulation
 from ..scene.parameters import is_ros_parameter, parameter_named, with_mass_of_density
-from ..scene.scenario import Scenario
-from ..simulation.commands import Change
-from ..simulation.observer import Observer
 from .parameter_server import converted, descriptor, is_read_only, ros_parameter
-from .physics_thread import Call
-from .simulation_loop import SimulationLoop
 from .state_publisher import StatePublisher
-from .warm_up import warm_up_change
-from .watchers import Watchers
 
 Store = Callable[[list[Parameter]], SetParametersResult]
 """rclpy's own way to set parameters atomically."""
@@ -32,20 +26,10 @@ Store = Callable[[list[Parameter]], SetParametersResult]
 class LiveParameters:
     """Serves the parameter services of a node. All but ``changed`` runs on the executor's thread."""
 
-    def __init__(
-        self,
-        node: Node,
-        store: Store,
-        loop: SimulationLoop,
-        call: Call,
-        watchers: Watchers,
-        states: StatePublisher,
-    ) -> None:
+    def __init__(self, node: Node, store: Store, live: LiveSimulation, states: StatePublisher) -> None:
         self._node = node
         self._store_in_ros = store
-        self._loop = loop
-        self._call = call
-        self._watchers = watchers
+        self._live = live
         self._states = states
         self._behind = node.create_guard_condition(self._follow)
         self._services = _ParameterServices(node, self.set_several)
@@ -75,7 +59,8 @@ class LiveParameters:
             parameters = [*parameters, *_as_ros({"mass": 0.0})]
         try:
             if changes:
-                self._change(changes, counted)
+                self._live.set_parameters(changes, counted)
+                self._states.configure(self._live.scenario.parameters)
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return self._store(parameters, changes)
@@ -95,67 +80,18 @@ class LiveParameters:
             results[k] = self.set_together([parameters[k]])
         return results
 
-    def _change(self, changes: dict, counted: bool) -> None:
-        # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
-        loop = self._loop
-        present = loop.scenario
-        planned = present.with_changes(changes)
-        warm_up_change(present, planned)
-        if changes.get("record", "") == present.parameters.record:
-            changes = {name: value for name, value in changes.items() if name != "record"}
-
-        def check() -> Scenario:
-            scenario = loop.scenario.with_changes(changes, at_hand=planned.body_mesh)
-            try:
-                loop.check_change(scenario)
-            except CommandRefused as refusal:
-                if counted:
-                    loop.simulation.refuse(refusal)
-                raise
-            return scenario
-
-        def change() -> None:
-            setup = loop.replace(check())
-            loop.simulation.submit(Change(changes, lambda: setup))
-
-        recorder = None
-        if "record" in changes:
-            # Opened last: a refused change must leave the file of that name as it is.
-            self._call(check)
-            recorder = self._watchers.open_recorder(planned)
-        try:
-            self._call(change)
-        except InputError:
-            if recorder is not None:
-                recorder.close()
-            raise
-        if "record" in changes:
-            finished = self._call(lambda: self._watchers.switch_recording(loop, recorder))
-            if finished is not None:
-                finished.close()
-        self._states.configure(loop.scenario.parameters)
-
     def _follow(self) -> None:
         """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
         where one has stopped.
         """
-        if self._watchers.has_failed_recording:
-            self._call(self._give_up_recording).close()
-        now = self._loop.scenario.parameters
+        self._live.give_up_failed_recording()
+        now = self._live.scenario.parameters
         behind = {
             name: value for name, value in now.named().items() if not self._is_in_force(_as_ros({name: value})[0])
         }
         if behind:
             self._store(_as_ros(behind), behind)
             self._states.configure(now)
-
-    def _give_up_recording(self) -> Observer:
-        """On the physics thread; returns the recorder, which is still to be closed."""
-        loop = self._loop
-        recorder = self._watchers.switch_recording(loop, None)
-        loop.change({"record": ""})
-        assert recorder is not None
-        return recorder
 
     def _store(self, parameters: list[Parameter], values: dict) -> SetParametersResult:
         """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""

@@ -12,10 +12,10 @@ import threading
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
-from .shutdown import Shutdown, begin_closing, begin_teardown, leave
+from ..live.shutdown import Shutdown, begin_closing, begin_teardown, leave
 
 if TYPE_CHECKING:
-    from .bodies import Bodies
+    from .node_process import NodeProcess
 
 LAST_START_S = 0.2
 """How long a start that is nearly done is waited for at the end; one that compiles is left alone."""
@@ -27,10 +27,10 @@ def main(argv: list[str] | None = None) -> int:
     """
     try:
         with Shutdown() as shutdown:
-            process = _Start(sys.argv if argv is None else argv, shutdown)
-            process.start()
+            start = _Start(sys.argv if argv is None else argv, shutdown)
+            start.start()
             shutdown.wait()
-            status = process.end()
+            status = start.end()
     except InputError as error:
         print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -38,13 +38,13 @@ def main(argv: list[str] | None = None) -> int:
 
 
 class _Start(threading.Thread):
-    """Starts the bodies that the arguments ask for; should that fail, it requests the shutdown."""
+    """Starts the node that the arguments ask for; should that fail, it requests the shutdown."""
 
     def __init__(self, argv: list[str], shutdown: Shutdown) -> None:
         super().__init__(name="start", daemon=True)
         self._argv = argv
         self._shutdown = shutdown
-        self._bodies: Bodies | None = None
+        self._process: NodeProcess | None = None
         self._error: BaseException | None = None
 
     def run(self) -> None:
@@ -53,10 +53,10 @@ class _Start(threading.Thread):
             from .arguments import own_arguments
 
             own = own_arguments(self._argv)
-            from .bodies import Bodies
+            from .node_process import NodeProcess
 
-            self._bodies = Bodies(self._argv, own.bodies, self._shutdown.request, own.until)
-            self._bodies.start()
+            self._process = NodeProcess(self._argv, self._shutdown.request, own.until)
+            self._process.start()
         except BaseException as error:  # raised again by the main thread
             self._error = error
             self._shutdown.request()
@@ -67,15 +67,15 @@ class _Start(threading.Thread):
         """
         self.join(LAST_START_S)
         if self._error is not None:
-            if self._bodies is not None:
-                self._bodies.close()
-                self._bodies.leave_ros()
+            if self._process is not None:
+                self._process.close()
+                self._process.leave_ros()
             raise self._error
         begin_closing()
-        status = 0 if self._bodies is None else self._bodies.close()
-        if not self.is_alive() and self._bodies is not None:
+        status = 0 if self._process is None else self._process.close()
+        if not self.is_alive() and self._process is not None:
             begin_teardown(status)
-            self._bodies.leave_ros()
+            self._process.leave_ros()
         return status
 
 

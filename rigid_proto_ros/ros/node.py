@@ -2,53 +2,46 @@
 """The node: topics, services and parameters around one body that the physics thread advances.
 
 Callbacks run on the executor's thread; they convert and hand over. Commands don't come through callbacks at all: the
-physics thread takes them itself (command_intake.py).
+physics thread takes them itself (command_subscriber.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 
 import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ..live.endpoints import Endpoints
+from ..live.live_simulation import LiveSimulation
+from ..motion.state import State
 from ..scene.command_codec import frame_names
-from ..scene.offline import notify_start
-from ..scene.scenario import BodyMesh, Scenario, make_scenario
+from ..scene.scenario import Scenario, make_scenario
 from ..simulation.observer import Observer
-from ..simulation.setup import Setup
 from .arguments import NODE_NAME
-from .command_intake import CommandIntake
-from .command_queue import Unserved
+from .command_queue import ManualCallbackGroup
+from .command_subscriber import CommandSubscriber
 from .diagnostics import Diagnostics
 from .event_publisher import EventPublisher
 from .live_parameters import LiveParameters
-from .pacing import Stamps
 from .parameter_server import declare_parameters
-from .physics_thread import PhysicsThread
 from .services import Services
 from .simulation_interfaces import offer_simulation_interfaces
-from .simulation_loop import SimulationLoop
 from .state_publisher import StatePublisher
-from .static_frames import StaticFrames
 from .step_service import StepService
-from .watchers import Watchers
 
 
 class RigidBodyNode(Node):
-    """values: parameters by name as scene files give them, the others at their defaults. physics: the thread that
-    advances ``loop`` once it is started with it. make_viewer(scenario, node name) gives an observer that shows the
-    body, or None.
+    """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node
+    name) gives an observer that shows the body, or None. ``live`` flies once it is started.
 
     Raises InputError when a parameter given at start is refused.
     """
 
     def __init__(
         self,
-        physics: PhysicsThread,
         values: Mapping[str, object],
         make_viewer: Callable[[Scenario, str], Observer | None] = lambda *_: None,
         node_name: str = NODE_NAME,
@@ -58,45 +51,26 @@ class RigidBodyNode(Node):
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
         frames = frame_names(scenario.parameters, self.get_name())
-        stamps = Stamps(self._followed_clock(scenario))
-        static_frames = StaticFrames(self, frames, scenario.setup.contacts, stamps)
-        events = EventPublisher(self, frames[1], self._mesh_path, static_frames, stamps)
-        self._watchers = Watchers(
-            self.get_name(), events, make_viewer(scenario, self.get_name()), self._recording_failed
-        )
-        self.states = StatePublisher(self, *frames, self._specific_force, stamps)
+        events = EventPublisher(self, frames[1], self._mesh_path, scenario.setup.contacts)
+        viewer = make_viewer(scenario, self.get_name())
+        self._endpoints = RosEndpoints(self)
+        clock = self._followed_clock(scenario)
+        self.live = LiveSimulation(scenario, self.get_name(), [events, *filter(None, [viewer])], self._endpoints, clock)
+        self.loop, self.call = self.live.loop, self.live.call
+        events.stamps = self.live.stamps
+        self._endpoints.states = self.states = StatePublisher(self, *frames, self._specific_force, self.live.stamps)
         self.states.configure(scenario.parameters)
-        self.loop = SimulationLoop(
-            scenario,
-            self._watchers.observer,
-            self.states.publish,
-            self._take_commands,
-            self._motion_failed,
-            stamps,
-            self.states.find_subscribers,
-            lambda: self._watchers.are_there,
-        )
-        self.call = partial(physics.call, self.loop)
-        self.intake = CommandIntake(self, self.loop, frames, static_frames, self._apply_scheduled, self._apply_inertia)
-        self._live_parameters = LiveParameters(
-            self, super().set_parameters_atomically, self.loop, self.call, self._watchers, self.states
-        )
-        self._watchers.record_to(self._watchers.open_recorder(scenario))
-        self.loop.watch(self._watchers.observer)
-        Services(self.loop, self.call, self.intake).offer(self)
-        self.loop.serve_steps = StepService(self, self.loop, self.intake, Unserved()).serve
-        offer_simulation_interfaces(self, self.loop, self.call)
-        self.diagnostics = Diagnostics(self, self.loop, self.intake, self._watchers)
-        notify_start(self._watchers.observer, scenario)
-        self.loop.simulation.announce()
-        self.loop.notify_scene()
+        has_thrusters = bool(scenario.parameters.thrusters)
+        self._endpoints.subscriber = CommandSubscriber(self, self.live.commands, has_thrusters)
+        self._live_parameters = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
+        Services(self.live).offer(self)
+        self._endpoints.steps = StepService(self, self.live, ManualCallbackGroup())
+        offer_simulation_interfaces(self, self.live)
+        self.diagnostics = Diagnostics(self, self.live)
+        self.live.announce()
 
-    def close(self) -> None:
-        """After the physics thread has ended: whatever the observers hold goes out."""
-        self._watchers.close()
-
-    def _recording_failed(self, message: str) -> None:
-        self.get_logger().error(message)
+    def parameters_changed(self) -> None:
+        """From any thread: the ROS parameters follow on the executor's thread."""
         self._live_parameters.changed()
 
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
@@ -107,12 +81,6 @@ class RigidBodyNode(Node):
         return lambda: clock.now().nanoseconds
 
     # On the physics thread
-
-    def _take_commands(self, wall_ns: int, all_topics: bool) -> bool:
-        return self.intake.take(wall_ns, all_topics)
-
-    def _motion_failed(self, message: str) -> None:
-        self.get_logger().error(f"paused in the last good state: {message}")
 
     def _specific_force(self) -> np.ndarray:
         """At the contact that ~/imu is mounted at, or the COM."""
@@ -125,20 +93,57 @@ class RigidBodyNode(Node):
         mesh = self.loop.scenario.body_mesh
         return mesh.mesh.path if mesh else ""
 
-    def _apply_scheduled(self, changes: Mapping, at_hand: BodyMesh | None) -> Setup:
-        """A scheduled ``set`` takes effect: the ROS parameters follow on the executor's thread."""
-        setup = self.loop.change(changes, at_hand=at_hand)
-        self._live_parameters.changed()
-        return setup
-
-    def _apply_inertia(self, content: Mapping) -> Setup:
-        """An inertia message takes effect."""
-        setup = self.loop.change_inertia(content)
-        self._live_parameters.changed()
-        return setup
-
     # On the executor's thread
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """All changes of parameters come here: checked, and handed to the physics thread."""
         return self._live_parameters.set_together(parameter_list)
+
+
+class RosEndpoints(Endpoints):
+    """What the loop of one node publishes to and takes commands from."""
+
+    states: StatePublisher
+    subscriber: CommandSubscriber
+    steps: StepService
+
+    def __init__(self, node: RigidBodyNode) -> None:
+        self._node = node
+
+    def publish(self, state: State) -> None:
+        """On the topics of states."""
+        self.states.publish(state)
+
+    def has_subscribers(self) -> bool:
+        """Whether one of them has any."""
+        return self.states.find_subscribers()
+
+    def take_commands(self, wall_ns: int, all_topics: bool) -> bool:
+        """From the command topics."""
+        return self.subscriber.take(wall_ns, all_topics)
+
+    def serve_steps(self, wall_ns: int) -> bool:
+        """``~/step``."""
+        return self.steps.serve(wall_ns)
+
+    @property
+    def queue_full(self) -> int:  # type: ignore[override]  # counted by the queues
+        """How often a queue was found full."""
+        return self.subscriber.queue_full
+
+    @property
+    def messages_lost(self) -> int:  # type: ignore[override]  # counted by the queues
+        """Messages that were sent and never arrived, as far as that can be known."""
+        return self.subscriber.sequence_gaps
+
+    def parameters_changed(self) -> None:
+        """The ROS parameters follow."""
+        self._node.parameters_changed()
+
+    def warn(self, message: str) -> None:
+        """In the node's log."""
+        self._node.get_logger().warning(message)
+
+    def failed(self, message: str) -> None:
+        """In the node's log."""
+        self._node.get_logger().error(message)

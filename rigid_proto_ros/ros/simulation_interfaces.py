@@ -13,11 +13,9 @@ from typing import Any
 from rclpy.node import Node
 
 from ..base.errors import InputError
-from ..scene.command_codec import frame_names
+from ..live.live_simulation import LiveSimulation
 from . import entity_services
 from .entity_services import EntityServices
-from .physics_thread import Call, step_over
-from .simulation_loop import SimulationLoop
 from .step_action import StepAction
 
 SERVICES = (
@@ -34,9 +32,9 @@ MAX_STEPS = 1_000_000
 class SimulationInterfaces:
     """Answers the standard services for one node; call ``offer`` once."""
 
-    def __init__(self, loop: SimulationLoop, call: Call, messages: Any, entity: EntityServices) -> None:
-        self._loop = loop
-        self._call = call
+    def __init__(self, live: LiveSimulation, messages: Any, entity: EntityServices) -> None:
+        self._live = live
+        self._loop = live.loop
         self._messages = messages
         self._entity = entity
         self._stopped = False
@@ -75,7 +73,7 @@ class SimulationInterfaces:
         both = request.SCOPE_TIME | request.SCOPE_STATE
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_ALL) and request.scope & both != both:
             return self._unsupported(response, f"scope {request.scope}: time and state are reset together")
-        self._call(self._loop.reset)
+        self._live.reset()
         return self._done(response)
 
     def _state(self) -> int:
@@ -93,7 +91,7 @@ class SimulationInterfaces:
 
     def set_simulation_state(self, request: Any, response: Any) -> Any:
         """Play, pause, or stop, which is to pause and reset."""
-        states, loop = self._messages.SimulationState, self._loop
+        states = self._messages.SimulationState
         wanted = request.state.state
         if wanted not in (states.STATE_STOPPED, states.STATE_PLAYING, states.STATE_PAUSED):
             accepted = "0 stopped, 1 playing or 2 paused; end the node by a signal"
@@ -103,9 +101,9 @@ class SimulationInterfaces:
             return response
         self._stopped = wanted == states.STATE_STOPPED
         if self._stopped:
-            self._call(self._stop)
+            self._live.call(self._stop)
         else:
-            self._call(lambda: loop.pause(wanted == states.STATE_PAUSED))
+            self._live.pause(wanted == states.STATE_PAUSED)
         return self._done(response)
 
     def _stop(self) -> None:
@@ -123,7 +121,7 @@ class SimulationInterfaces:
             response.result.error_message = f"{request.steps} steps: 1 to {MAX_STEPS}"
         else:
             try:
-                step_over(self._call, loop, request.steps)
+                self._live.step(request.steps)
             except InputError as error:
                 response.result.result = results.RESULT_OPERATION_FAILED
                 response.result.error_message = str(error)
@@ -141,13 +139,13 @@ class SimulationInterfaces:
         return response
 
 
-def offer_simulation_interfaces(node: Node, loop: SimulationLoop, call: Call) -> bool:
+def offer_simulation_interfaces(node: Node, live: LiveSimulation) -> bool:
     """Offer the standard services on the node; False where simulation_interfaces isn't installed."""
     try:
         from simulation_interfaces import action, msg, srv
     except ImportError:
         return False
-    entity = EntityServices(loop, call, msg, node.get_name(), frame_names(loop.scenario.parameters, "")[0])
-    SimulationInterfaces(loop, call, msg, entity).offer(node, srv)
-    StepAction(loop, call, msg, action.SimulateSteps).offer(node)
+    entity = EntityServices(live, msg)
+    SimulationInterfaces(live, msg, entity).offer(node, srv)
+    StepAction(live, msg, action.SimulateSteps).offer(node)
     return True

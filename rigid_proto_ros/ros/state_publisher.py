@@ -15,6 +15,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
 from ..base.rotation import rotate
+from ..live.pacing import Stamps
 from ..messages import cdr
 from ..motion.state import State
 from ..scene.parameters import Parameters
@@ -29,7 +30,6 @@ from ..scene.sensor_noise import (
     sensor_noise,
 )
 from . import qos
-from .pacing import Stamps
 
 Topics = list[tuple[Publisher, Callable[[int, list[float]], Any]]]
 """A publisher, and how its message is made from time and state."""

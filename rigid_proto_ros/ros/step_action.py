@@ -13,8 +13,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
 
 from ..base.errors import InputError
-from .physics_thread import Call, step_over
-from .simulation_loop import SimulationLoop
+from ..live.live_simulation import LiveSimulation
 
 
 class StepAction:
@@ -22,9 +21,8 @@ class StepAction:
     modules simulation_interfaces.msg.
     """
 
-    def __init__(self, loop: SimulationLoop, call: Call, messages: Any, action: Any) -> None:
-        self._loop = loop
-        self._call = call
+    def __init__(self, live: LiveSimulation, messages: Any, action: Any) -> None:
+        self._live = live
         self._results = messages.Result
         self._action = action
 
@@ -59,9 +57,7 @@ class StepAction:
         for done in range(1, steps + 1):
             if goal.is_cancel_requested:
                 return
-            if not self._loop.timekeeping.paused:
-                raise InputError("simulate_steps", "the simulation is running; pause it first")
-            step_over(self._call, self._loop)
+            self._live.step()
             goal.publish_feedback(self._action.Feedback(completed_steps=done, remaining_steps=steps - done))
 
     def _ended(self, goal: Any, message: str) -> Any:

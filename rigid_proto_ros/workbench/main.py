@@ -10,9 +10,9 @@ import time
 import webbrowser
 
 from ..base.errors import InputError
+from ..live.shutdown import Shutdown
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
-from ..ros.shutdown import Shutdown
 
 PATIENCE_S = 10.0
 """[s] For a node that is said to be running: discovery takes less than one of them."""

@@ -35,7 +35,7 @@ from ..base.errors import InputError
 from ..messages import cdr
 from ..messages.session_messages import simulated_time
 from ..ros import qos
-from ..ros.command_queue import Unserved
+from ..ros.command_queue import ManualCallbackGroup
 from ..ros.parameter_server import ros_parameter
 from ..scene.parameters import parameter_named
 
@@ -129,7 +129,7 @@ class RosLink:
         self._services = {name: self.node.create_client(Trigger, f"{self.target}/{name}") for name in _TRIGGERS}
         self._services["pause"] = self.node.create_client(SetBool, f"{self.target}/pause")
         self._set = self.node.create_client(SetParametersAtomically, f"{self.target}/set_parameters_atomically")
-        self._by_hand = Unserved()
+        self._by_hand = ManualCallbackGroup()
         self._taken: dict[str, Subscription] = {}
         self._served: list[Subscription] = []
         self._poses: dict[int, PoseStamped] = {}

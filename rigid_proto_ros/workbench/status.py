@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Mapping
 import viser
 
 from ..base.errors import InputError
-from ..ros.diagnostic_warnings import command_warnings, increase
+from ..live.diagnostics import command_warnings, increase
 
 SILENT_S = 2.5
 """[s] Without a state or a report: a node that lives sends a report every second."""

@@ -286,10 +286,10 @@ def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["--bodys", "hammer"], "did you mean --bodies?"),
+        (["--untl", "3"], "did you mean --until?"),
         (["--recrd"], "no option --recrd"),
         (["hammer"], "--ros-args --params-file hammer"),
-        (["--bodies"], "--bodies"),
+        (["--until"], "--until"),
         (["--ros-args", "--parms-file", "x.yaml"], "did you mean --params-file?"),
         (["--ros-args", "mesh:=book"], "did you mean -p mesh:=book?"),
         (["--ros-args", "-p", "mass:=1", "--", "--mas"], "no option --mas"),
@@ -304,16 +304,16 @@ def test_help_of_the_node_lists_options_and_parameters_and_starts_nothing(capfd)
         rigid_body_node(["rigid_body_node", "--help"])
     assert ended.value.code == 0
     text = capfd.readouterr().out
-    assert "--bodies" in text and all(f"\n  {name}\n" in text for name in PARAMETERS)
+    assert "--until" in text and all(f"\n  {name}\n" in text for name in PARAMETERS)
 
 
 def test_what_ros_itself_hands_a_node_is_no_mistake():
     """As `ros2 launch` and `ros2 run` start it, with every kind of ROS argument."""
     ros = "--ros-args -r __node:=a -r __ns:=/b --remap ~/wrench:=/w --params-file f.yaml -p mass:=1 --log-level debug"
     ros += " --log-level rigid_body:=info --enable-rosout-logs --disable-stdout-logs -e /enclave"
-    assert own_arguments(["node", *ros.split()]).bodies == []
-    assert own_arguments(["node", *ros.split(), "--", "--bodies", "book", "hammer"]).bodies == ["book", "hammer"]
-    assert own_arguments(["node", "--bodies", "book", *ros.split()]).bodies == ["book"]
+    assert own_arguments(["node", *ros.split()]).until is None
+    assert own_arguments(["node", *ros.split(), "--", "--until", "3"]).until == 3.0
+    assert own_arguments(["node", "--until", "3", *ros.split()]).until == 3.0
 
 
 @pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])

@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import String
 
-from rigid_proto_ros.ros.command_intake import read_wrench_stamped
+from rigid_proto_ros.ros.command_subscriber import read_stamped
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=40)
 stamps = st.integers(0, 2**31 * 10**9 - 1)
@@ -53,7 +53,8 @@ def test_a_wrench_is_the_serialized_message_and_read_back(stamp_ns, frame_id, va
     fill(message.wrench.torque, values[3:])
     packed = cdr.wrench_stamped(stamp_ns, frame_id, values[:3], values[3:])
     assert packed == zero_padded(serialize_message(message), frame_id)
-    assert read_wrench_stamped(packed) == (stamp_ns, frame_id, values[:3], values[3:])
+    read = read_stamped("wrench", packed)
+    assert (read.t_ns, read.frame_id, read.force, read.torque) == (stamp_ns, frame_id, values[:3], values[3:])
 
 
 @settings(deadline=None)
@@ -90,13 +91,13 @@ def test_states_are_the_serialized_messages_for_frames_of_any_length(length):
 def test_any_bytes_are_read_or_refused_like_rclpy_does(body):
     data = b"\x00\x01\x00\x00" + body
     try:
-        stamp_ns, frame_id, force, torque = read_wrench_stamped(data)
+        read = read_stamped("wrench", data)
     except Exception:  # refused; by us or by rclpy
         return
-    assert isinstance(stamp_ns, int) and isinstance(frame_id, str)
-    assert len(force) == len(torque) == 3
+    assert isinstance(read.t_ns, int) and isinstance(read.frame_id, str)
+    assert len(read.force) == len(read.torque) == 3
     try:
         theirs = deserialize_message(data, WrenchStamped)
     except Exception:
         return
-    assert theirs.header.stamp.sec * 10**9 + theirs.header.stamp.nanosec == stamp_ns
+    assert theirs.header.stamp.sec * 10**9 + theirs.header.stamp.nanosec == read.t_ns

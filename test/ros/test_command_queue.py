@@ -19,7 +19,7 @@ from rclpy.parameter_service import ParameterService
 from rclpy.subscription import Subscription
 from ros_process import READY_S
 
-from rigid_proto_ros.ros.command_queue import RequestQueue, Unserved
+from rigid_proto_ros.ros.command_queue import ManualCallbackGroup, RequestQueue
 
 SAYS = "this release of rclpy differs from 7.1.6 in what rigid_proto_ros uses beyond the public interface: "
 
@@ -75,7 +75,7 @@ def test_requests_can_be_taken_from_a_service_without_an_executor(ros_domain_id)
     rclpy.init(context=context, domain_id=ros_domain_id)
     node = rclpy.create_node("asked", context=context)
     try:
-        queue = RequestQueue(node, Trigger, "do", Unserved())
+        queue = RequestQueue(node, Trigger, "do", ManualCallbackGroup())
         assert queue.take() is None
         client = node.create_client(Trigger, "~/do")
         while not client.service_is_ready():

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: MIT
 """What ROS users expect of any node: names, types, QoS, descriptors, namespaces, several at once."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import yaml
 from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
 from conftest import held_domain
-from ros_process import running_node
 
 from rigid_proto_ros.scene.declaration import READ_ONLY
 from rigid_proto_ros.scene.parameters import PARAMETERS, is_ros_parameter
@@ -234,48 +231,6 @@ def test_a_second_node_of_the_same_name_is_warned_of_by_both(ros_environment, tm
                 client.until(lambda: all(node.log.read_text().count(said) == 1 for node in nodes), "a warning of each")
         finally:
             assert [node.stop() for node in nodes] == [0, 0]
-
-
-def test_what_the_command_line_gives_is_for_all_bodies_and_comes_after_their_files(ros_environment, tmp_path):
-    arguments = ("--bodies", "hammer", "book", "--ros-args", "-p", "publish_rate:=40.0")
-    with held_domain() as domain:
-        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        with running_node(*arguments, environment=environment, log=tmp_path / "bodies"):
-            for node in ("/hammer", "/book"):
-                with RosClient(environment, node) as client:
-                    assert client.get("publish_rate", "mesh") == {"publish_rate": 40.0, "mesh": node.strip("/")}
-
-
-TWO_IN_ONE = """
-import rclpy
-from rigid_proto_ros.ros.node import RigidBodyNode
-from rigid_proto_ros.ros.physics_thread import PhysicsThread
-from rigid_proto_ros.simulation.commands import WrenchCommand
-from rigid_proto_ros.motion.frames import parse_frame
-import time
-
-rclpy.init()
-thread = PhysicsThread()
-nodes = [RigidBodyNode(thread, v, node_name=n) for n, v in (
-    ("one", {"mesh": "t_handle", "contacts.tip": [0.0, 0.0, 0.07]}), ("two", {"mesh": "hammer"}))]
-thread.start([node.loop for node in nodes])
-frame = "world@tip;impulse"
-command = WrenchCommand(False, parse_frame(frame, {"tip"}), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, frame, b"")
-nodes[0].call(lambda: nodes[0].loop.simulation.submit(command))
-while nodes[0].loop.simulation.events.count == 0 or nodes[1].loop.simulation.time_ns == 0:
-    time.sleep(0.01)
-thread.stop()
-print(nodes[0].loop.simulation.events.count, nodes[1].loop.simulation.events.count)
-print(nodes[0].loop.simulation.state.linear_velocity[0] > 0, nodes[1].loop.simulation.state.linear_velocity.any())
-print([n.get_fully_qualified_name() for n in nodes])
-"""
-
-
-def test_two_nodes_in_one_process_have_nothing_in_common(ros_environment):
-    done = subprocess.run(
-        [sys.executable, "-c", TWO_IN_ONE], env=ros_environment, capture_output=True, text=True, timeout=300
-    )
-    assert done.stdout.splitlines()[-3:] == ["1 0", "True False", "['/one', '/two']"], done.stderr
 
 
 def test_depth_and_reliability_of_each_topic_are_parameters_like_others(rig):

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The real packages simulation_interfaces and tf2_msgs, where they are installed: from a ROS installation, or built from
-their sources by tools/build_interfaces.py.
-"""
+"""The real packages simulation_interfaces and tf2_msgs, where they are installed: from a ROS installation."""
 
 from __future__ import annotations
 

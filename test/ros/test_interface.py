@@ -86,7 +86,7 @@ def _resolved(name: str) -> str:
 
 
 def _listed(direction: str) -> dict[str, str]:
-    missing = {p for p in ("tf2_msgs", "rigid_proto_interfaces") if importlib.util.find_spec(p) is None}
+    missing = {p for p in ("tf2_msgs",) if importlib.util.find_spec(p) is None}
     return {
         _resolved(i.name): i.type
         for i in INTERFACES

@@ -12,8 +12,8 @@ import pytest
 from command_rig import stamp_ns, wrench_message
 from scipy.spatial.transform import Rotation
 
+from rigid_proto_ros.live.pacing import Stamps
 from rigid_proto_ros.mesh.reading import load_mesh
-from rigid_proto_ros.ros.pacing import Stamps
 from rigid_proto_ros.scene.scenario import make_scenario
 
 SECOND = 10**9

@@ -36,38 +36,22 @@ OK, UNSUPPORTED, NOT_FOUND, FAILED, ALREADY, INVALID_POSE = 1, 0, 2, 4, 101, 101
 SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED": 4, "SCOPE_ALL": 255}
 
 
-class Node:
-    """A flight on a real physics thread, without ROS."""
-
-    def __init__(self) -> None:
-        from rigid_proto_ros.ros.physics_thread import PhysicsThread
-        from rigid_proto_ros.ros.simulation_loop import SimulationLoop
-        from rigid_proto_ros.ros.warm_up import warm_up
-        from rigid_proto_ros.scene.scenario import make_scenario
-        from rigid_proto_ros.simulation.observer import Observer
-
-        scenario = make_scenario({"initial.angular_velocity": [0.1, 3.0, 0.1], "start_paused": True})
-        self.loop = SimulationLoop(
-            scenario, Observer(), lambda state: None, lambda wall_ns, whole: False, lambda message: None
-        )
-        # As the node does: a kernel that compiles would hold the first request up for longer than it waits.
-        warm_up(scenario.setup)
-        self.thread = PhysicsThread()
-        self.thread.start([self.loop])
-
-    def call(self, function):
-        return self.thread.call(self.loop, function)
-
-
 @pytest.fixture
 def services():
+    """The services of a flight on a real physics thread, without ROS."""
+    from rigid_proto_ros.live.live_simulation import LiveSimulation
+    from rigid_proto_ros.live.warm_up import warm_up
     from rigid_proto_ros.ros.entity_services import EntityServices
     from rigid_proto_ros.ros.simulation_interfaces import SimulationInterfaces
+    from rigid_proto_ros.scene.scenario import make_scenario
 
-    node = Node()
-    entity = EntityServices(node.loop, node.call, MESSAGES, "tool", "map")
-    yield SimulationInterfaces(node.loop, node.call, MESSAGES, entity), node
-    node.thread.stop()
+    values = {"initial.angular_velocity": [0.1, 3.0, 0.1], "start_paused": True, "world_frame": "map"}
+    live = LiveSimulation(make_scenario(values), "tool")
+    # As the node does: a kernel that compiles would hold the first request up for longer than it waits.
+    warm_up(live.scenario.setup)
+    live.start()
+    yield SimulationInterfaces(live, MESSAGES, EntityServices(live, MESSAGES)), live
+    live.stop()
 
 
 def response():
@@ -185,7 +169,7 @@ def carried_out(node, goal: Goal):
     from rigid_proto_ros.ros.step_action import StepAction
 
     action = SimpleNamespace(Result=response, Feedback=SimpleNamespace)
-    StepAction(node.loop, node.call, MESSAGES, action).accepted(goal).join()
+    StepAction(node, MESSAGES, action).accepted(goal).join()
     return goal.result
 
 
@@ -249,7 +233,7 @@ def test_without_the_package_nothing_is_offered(monkeypatch):
     from rigid_proto_ros.ros.simulation_interfaces import offer_simulation_interfaces
 
     monkeypatch.setitem(sys.modules, "simulation_interfaces", None)
-    assert offer_simulation_interfaces(None, None, None) is False
+    assert offer_simulation_interfaces(None, None) is False
 
 
 def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services):
@@ -308,25 +292,3 @@ def test_the_only_entity_is_found_by_name_category_and_place(services):
     for radius, found in ((0.09, []), (0.11, ["tool"])):
         points = [place, SimpleNamespace(x=radius, y=0.0, z=0.0)]
         assert find(bounds=3, points=points).entities == found
-
-
-def test_a_step_goes_up_to_a_time_where_one_is_given():
-    from rigid_proto_ros.ros.pacing import publications_until
-
-    assert [publications_until(t, 30.0) for t in (0, 33_333_332, 33_333_333, 99_999_999, 100_000_000, 10**9)] == [
-        0,
-        0,
-        1,
-        2,
-        3,
-        30,
-    ]
-    node = Node()
-    try:
-        change = {"step_until": 0.355}
-        node.call(lambda: node.loop.change(change))
-        assert node.call(lambda: node.loop.periods_of_a_step) == 35
-        node.call(lambda: node.loop.step(35))
-        assert node.call(lambda: node.loop.periods_of_a_step) == 1
-    finally:
-        node.thread.stop()

@@ -77,13 +77,10 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
 
 
 def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
-    pytest.importorskip("rclpy")
-    from rigid_proto_ros.ros.simulation_loop import SimulationLoop
+    from rigid_proto_ros.live.simulation_loop import SimulationLoop
 
     watcher = Watcher()
-    flight = SimulationLoop(
-        make_scenario(MOVING), watcher, lambda s: None, lambda wall_ns, whole: False, print, is_viewed=lambda: True
-    )
+    flight = SimulationLoop(make_scenario(MOVING), watcher)
     flight.start()
     while flight.simulation.time_ns < SECOND:
         flight.tick()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigid_proto_ros.ros.diagnostic_warnings import warnings_since
+from rigid_proto_ros.live.diagnostics import warnings_since
 from rigid_proto_ros.workbench.status import SHOWN_S, SILENT_S, Status
 
 CALM = {

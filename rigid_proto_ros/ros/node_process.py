@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bodies of one process and the threads that they need, from the arguments to the end."""
+"""The node of one process and the threads that it needs, from the arguments to the end."""
 
 from __future__ import annotations
 
@@ -14,39 +14,33 @@ from rclpy.signals import SignalHandlerOptions
 
 from ..base.compilation import notify_when_compiling
 from ..base.errors import InputError
+from ..live.warm_up import IntegratorsCompiling, warm_up
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds
 from ..simulation.observer import Observer
-from .arguments import NODE_NAME, given_arguments, read_bodies, remapped_node_name
+from .arguments import given_arguments, remapped_node_name
 from .diagnostics import Reports
 from .node import RigidBodyNode
-from .physics_thread import PhysicsThread
-from .warm_up import IntegratorsCompiling, warm_up
 
 
-class Bodies:
-    """The nodes of this process. files: what stands behind ``--bodies``. request_end() is called when the process
-    should end by itself: after a fault, or when simulated time has come to until_s.
+class NodeProcess:
+    """request_end() is called when the process should end by itself: after a fault, or when simulated time has come to
+    until_s.
     """
 
-    def __init__(
-        self, argv: list[str], files: list[str], request_end: Callable[[], None], until_s: float | None = None
-    ) -> None:
+    def __init__(self, argv: list[str], request_end: Callable[[], None], until_s: float | None = None) -> None:
         self._argv = argv
-        self._files = files
         self._request_end = request_end
         self._until_s = until_s
         self._ending = False
         self._crashed = False
-        self._nodes: list[RigidBodyNode] = []
-        self._physics = PhysicsThread(self._on_crash)
+        self._node: RigidBodyNode | None = None
         self._executor: Executor | None = None
         self._executing: threading.Thread | None = None
         self._reports: Reports | None = None
 
     def start(self) -> None:
-        """Make the nodes, which may compile for minutes, and let them run. Raises InputError."""
-        bodies = read_bodies(self._files)
+        """Make the node, which may compile for minutes, and let it run. Raises InputError."""
         given = given_arguments(self._argv, remapped_node_name(self._argv), _warn)
         try:
             # The middleware must outlive the physics thread, so rclpy's own handlers of signals stay out.
@@ -60,24 +54,20 @@ class Bodies:
             integrators.begin()
 
         with notify_when_compiling(begin_compiling):
-            # What the command line gives is for all of them, and comes after the files.
-            for name, values in (bodies or {NODE_NAME: {}}).items():
-                self._nodes.append(RigidBodyNode(self._physics, {**values, **given}, _make_viewer, name))
-            integrators.wait(self._nodes[0].loop.scenario.setup)
-            for node in self._nodes:
-                node.states.pack_all(warm_up(node.loop.scenario.setup))
-                if self._until_s is not None:
-                    node.loop.end_at(nanoseconds(self._until_s), self._request_end)
+            node = self._node = RigidBodyNode(given, _make_viewer)
+            setup = node.live.scenario.setup
+            integrators.wait(setup)
+            node.states.pack_all(warm_up(setup))
+        if self._until_s is not None:
+            node.live.loop.end_at(nanoseconds(self._until_s), self._request_end)
         self._executor = SingleThreadedExecutor()
-        for node in self._nodes:
-            self._executor.add_node(node)
+        self._executor.add_node(node)
         self._executing = threading.Thread(target=self._spin, args=(self._executor,), name="executor", daemon=True)
         self._executing.start()
-        self._reports = Reports([node.diagnostics for node in self._nodes])
+        self._reports = Reports(node.diagnostics)
         self._reports.start()
-        self._physics.start([node.loop for node in self._nodes])
-        for node in self._nodes:
-            node.get_logger().info(f"{node.get_fully_qualified_name()} is simulating {_described(node.loop.scenario)}")
+        node.live.start(self._on_crash)
+        node.get_logger().info(f"{node.get_fully_qualified_name()} is simulating {_described(node.live.scenario)}")
 
     def _spin(self, executor: Executor) -> None:
         while not self._ending:
@@ -100,9 +90,8 @@ class Bodies:
         self._ending = True
         if self._reports is not None:
             self._reports.stop()
-        self._physics.stop()
-        for node in list(self._nodes):
-            node.close()
+        if self._node is not None:
+            self._node.live.stop()
         return 1 if self._crashed else 0
 
     def leave_ros(self) -> None:
@@ -111,8 +100,8 @@ class Bodies:
             self._executor.shutdown(timeout_sec=0.5)
         if self._executing is not None:
             self._executing.join(timeout=0.5)
-        for node in self._nodes:
-            node.destroy_node()
+        if self._node is not None:
+            self._node.destroy_node()
         rclpy.try_shutdown()
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Kernels compiled, or loaded from the cache, before a command waits for them.
 
-``python -m rigid_proto_ros.ros.warm_up`` compiles auto's integrators and ends.
+``python -m rigid_proto_ros.live.warm_up`` compiles auto's integrators and ends.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class IntegratorsCompiling:
         if len(os.sched_getaffinity(0)) < 2:
             return
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "rigid_proto_ros.ros.warm_up"],
+            [sys.executable, "-m", "rigid_proto_ros.live.warm_up"],
             env=with_this_package(),
             preexec_fn=end_with_this_thread(),  # which waits for it below
             stdin=subprocess.DEVNULL,

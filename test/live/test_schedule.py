@@ -6,21 +6,16 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections import deque
-from types import SimpleNamespace
 
 import pytest
 
-pytest.importorskip("rclpy")
-
+from rigid_proto_ros.live import warm_up
+from rigid_proto_ros.live.endpoints import Endpoints
+from rigid_proto_ros.live.live_simulation import LiveSimulation
+from rigid_proto_ros.live.pacing import WorkBudget
 from rigid_proto_ros.messages import cdr
-from rigid_proto_ros.ros import command_intake, command_queue, warm_up
-from rigid_proto_ros.ros.pacing import WorkBudget
-from rigid_proto_ros.ros.physics_thread import advance_by
-from rigid_proto_ros.ros.services import Services
-from rigid_proto_ros.ros.simulation_loop import SimulationLoop
-from rigid_proto_ros.ros.step_service import step
 from rigid_proto_ros.scene import scenario
+from rigid_proto_ros.scene.command_codec import ScriptCommand
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation import flight_arrays
@@ -29,52 +24,24 @@ from rigid_proto_ros.simulation.observer import Observer
 MS = 1_000_000
 
 
-class Subscription:
-    """One whose queue is filled here."""
+class Rig(Endpoints):
+    """A flight that is ticked here."""
 
     def __init__(self) -> None:
-        self.queue: deque[bytes] = deque()
-        self.handle = self
-        self.qos_profile = SimpleNamespace(depth=5000)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_) -> None:
-        pass
-
-    def take_message(self, message_type, raw: bool):
-        return (self.queue.popleft(), {}) if self.queue else None
-
-
-class Rig:
-    """A flight with its intake, and no ROS graph."""
-
-    def __init__(self, monkeypatch) -> None:
-        monkeypatch.setattr(command_queue, "_event", lambda subscription, kind: None)
-        self.topics: dict[str, Subscription] = {}
         self.published: list[int] = []
-        self.loop = SimulationLoop(
-            make_scenario({"mesh": "t_handle", "publish_rate": 1000.0, "real_time_factor": 0.0}),
-            Observer(),
-            lambda state: self.published.append(state.time_ns),
-            lambda wall_ns, all_topics: self.intake.take(wall_ns, True),
-            print,
-        )
-        self.intake = command_intake.CommandIntake(self, self.loop, ("world", "rigid_body"), None, self.change, None)
+        values = {"mesh": "t_handle", "publish_rate": 1000.0, "real_time_factor": 0.0}
+        self.live = LiveSimulation(make_scenario(values), endpoints=self)
+        self.loop, self.commands = self.live.loop, self.live.commands
         self.loop.start()
 
-    def get_logger(self):
-        return None
+    def publish(self, state) -> None:
+        self.published.append(state.time_ns)
 
-    def create_subscription(self, message_type, topic, *_, **__) -> Subscription:
-        return self.topics.setdefault(topic.removeprefix("~/"), Subscription())
-
-    def change(self, changes: dict, at_hand):
-        return self.loop.change(changes, at_hand=at_hand)
+    def has_subscribers(self) -> bool:
+        return True
 
     def schedule(self, text: str) -> None:
-        self.topics["schedule"].queue.append(cdr.string(text))
+        self.commands.receive_schedule(lambda: text, cdr.string(text))
 
     def tick_until(self, condition) -> None:
         for _ in range(1_000_000):
@@ -85,7 +52,7 @@ class Rig:
 
 
 def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_the_body(monkeypatch) -> None:
-    rig = Rig(monkeypatch)
+    rig = Rig()
     may_load, loaded_by = threading.Event(), []
     load = scenario.mesh_body
 
@@ -99,11 +66,11 @@ def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_th
     rig.tick_until(lambda: loaded_by)
     before = len(rig.published)
     # The mesh isn't there, and the body flies on; what comes by other ways is taken meanwhile.
-    rig.topics["poke"].queue.append(cdr.wrench_stamped(0, "world;impulse", (1e-3, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    rig.tick_until(lambda: len(rig.published) >= before + 200 and rig.intake.received["poke"])
-    assert rig.intake.received["schedule"] == 0
+    rig.commands.receive("poke", lambda: ScriptCommand(0, "poke", "world;impulse", (1e-3, 0.0, 0.0)))
+    rig.tick_until(lambda: len(rig.published) >= before + 200 and rig.loop.simulation.events.count)
+    assert rig.commands.received["schedule"] == 0
     may_load.set()
-    rig.tick_until(lambda: rig.intake.received["schedule"] == 1)
+    rig.tick_until(lambda: rig.commands.received["schedule"] == 1)
     assert not rig.loop.simulation.refused
     rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
     rig.tick_until(lambda: rig.loop.scenario.parameters.mesh == "book")
@@ -111,7 +78,7 @@ def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_th
 
 
 def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_body(monkeypatch) -> None:
-    rig = Rig(monkeypatch)
+    rig = Rig()
     may_compile, compiled_by = threading.Event(), []
 
     def slow(setup) -> None:
@@ -127,7 +94,7 @@ def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_b
     assert rig.loop.scenario.parameters.integrator == "auto"
     may_compile.set()
     # What was scheduled after it is taken after it.
-    rig.tick_until(lambda: rig.intake.received["schedule"] == 2)
+    rig.tick_until(lambda: rig.commands.received["schedule"] == 2)
     rig.tick_until(lambda: rig.loop.scenario.parameters.gravity == (0.0, 0.0, -1.0))
     assert rig.loop.scenario.parameters.integrator == "rk4"
     assert compiled_by == [("schedule", "rk4")]
@@ -135,7 +102,7 @@ def test_a_scheduled_integrator_is_compiled_beside_the_thread_that_carries_the_b
 
 @pytest.mark.parametrize("service", ["pause", "step"])
 def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on(monkeypatch, service) -> None:
-    rig = Rig(monkeypatch)
+    rig = Rig()
     load = scenario.mesh_body
 
     def slow(*arguments, **named):
@@ -150,28 +117,27 @@ def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on
 
     monkeypatch.setattr(scenario, "mesh_body", slow)
     rig.loop.watch(Changes())
-    services = Services(rig.loop, lambda function: function(), rig.intake)
-    services._pause(SimpleNamespace(data=True))
+    rig.live.pause(True)
     at_ns = rig.loop.simulation.time_ns
     rig.schedule('[{"t": 0, "set": {"mesh": "book"}}]')
     if service == "pause":
-        services._pause(SimpleNamespace(data=False))
+        rig.live.pause(False)
     else:
-        for _ in step(rig.loop, rig.intake):
+        for _ in rig.live.steps():
             rig.loop.tick()
-    assert rig.intake.received["schedule"] == 1
+    assert rig.commands.received["schedule"] == 1
     rig.tick_until(lambda: rig.loop.scenario.parameters.mesh == "book")
     assert changed_ns == [at_ns]
 
 
 def test_a_step_asked_for_while_another_is_made_follows_it(monkeypatch) -> None:
-    rig = Rig(monkeypatch)
+    rig = Rig()
     rig.loop.pause(True)
     reached_ns = rig.loop.simulation.time_ns
     advance, calls = WorkBudget.advance, itertools.count()
     # As where a tick's time is over before the step is made.
     monkeypatch.setattr(WorkBudget, "advance", lambda *given: next(calls) % 3 != 0 and advance(*given))
-    waiting = [advance_by(rig.loop, 5), advance_by(rig.loop, 7)]
+    waiting = [rig.loop.steps(5), rig.loop.steps(7)]
     while waiting:
         waiting = [steps for steps in waiting if next(steps, True) is None]
         rig.loop.tick()

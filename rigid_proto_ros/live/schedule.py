@@ -52,21 +52,30 @@ class Entry:
 @dataclass
 class ScheduleMessage:
     """One message. count: its entries, as messages are counted. commands: once read. entries: once checked. refusal:
-    why none of it is taken.
+    why none of it is taken. is_submitted: whether it is taken or refused by now.
     """
 
     data: bytes
-    text: str
+    text: str = ""
     count: int = 1
     is_list: bool = False
     commands: list[ScriptCommand] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
     refusal: CommandRefused | None = None
+    is_submitted: bool = False
 
     @property
     def is_slow(self) -> bool:
         """Whether it is to be checked in the background."""
         return any(command.changes and SLOW & command.changes.keys() for command in self.commands)
+
+    def decode(self, text: Callable[[], str]) -> None:
+        """Fill ``text``."""
+
+        def decode() -> None:
+            self.text = text()
+
+        self._keep_refusal(decode)
 
     def read(self, scenario: Scenario) -> None:
         """Fill ``commands``."""

@@ -6,16 +6,12 @@ from __future__ import annotations
 import time
 
 import pytest
-
-pytest.importorskip("rclpy")
-
 from flights import SECOND, wrench
 
-from rigid_proto_ros.ros.pacing import TICK_NS, WorkBudget
-from rigid_proto_ros.ros.physics_thread import PhysicsThread
-from rigid_proto_ros.ros.simulation_loop import SimulationLoop
+from rigid_proto_ros.live.endpoints import Endpoints
+from rigid_proto_ros.live.pacing import TICK_NS, WorkBudget
+from rigid_proto_ros.live.simulation_loop import SimulationLoop
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
 ENDLESS = {
@@ -28,24 +24,31 @@ ENDLESS = {
 """10¹⁵ steps to the next publication: years."""
 
 
-class Rig:
+class Rig(Endpoints):
     """A flight whose publications and commands are at hand."""
 
     def __init__(self, values: dict) -> None:
         self.published: list[int] = []
         self.commands: list = []
-        scenario = make_scenario(values)
-        self.loop = SimulationLoop(scenario, Observer(), lambda s: self.published.append(s.time_ns), self.take, print)
+        self.has_listeners = True
+        self.lively = False
+        self.loop = SimulationLoop(make_scenario(values), endpoints=self)
         self.loop.start()
         # Simulated time begins at the next moment that all loops of a process share.
         time.sleep(1.1e-9 * TICK_NS)
 
-    def take(self, wall_ns: int, all_topics: bool) -> bool:
+    def publish(self, state) -> None:
+        self.published.append(state.time_ns)
+
+    def has_subscribers(self) -> bool:
+        return self.has_listeners
+
+    def take_commands(self, wall_ns: int, all_topics: bool) -> bool:
         if self.commands:
             self.loop.catch_up()
         while self.commands:
             self.loop.simulation.submit(self.commands.pop())
-        return False
+        return self.lively
 
 
 def test_a_tick_ends_long_before_a_publication_that_is_years_away():
@@ -98,9 +101,9 @@ def test_a_step_that_takes_years_is_begun_and_given_up_by_resuming():
 
 @pytest.mark.parametrize("listeners", [True, False])
 def test_a_flight_pauses_at_the_last_time_that_a_stamp_can_say(monkeypatch, listeners):
-    monkeypatch.setattr("rigid_proto_ros.ros.simulation_loop.LAST_STAMP_NS", 3 * SECOND)
+    monkeypatch.setattr("rigid_proto_ros.live.simulation_loop.LAST_STAMP_NS", 3 * SECOND)
     rig = Rig({"real_time_factor": 0.0 if listeners else 1e6, "publish_rate": 1.0})
-    rig.loop._anybody_listens = lambda: listeners
+    rig.has_listeners = listeners
     while not rig.loop.timekeeping.paused:
         rig.loop.tick()
     assert "the largest that a stamp can hold" in rig.loop.simulation.failure
@@ -112,8 +115,8 @@ def test_a_flight_pauses_at_the_last_time_that_a_stamp_can_say(monkeypatch, list
 
 def test_without_listeners_a_motion_that_is_too_dear_gives_time_up_and_says_so(monkeypatch):
     rig = Rig({**ENDLESS, "publish_rate": 1000.0, "real_time_factor": 1.0})
-    monkeypatch.setattr("rigid_proto_ros.ros.pacing.MAX_LAG_NS", 10_000_000)
-    rig.loop._anybody_listens = lambda: False
+    monkeypatch.setattr("rigid_proto_ros.live.pacing.MAX_LAG_NS", 10_000_000)
+    rig.has_listeners = False
     rig.loop.tick()
     lost_s = rig.loop.timekeeping.real_time_lost_s
     while rig.loop.timekeeping.real_time_lost_s == lost_s:
@@ -140,10 +143,9 @@ def test_slices_give_the_same_bits(integrator):
 
 def test_while_commands_come_they_are_taken_once_more_shortly_before_each_publication(monkeypatch):
     now = [10**12]
-    monkeypatch.setattr("rigid_proto_ros.ros.pacing.time.monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("rigid_proto_ros.live.pacing.time.monotonic_ns", lambda: now[0])
     rig = Rig({"publish_rate": 1000.0})
     rig.lively = True
-    rig.loop._take_commands = lambda wall_ns, all_topics: rig.lively
     wakes = []
     for _ in range(6):
         rig.loop.tick()
@@ -155,46 +157,3 @@ def test_while_commands_come_they_are_taken_once_more_shortly_before_each_public
         rig.loop.tick()
         now[0] = max(now[0], rig.loop.next_wake_ns())
     assert round((now[0] - 10**12) / 1e6) == 5
-
-
-class CountedLoop:
-    """A loop that is due every 10 ms and counts how often it is asked."""
-
-    def __init__(self) -> None:
-        self.asked = self.ticks = 0
-
-    def start(self) -> None:
-        self._due_ns = time.monotonic_ns()
-
-    def next_wake_ns(self) -> int:
-        self.asked += 1
-        return self._due_ns
-
-    def tick(self) -> None:
-        self.ticks += 1
-        self._due_ns = (time.monotonic_ns() // TICK_NS + 1) * TICK_NS
-
-
-def test_the_work_of_the_physics_thread_grows_with_the_number_of_its_bodies_and_no_faster():
-    loops = [CountedLoop() for _ in range(64)]
-    thread = PhysicsThread()
-    thread.start(loops)
-    while min(loop.ticks for loop in loops) < 20:
-        time.sleep(0.01)
-    thread.stop()
-    for loop in loops:
-        assert loop.asked <= loop.ticks + 1  # 64 times as often before: every loop at every wake-up of one
-
-
-def test_loops_that_start_at_different_moments_wake_together(monkeypatch):
-    now = [10**12]
-    monkeypatch.setattr("rigid_proto_ros.ros.pacing.time.monotonic_ns", lambda: now[0])
-    wakes = set()
-    for offset_ns in (0, 1_234_567, 9_999_999):
-        now[0] = 10**12 + offset_ns
-        rig = Rig({"publish_rate": 100.0})
-        for _ in range(5):
-            rig.loop.tick()
-            now[0] = max(now[0] + 1, rig.loop.next_wake_ns())
-        wakes.add(now[0] % TICK_NS)
-    assert wakes <= {0, 1}

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""One body in real time: when it is advanced, publishes and takes commands. All runs on the physics
-thread (physics_thread.py).
+"""One body in real time: when it is advanced, publishes and takes commands. All runs on the physics thread
+(physics_thread.py); where states go and commands come from is up to its endpoints (endpoints.py).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from ..base.errors import InputError
-from ..motion.state import State
 from ..scene.scenario import Scenario, nanoseconds
 from ..scene.scenario_run import ScenarioRun
-from ..simulation.observer import Observer
+from ..simulation.observer import Observer, listens
 from ..simulation.setup import Setup
+from .command_receiver import CommandReceiver
+from .endpoints import Endpoints
 from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Stamps, Timekeeping, WorkBudget, publications_until
 
 ACTIVE_DRAIN_NS = 500_000
@@ -34,39 +35,31 @@ LOCKSTEP_NS = 100_000
 FOLLOW_NS = 1_000_000
 """A followed clock is read this often [ns of wall time]."""
 
+STEP_PATIENCE_S = 10.0
+"""How long a request to step waits for the end of it."""
+
 
 class SimulationLoop(ScenarioRun):
-    """publish(state) is called for every publication; take_commands(wall_ns, all_topics) at every tick, to submit what
-    has arrived, on quiet topics too if ``all_topics``; it says whether commands come in these seconds. Who offers steps
-    sets serve_steps(wall_ns): it answers requests for them, and says whether more are to be expected soon.
-
-    anybody_listens() says whether publications reach a subscriber, is_viewed() whether a recording or viewer takes the
-    states. For these alone states are made in bundles, whenever commands are taken; for nobody none is made, and the
-    body crosses the time between two such moments at once. on_failure(message) is called when the motion stopped in its
-    last good state. Stamps are those of a clock that is followed from the start, a reset and the end of a pause on.
+    """observer: gets every publication, in bundles where nobody subscribes to the endpoints; without subscribers and an
+    observer that takes states none is made, and the body crosses the time between two moments at which commands are
+    taken at once. stamps: those of a clock that is followed from the start, a reset and the end of a pause on.
+    frames: what commands may call the world's and the body's frame.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        observer: Observer,
-        publish: Callable[[State], None],
-        take_commands: Callable[[int, bool], bool],
-        on_failure: Callable[[str], None],
+        observer: Observer | None = None,
+        endpoints: Endpoints | None = None,
         stamps: Stamps | None = None,
-        anybody_listens: Callable[[], bool] = lambda: True,
-        is_viewed: Callable[[], bool] = lambda: False,
+        frames: tuple[str, str] = ("world", "body"),
     ) -> None:
         super().__init__(scenario, observer)
         self.timekeeping = Timekeeping(paused=scenario.parameters.start_paused)
         self.stamps = stamps or Stamps()
-        self._publish = publish
-        self._take_commands = take_commands
-        self.serve_steps: Callable[[int], bool] = lambda _: False
-        self._on_failure = on_failure
-        self._anybody_listens = anybody_listens
+        self.endpoints = endpoints or Endpoints()
+        self.commands = CommandReceiver(self, frames)
         self._has_subscribers = self._has_listeners = True
-        self._is_viewed = is_viewed
         self._budget = WorkBudget()
         self._publications = Publications(scenario.parameters.publish_rate)
         self._pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
@@ -131,6 +124,10 @@ class SimulationLoop(ScenarioRun):
         """Take all commands that have arrived."""
         self._take_commands(time.monotonic_ns(), True)
 
+    def _take_commands(self, wall_ns: int, all_topics: bool) -> bool:
+        self.commands.submit_finished()
+        return self.endpoints.take_commands(wall_ns, all_topics)
+
     def catch_up(self) -> None:
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
         Without commands nobody needs it.
@@ -166,6 +163,25 @@ class SimulationLoop(ScenarioRun):
         )
         return last - reached if last > reached else parameters.step_periods
 
+    def steps(self, periods: int) -> Iterator[None]:
+        """While paused, advance over so many publications; yields while the thread's ticks make them.
+
+        Raises InputError when that takes longer than STEP_PATIENCE_S; the step goes on by itself then.
+        """
+        end = time.monotonic() + STEP_PATIENCE_S
+        begun = False
+        # One after another: a step that somebody else has begun is made first.
+        while self.stepping or not begun:
+            if time.monotonic() > end:
+                reached_s = self.simulation.time_ns / 1e9
+                text = f"{reached_s:.9g} s reached after {STEP_PATIENCE_S:g} s of computing; the step continues"
+                raise InputError("step", text)
+            if not self.stepping:
+                begun = True
+                if self.step(periods):
+                    return
+            yield
+
     def _end_steps(self) -> None:
         self._steps_left = self._steps_requested = 0
 
@@ -185,7 +201,7 @@ class SimulationLoop(ScenarioRun):
         self.simulation.reset(self.scenario.setup)
         if self.ghost is not None:
             self.ghost.reset(self.scenario)
-        elif self._is_viewed():
+        elif self._is_observed:
             self.begin_ghost()
         self._publications.restart()
         self._end_steps()
@@ -195,7 +211,7 @@ class SimulationLoop(ScenarioRun):
 
     def start(self) -> None:
         """Simulated time begins now."""
-        if self._is_viewed():
+        if self._is_observed:
             self.begin_ghost()
         self._anchor()
 
@@ -223,7 +239,7 @@ class SimulationLoop(ScenarioRun):
             self._check_listeners()
         if wall_ns >= self._next_refused_steps_ns:
             self._next_refused_steps_ns = wall_ns + REFUSED_STEPS_NS
-            self.serve_steps(wall_ns)
+            self.endpoints.serve_steps(wall_ns)
         present_ns = self._simulated_present_ns()
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
@@ -251,9 +267,13 @@ class SimulationLoop(ScenarioRun):
             self.timekeeping.paused = True
             self._on_end()
 
+    @property
+    def _is_observed(self) -> bool:
+        return listens(self.observer, "state")
+
     def _check_listeners(self) -> None:
-        self._has_subscribers = self._anybody_listens()
-        self._has_listeners = self._has_subscribers or self._is_viewed()
+        self._has_subscribers = self.endpoints.has_subscribers()
+        self._has_listeners = self._has_subscribers or self._is_observed
 
     def _step_on(self) -> None:
         while self._steps_left and self._publish_next():
@@ -273,11 +293,11 @@ class SimulationLoop(ScenarioRun):
         if self._steps_requested and not self.stepping:
             self._steps_requested -= 1
             self.step(self.periods_of_a_step)
-        self._steps_expected = self.serve_steps(now_ns)
+        self._steps_expected = self.endpoints.serve_steps(now_ns)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._check_listeners()
-            self._publish(self.simulation.state)
+            self.endpoints.publish(self.simulation.state)
 
     def _publish_next(self) -> bool:
         """Advance to the next publication and make it; False when the tick's time is over before, or the
@@ -295,7 +315,7 @@ class SimulationLoop(ScenarioRun):
         self.simulation.notify_status()
         if self.ghost is not None:
             self.ghost.advance(state.time_ns)
-        self._publish(state)
+        self.endpoints.publish(state)
         return True
 
     def _stop_at_the_last_stamp(self) -> None:
@@ -310,7 +330,7 @@ class SimulationLoop(ScenarioRun):
             return False
         if not self.timekeeping.paused:
             self.timekeeping.paused = True
-            self._on_failure(self.simulation.failure)
+            self.endpoints.failed(f"paused in the last good state: {self.simulation.failure}")
         return True
 
     # Time

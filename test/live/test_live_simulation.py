@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""A body in real time without ROS: commands, time, parameters, observers and a recording from any thread."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from rigid_proto_ros.base.errors import CommandRefused, InputError
+from rigid_proto_ros.live.diagnostics import report
+from rigid_proto_ros.live.live_simulation import LiveSimulation
+from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.scene.command_codec import ScriptCommand
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.observer import Observer
+
+PERIOD_NS = 10_000_000
+
+
+class Watcher(Observer):
+    """Keeps the times of states and the lines of events."""
+
+    def __init__(self) -> None:
+        self.times: list[int] = []
+        self.lines: list[str] = []
+
+    def state(self, time_ns: int, row: np.ndarray) -> None:
+        self.times.append(time_ns)
+
+    def event(self, time_ns: int, line: str) -> None:
+        self.lines.append(line)
+
+
+@pytest.fixture
+def watcher():
+    return Watcher()
+
+
+@pytest.fixture
+def live(watcher):
+    """A body at rest, paused, with a contact."""
+    scenario = make_scenario({"mesh": "t_handle", "start_paused": True, "contacts.tip": [0.0, 0.0, 0.07]})
+    live = LiveSimulation(scenario, observers=[watcher])
+    live.announce()
+    warm_up(scenario.setup)
+    live.start()
+    yield live
+    live.stop()
+
+
+def test_it_flies_where_rclpy_cannot_be_imported():
+    code = """
+import sys
+for name in ("rclpy", "std_msgs", "geometry_msgs", "rerun", "viser"):
+    sys.modules[name] = None
+import time
+from rigid_proto_ros.live.live_simulation import LiveSimulation
+from rigid_proto_ros.scene.scenario import make_scenario
+live = LiveSimulation(make_scenario({"mesh": "t_handle"}))
+live.announce()
+live.start()
+live.schedule("{t: 0, impulse: [0.01, 0, 0]}")
+while live.state.time_ns < 100_000_000:
+    time.sleep(0.01)
+live.stop()
+print(live.state.linear_velocity[0] > 0.0)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
+    assert done.stdout == "True\n", done.stderr
+
+
+def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
+    mass = live.scenario.setup.body.mass
+    live.submit(ScriptCommand(0, "poke", "world;impulse", (mass, 0.0, 0.0)))
+    live.schedule(f"[{{t: 0, impulse: [0, {mass!r}, 0]}}, {{t: 0, set: {{gravity: [0, 0, -1]}}}}]")
+    live.step(10)
+    assert live.state.time_ns == 10 * PERIOD_NS
+    assert live.state.linear_velocity == pytest.approx([1.0, 1.0, -0.1], abs=1e-12)
+    with pytest.raises(CommandRefused, match="nowhere"):
+        live.submit(ScriptCommand(0, "wrench", "world@nowhere", (1.0, 0.0, 0.0)))
+    with pytest.raises(CommandRefused, match="t"):
+        live.schedule("[{t: -1, force: [1, 0, 0]}]")
+    said = report(live)
+    assert (said["poke_received"], said["wrench_received"], said["schedule_received"]) == (1, 1, 3)
+    assert (said["refused_frame"], said["refused_schedule"], said["refused_total"]) == (1, 1, 2)
+
+
+def test_time_runs_pauses_steps_and_starts_anew(live, watcher):
+    live.step(3)
+    assert live.state.time_ns == 3 * PERIOD_NS and live.paused
+    live.pause(False)
+    with pytest.raises(InputError, match="pause it first"):
+        live.step()
+    while live.state.time_ns < 10 * PERIOD_NS:
+        time.sleep(0.01)
+    live.pause(True)
+    reached_ns = live.state.time_ns
+    time.sleep(0.05)
+    assert live.state.time_ns == reached_ns
+    live.reset()
+    assert live.state.time_ns == 0
+    assert watcher.times[:10] == [k * PERIOD_NS for k in range(1, 11)]
+
+
+def test_parameters_change_together_or_not_at_all(live):
+    live.set_parameters({"density": 2000.0, "gravity": [0.0, 0.0, -2.0]})
+    live.step()
+    assert live.call(lambda: live.loop.simulation.setup.gravity[2]) == -2.0
+    with pytest.raises(InputError, match="inertia_model"):
+        live.set_parameters({"gravity": [0.0, 0.0, -3.0], "inertia_model": "none"})
+    assert live.scenario.parameters.gravity == (0.0, 0.0, -2.0)
+    assert live.scenario.parameters.density == 2000.0
+
+
+def test_an_observer_that_comes_in_flight_is_told_and_one_that_leaves_is_not(live, watcher):
+    live.step(2)
+    guest = Watcher()
+    live.add_observer(guest)
+    live.step(2)
+    live.remove_observer(guest)
+    live.step(2)
+    assert [t // PERIOD_NS for t in watcher.times] == [1, 2, 3, 4, 5, 6]
+    assert [t // PERIOD_NS for t in guest.times] == [3, 4]
+
+
+def test_a_recording_begins_and_ends_in_flight(live, tmp_path):
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+
+    path = tmp_path / "flight.mcap"
+    live.step(2)
+    live.set_parameters({"record": str(path)})
+    live.step(3)
+    live.set_parameters({"record": ""})
+    live.step(2)
+    (run,) = read_runs(path)
+    assert (np.asarray(run.times) // PERIOD_NS).tolist() == [3, 4, 5]
