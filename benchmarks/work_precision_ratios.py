@@ -132,7 +132,7 @@ def _strings(rows) -> list[str]:
 def _string_targets(rows) -> list[str]:
     """What bounds the strings over all frequencies at steps of 1 ms: ours that take any of them."""
     lines = []
-    for name in ("discrete_gradient", "auto"):
+    for name in ("auto",):
         mine = [
             r for r in rows if r["tool"] == WHOLE and r["integrator"] == name and str(r["problem"]).startswith("P3")
         ]

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Compile what the first flight needs, kept beside the source: ``compile_kernels.py integrators``, or ``flight``.
 
-The two share few kernels and take about as long, so that they run side by side. Radau and the discrete gradient, for stiff
-strings and damping, are compiled by the first flight that needs them.
+The two share few kernels and take about as long, so that they run side by side.
 """
 
 import sys

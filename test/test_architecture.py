@@ -112,7 +112,7 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     listing = listing.replace(
         "from .integrator import Integrator\n", "from .heun import HEUN\nfrom .integrator import Integrator\n"
     )
-    listing = listing.replace("        DISCRETE_GRADIENT,\n", "        DISCRETE_GRADIENT,\n        HEUN,\n")
+    listing = listing.replace("        FREE_BODY_STRANG,\n", "        FREE_BODY_STRANG,\n        HEUN,\n")
     (folder / "__init__.py").write_text(listing, "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False

@@ -43,8 +43,6 @@ ALLOWED = {
     ("base/addresses.py", "np.prod"): FRACTIONS,
     ("motion/surface.py", ".sum"): "of three numbers in compiled code: one after the other",
     ("motion/loads.py", "sum"): "asked only whether it is finite",
-    ("motion/integrators/radau_tableau.py", "sum"): FRACTIONS,
-    ("motion/integrators/radau_tableau.py", "**"): FRACTIONS,
     ("simulation/flight_arrays.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "**"): FRACTIONS,

@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
 
         write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else line)
     if floor := flight.simulation.accuracy_floor:
-        _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held at the end: {floor}")
+        _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held throughout: {floor}")
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1

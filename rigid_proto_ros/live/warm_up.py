@@ -83,9 +83,9 @@ def compile_flight(setup: Setup) -> None:
 
 
 def compile_integrators() -> None:
-    """Compile auto's integrators but for stiff strings and damping, which the first flight with them compiles."""
+    """Compile auto's integrators."""
     table = method_table(auto.AUTO, 0)
-    for kind in (auto.STEADY, auto.FREE, auto.TURNING_LOADS, auto.ANY_LOADS, auto.WEAK_LOADS):
+    for kind in (auto.STEADY, auto.FREE, auto.TURNING_LOADS, auto.ANY_LOADS):
         provide_kernel(auto.AUTO, table, kind)
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.compilation import njit
 from ..base.rotation import Numbers, cross, dot, times, transposed_times, vector
 from .body import Body
 from .state import State
@@ -32,6 +33,16 @@ NO_DIRECTION = 1e-12
 
 ROUNDINGS = 4.0
 """Of position and arm, that a span of zero may come to when it is computed."""
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def most_yielding(mass: float, i1: float, i2: float, i3: float, x: float, y: float, z: float) -> float:
+    """A bound of 1/m_eff [1/kg] over all directions for the knot at x, y, z [m] from the COM, in principal axes with
+    moments i1 ≤ i2 ≤ i3: 1/m and the largest eigenvalue of [r]×ᵀ I⁻¹ [r]×, by its trace or by |r|²/i1.
+    """
+    xx, yy, zz = x * x, y * y, z * z
+    trace = (yy + zz) / i1 + (zz + xx) / i2 + (xx + yy) / i3
+    return 1.0 / mass + min(trace, (xx + yy + zz) / i1)
 
 
 @dataclass(frozen=True)

@@ -149,6 +149,7 @@ def summary(run: OfflineRun, wall_time: float) -> dict:
         "integrator": simulation.setup.integrator.name,
         "steps": simulation.steps,
         "force_evaluations": simulation.force_evaluations,
+        "accuracy_floor": simulation.accuracy_floor,
         "wall_time": wall_time,
         "state_hash": state.sha256(),
     }

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
+from ..base.errors import CommandRefused
+from ..base.rotation import Vector, transposed_times
 from ..motion.integrators import check_supported
+from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.integrator import (
     ANGULAR_DAMPING,
     NO_GYROSCOPIC_TERM,
@@ -14,6 +18,7 @@ from ..motion.integrators.integrator import (
 )
 from ..motion.loads import Load, light_row, resolve_load
 from ..motion.state import State
+from ..motion.string import most_yielding
 from .commands import Command, MoveString, ThrusterCommand, WrenchCommand
 from .setup import Setup
 from .thrusters import check_forces
@@ -70,6 +75,42 @@ def check_in_flight(setup: Setup) -> None:
     if in_flight is not None and in_flight.thrusters:
         loads += [thruster.load(1.0) for thruster in setup.thrusters.values()]
     check_supported(setup.integrator, needs_of(setup, loads, tied))
+    going = in_flight.string.tied if in_flight is not None and in_flight.string is not None else None
+    check_rates(setup, going.attach if going is not None else setup.string.attach if tied else None)
+
+
+def check_rates(setup: Setup, knot: Vector | None) -> None:
+    """Raises CommandRefused (``integrator``) where damping, or a string tied at ``knot`` (mesh coordinates), is faster
+    than an integrator that chooses its own steps can follow.
+    """
+    if not setup.integrator.chooses:
+        return
+    mass, moments = setup.body.mass, setup.body.principal_moments.tolist()
+    _check_rate("linear_damping", setup.linear_damping, "N s/m", setup.linear_damping / mass)
+    _check_rate("angular_damping", setup.angular_damping, "N m s", setup.angular_damping / moments[0])
+    if knot is None:
+        return
+    string = setup.string
+    yields = most_yielding(mass, *moments, *transposed_times(setup.body.principal_axes, setup.body.point(knot)))
+    # No point shows more than the whole mass.
+    stiffness = mass * string.frequency * string.frequency if string.frequency > 0.0 else string.stiffness
+    swing = math.sqrt(stiffness * yields)
+    if string.frequency > 0.0:
+        _check_rate("string.frequency", string.frequency, "rad/s", swing)
+    else:
+        _check_rate("string.stiffness", string.stiffness, "N/m", swing, power=2)
+    damping = 2.0 * string.damping_ratio * math.sqrt(stiffness * mass) * yields
+    _check_rate("string.damping_ratio", string.damping_ratio, "", damping)
+
+
+def _check_rate(parameter: str, value: float, unit: str, rate: float, power: int = 1) -> None:
+    """power: by which the value grows with the rate [1/s or rad/s]."""
+    if rate > FASTEST:
+        most = f"{value * (FASTEST / rate) ** power:.3g} {unit}".rstrip()
+        accepted = (
+            f"at most {most} for this body: auto follows rates up to {FASTEST:g} /s, and this is one of {rate:.3g} /s"
+        )
+        raise CommandRefused("integrator", parameter, value, accepted)
 
 
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:

@@ -307,12 +307,12 @@ class FlightArrays:
     @property
     def steps(self) -> int:
         """Steps committed since time 0."""
-        return int(self.n[fl.STEPS_BEFORE]) + fl.steps_of_segment(self.f, self.n)
+        return int(self.n[fl.STEPS_BEFORE] + fl.steps_of_segment(self.f, self.n))
 
     @property
     def evaluations(self) -> int:
         """Evaluations of the equations of motion in them."""
-        return int(self.n[fl.EVALUATIONS_BEFORE]) + fl.evaluations_of_segment(self.f, self.n, self.methods)
+        return int(self.n[fl.EVALUATIONS_BEFORE] + fl.evaluations_of_segment(self.f, self.n, self.methods))
 
     @property
     def hand_work(self) -> float:
@@ -323,6 +323,13 @@ class FlightArrays:
     def heat(self) -> float:
         """In the string's damper since time 0 [J]."""
         return float(self.f[fl.LOST_BEFORE] + self.f[fl.LOST])
+
+    @property
+    def floors(self) -> list[float]:
+        """What has held the motion to less than its accuracy since time 0, by kind (flight.FLOOR_KINDS)."""
+        floors = self.f[fl.FLOORS : fl.FLOORS + fl.FLOOR_KINDS].copy()
+        fl.note_floors(self.f, self.n, self.methods, floors)
+        return floors.tolist()
 
     @property
     def method(self) -> Method:

@@ -5,12 +5,9 @@ motion has cost.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..base.rotation import Numbers, cross, dot, length, times, transposed_times
-from ..motion.integrators.error_measure import FLOOR
 from ..motion.loads import LoadSum
 from ..motion.state import State
 from ..motion.string import Tied
@@ -25,15 +22,16 @@ from .thrusters import ThrusterControl
 FEWEST_EVALUATIONS = 20_000
 """In a segment, from which on they are checked: the first tiny steps of a transient say nothing about later ones."""
 MOST_EVALUATIONS_A_SECOND = {True: 2e5, False: 5e6}
-"""That the clock leaves time for: for methods that choose their steps, a series or an implicit stage
-each, and for fixed steps.
-"""
+"""That the clock leaves time for: for methods that choose their steps, a series each, and for fixed steps."""
 
-_EPSILON = 2.0**-52
-ROUNDINGS = 2.0
-"""ε|ω|t that the exact free step's attitude may err. Measured in 36 flights at 1e3 to 1e6 rad/s: up to 1.1 where the
-tensor is given in its own axes, and up to 1.0 times I₃/I₁ where it isn't.
-"""
+FLOORS = (
+    "rounding of 32 units in the last place a step, in steps that short, comes to {:.2g} a second",
+    "the string's knot came within nanoseconds of its free end, where no accuracy is kept, {:.0f} times",
+    "rounding of the spin turns the attitude by up to {:.2g} rad a second",
+    "rounding of a slender tensor given in axes other than its own turns the attitude by up to {:.2g} rad a second",
+    "rounding of a position far from the world's origin is {:.2g} of the body's size",
+)
+"""In the order of flight.FLOOR_KINDS."""
 
 
 class Readings:
@@ -86,20 +84,14 @@ class Readings:
         return self._segment.choice
 
     @property
-    def floor_binds(self) -> bool:
-        """Rounding, not the accuracy asked for, limits some step of the present segment."""
-        return self._segment.floor_binds
-
-    @property
     def accuracy_floor(self) -> str:
-        """Why rounding, and not the accuracy asked for, limits the present segment; empty when it doesn't
-        or nothing adapts to it.
+        """Why, since start or reset, rounding and not the accuracy asked for has set what the motion errs; empty where
+        it hasn't, or nothing adapts to the accuracy.
         """
-        setup, segment = self.setup, self._segment
-        if setup.integrator.name not in ("auto", "free_body"):
+        if not self.setup.integrator.chooses and self.setup.integrator.name != "free_body":
             return ""
-        elapsed = (self.state.time_ns - segment.start.time_ns) * 1e-9
-        return why_rounding_binds(setup, self.state, segment.floor_binds, segment.evaluates_once, elapsed)
+        floors = self._arrays.floors
+        return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
 
     @property
     def too_coarse(self) -> str:
@@ -113,7 +105,7 @@ class Readings:
         swing = string.frequency * h if string else 0.0
         if spin > limit:
             return f"{setup.integrator.name}: |w| step = {spin:.3g}, good up to {limit:g}"
-        if swing > limit and not setup.integrator.stiff:
+        if swing > limit:
             return f"{setup.integrator.name}: string frequency times step = {swing:.3g}, good up to {limit:g}"
         return ""
 
@@ -213,33 +205,3 @@ def _going_load(acting: ActingLoad, now_ns: int, thrusters: list[str]) -> GoingL
     held = acting.kind == HELD_WRENCH
     end_ns = NEVER if held else acting.end_ns - now_ns
     return GoingLoad(begin_ns, acting.load, held, acting.slot, end_ns)
-
-
-def why_rounding_binds(setup: Setup, state: State, step_floor: bool, exact_step: bool, elapsed: float) -> str:
-    """Why the motion is held to less than ``setup.accuracy``; empty when it is held to it.
-
-    A state is held in doubles, so three things no method can better: a spin known to ε turns into an attitude known to
-    ε|ω|t, a position far from the world's origin is known to half a unit in its last place, and a slender body's tensor
-    given in axes other than its own holds its smallest moment, and the difference of the others, to ε I₃ alone
-    (diagonalizing it adds no more to that: mass/slender_axes.py).
-
-    step_floor: the stepper's own report. exact_step: the segment is one exact step. elapsed: since the segment's start
-    [s].
-    """
-    accuracy, spin = setup.accuracy, length(state.angular_velocity_body)
-    inertia, moments = setup.body.inertia, setup.body.principal_moments
-    rate = ROUNDINGS * _EPSILON * spin
-    if exact_step and rate > accuracy:
-        return f"rounding of a spin of {spin:.3g} rad/s turns the attitude by up to {rate:.2g} rad a second"
-    if inertia[0, 1] or inertia[0, 2] or inertia[1, 2]:
-        ratio = float(moments[2] / moments[0])
-        if ratio * rate > accuracy:
-            what = f"a tensor whose moments differ {ratio:.3g} times, given in other axes than its own"
-            return f"rounding of {what}, turns the attitude by up to {ratio * rate:.2g} rad a second"
-    farthest = float(abs(state.position).max())
-    place = 0.5 * math.ulp(farthest) / setup.length
-    if place > max(accuracy * elapsed, FLOOR):
-        return f"rounding of a position {farthest:.3g} m from the world's origin is {place:.2g} of the body's size"
-    if step_floor:
-        return "rounding sets what a step may err, 32 units in the last place: steps are too short for the accuracy"
-    return ""

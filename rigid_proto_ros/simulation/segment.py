@@ -14,8 +14,7 @@ from ..base.rotation import length
 from ..motion.integrators import control as ctl
 from ..motion.integrators.auto import fastest_swing
 from ..motion.integrators.equations import stretch
-from ..motion.integrators.integrator import FIXED_STEPS, NOTHING, ONE_STEP
-from ..motion.integrators.stiffness import implicit_effort
+from ..motion.integrators.integrator import FIXED_STEPS
 from ..motion.problem import SIZE
 from ..motion.state import State
 from ..motion.variables import STORED
@@ -74,20 +73,12 @@ class Segment:
         """Evaluations of the equations of motion in them."""
         return int(fl.evaluations_of_segment(self._arrays.f, self._arrays.n, self._arrays.methods))
 
-    @property
-    def evaluates_once(self) -> bool:
-        """Whether the segment is one exact step, however long, of a body that turns."""
-        method = self._arrays.method
-        return method.way in (NOTHING, ONE_STEP) and not method.sleeps
-
     def expected_effort(self, now: State) -> tuple[float, float]:
         """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
         method = self._arrays.method
         if method.way == FIXED_STEPS:
             steps = 1e9 / int(self._arrays.n[fl.STEP_NS])
             return steps, steps * method.evaluations
-        if method.implicit:
-            return implicit_effort(self.problem, self.sampled, True)
         if method.radians == 0.0:
             return 0.0, 0.0
         fastest = length(now.angular_velocity_body)
@@ -104,4 +95,4 @@ class Segment:
     @property
     def floor_binds(self) -> bool:
         """Some step's error allowance was set by rounding and not by the accuracy asked for."""
-        return self._arrays.method.floor_binds or bool(self._arrays.f[fl.CONTROL + ctl.FLOOR_BINDS])
+        return bool(self._arrays.f[fl.CONTROL + ctl.FLOOR_RATE])

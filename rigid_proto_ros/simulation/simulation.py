@@ -22,7 +22,7 @@ from ..motion.integrators.integrator import MAX_SPEED, STRING
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
 from . import flight as fl
-from .checks import check_command, check_in_flight, check_load_supported, check_thrust, load_row, needs_of
+from .checks import check_command, check_in_flight, check_load_supported, check_rates, check_thrust, load_row, needs_of
 from .commands import (
     Change,
     ClearWrench,
@@ -153,6 +153,8 @@ class Simulation(Readings):
         # A string that is to be tied at time 0 will be, at the next reset, though it was let go since.
         tied = new.string.attached or (self.string is not None and not self.setup.string.attached)
         check_supported(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
+        knot = new.string.attach if new.string.attach != self.setup.string.attach else self._string.attach
+        check_rates(new, knot if tied else None)
 
     def reset(self, setup: Setup | None = None) -> None:
         """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters

@@ -13,6 +13,7 @@ from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State
 from ..motion.string import Tied, tie
+from .checks import check_rates
 from .commands import MoveString, TieString
 from .in_flight import GoingString, body_hash
 from .setup import Setup
@@ -75,6 +76,7 @@ class StringControl:
         """Take the knot to a point of the body; a string that is tied stays so, its k and c computed anew."""
         attach = _attach(command, setup, state)
         if self.tied is not None:
+            check_rates(setup, attach)
             self.tied = _checked(
                 replace(self.tied, attach=attach).with_spring(setup.string, setup.body, state), setup.body, state
             )
@@ -84,6 +86,7 @@ class StringControl:
         """Take the free end to a new target, tying the string if it wasn't; raises CommandRefused."""
         timeout_ns = setup.string.timeout_ns
         if self.tied is None:
+            check_rates(setup, self.attach)
             tied = tie(setup.string, self.attach, command.target, setup.body, state, timeout_ns)
         else:
             tied = self.tied.moved(command.target, state.time_ns, timeout_ns)

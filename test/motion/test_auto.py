@@ -40,7 +40,6 @@ def auto(initial=AT_REST, **changes):
         (auto(spinning((1, 2, 3)), angular_damping=0.3), "taylor"),
         (auto(string=STRING), "taylor"),
         (auto(string=StringSettings(attached=True, target=(0.0, 0.0, 0.5), rest_length=1.0)), "sleeping"),
-        (auto(spinning((1, 2, 3)), string=StringSettings(True, stiffness=1e15)), "discrete_gradient"),
     ],
 )
 def test_the_method_is_the_cheapest_that_fits_the_segment(simulation, method):

@@ -12,7 +12,6 @@ from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import STRING
 from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import StringSettings, tie
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
 BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag(MOMENTS))
@@ -86,41 +85,5 @@ def test_attitude_stays_a_rotation_for_a_million_steps(name, blocks):
     assert worst <= 4e-15  # measured 1.1e-15
 
 
-def pendulum(stiffness, h):
-    """A heavy body on a pull-only string without damping, stepped by discrete_gradient; the largest energy error."""
-    settings = StringSettings(
-        attached=True, attach=(0.2, 0.1, 0.4), stiffness=stiffness, damping_ratio=0.0, rest_length=1.0
-    )
-    row = np.array([0.3, 0.1, -1.2, 0.0, 0.0, 0.0, 1.0, 0.2, 0.5, 0.0, 0.3, -0.4, 0.8])
-    state, gravity = State(0, row), np.array((0.0, 0.0, -9.81))
-    string = tie(settings, settings.attach, settings.target, BODY, state, 0)
-    problem = make_problem(BODY, LoadSum(), gravity, 0.0, 0.0, True, state, string)
-    return problem, new_variables(row, problem), string, gravity
-
-
-def total_energy(y, string, gravity):
-    q, w = y[0:4], y[4:7]
-    position = np.array((0.3, 0.1, -1.2)) + y[7:10]
-    knot = position + matrix_from_quaternion(q) @ np.array((0.2, 0.1, 0.4))
-    stretch = max(0.0, float(np.linalg.norm(knot)) - string.rest_length)
-    kinetic = 0.5 * float(y[10:13] @ y[10:13]) + 0.5 * float((MOMENTS * w) @ w)
-    return kinetic, kinetic - float(gravity @ position) + 0.5 * string.stiffness * stretch**2
-
-
-@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
-def test_discrete_gradient_keeps_energy_through_slack_and_taut_at_any_stiffness(stiffness):
-    h = 1e-3
-    problem, y, string, gravity = pendulum(stiffness, h)
-    kernel = INTEGRATORS["discrete_gradient"].kernel
-    _, start = total_energy(y, string, gravity)
-    largest, worst = 0.0, 0.0
-    for _ in range(1000):
-        assert kernel(y, problem, h, 10) == 10
-        kinetic, energy = total_energy(y, string, gravity)
-        largest, worst = max(largest, kinetic), max(worst, abs(energy - start))
-    # ω_s h from 0.01 to 1000; one rounding of the knot's place, in the energy as measured here, weighs √(2 k E) ε.
-    assert worst <= 1e-9 * largest
-
-
 def test_every_integrator_that_carries_a_string_says_so():
-    assert {n for n, i in INTEGRATORS.items() if STRING in i.supports} >= {"rk4", "rkmk4", "dop853", "auto"}
+    assert {n for n, i in INTEGRATORS.items() if STRING in i.supports} >= {"rk4", "dop853", "auto"}

@@ -86,7 +86,7 @@ def test_a_command_yet_to_come_changes_nothing_before_it():
 
 @pytest.mark.parametrize("threads", ["1", "2"])
 def test_another_process_with_one_or_two_threads_gives_the_same_bits(threads):
-    names = ("auto", "rk4", "discrete_gradient")
+    names = ("auto", "rk4", "dop853")
     code = f"from test_integrator_portions import flown\nfor n in {names}: print(flown(n, 1, ()).state.sha256())"
     settings = {"NUMBA_NUM_THREADS": threads, "OMP_NUM_THREADS": threads, "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(

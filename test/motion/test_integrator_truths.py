@@ -22,7 +22,6 @@ def box_tensor(mass, half):
     ("name", "bound"),
     [
         ("rk4", 4e-10),  # measured 1.7e-10
-        ("rkmk4", 4e-10),  # measured 1.7e-10
         ("dop853", 1e-13),
         ("taylor", 1e-13),
         ("lie_midpoint", 1e-13),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A body on a string of any stiffness, from one that a step resolves to one that swings many times within it."""
+"""A body on a string of any stiffness that auto resolves keeps its energy and comes to where it belongs."""
 
 import numpy as np
 import pytest
@@ -52,14 +52,6 @@ def energy_error(problem, integrator, duration_s, every_s):
     return worst / largest
 
 
-@pytest.mark.parametrize("frequency", FREQUENCIES)
-@pytest.mark.parametrize("bilateral", [True, False], ids=["bilateral", "pull-only"])
-def test_a_string_of_any_stiffness_keeps_the_energy(bilateral, frequency):
-    problem = problems.string_problem(frequency, 0.0, bilateral, 10.0)
-    # Measured 4e-14 at most.
-    assert energy_error(problem, "discrete_gradient", 10.0, 0.0125) <= 1e-12
-
-
 @pytest.mark.parametrize("frequency", [10.0, 1e3])
 @pytest.mark.parametrize("bilateral", [True, False], ids=["bilateral", "pull-only"])
 def test_auto_keeps_the_energy_on_a_string(bilateral, frequency):
@@ -77,13 +69,12 @@ def test_auto_keeps_the_energy_on_a_string_of_any_stiffness(bilateral, frequency
 
 
 @pytest.mark.stress
-@pytest.mark.parametrize("integrator", ["discrete_gradient", "auto"])
 @pytest.mark.parametrize("frequency", FREQUENCIES)
 @pytest.mark.parametrize("bilateral", [True, False], ids=["bilateral", "pull-only"])
-def test_a_damped_string_leaves_the_body_where_it_belongs(bilateral, frequency, integrator):
+def test_a_damped_string_leaves_the_body_where_it_belongs(bilateral, frequency):
     """ζ = 0.1, attitude after 1 s against the reference."""
     problem = problems.string_problem(frequency, 0.1, bilateral, 1.0)
-    simulation = hung(problem, integrator)
+    simulation = hung(problem, "auto")
     state = simulation.advance(SECOND)
     exact = reference_row(problem)
     assert angle_between(state.orientation_xyzw, rotation_of(exact[3:7])) <= 5e-3

@@ -3,14 +3,13 @@
 
 import numpy as np
 import pytest
-from flights import SECOND, flight, spinning
+from flights import flight, spinning
 from numba import njit
 
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.problem import MOMENTS
-from rigid_proto_ros.motion.string import StringSettings
 
 STEPS = 1_000_000
 STRESS_STEPS = 100_000_000
@@ -79,38 +78,3 @@ def test_attitudes_stay_rotations_for_a_million_steps(name):
         assert kernel(y, segment.problem, 1e-3, STEPS // 100) == STEPS // 100
         # |RᵀR − 1| of the matrix of q is at most twice this.
         assert abs((y[:4] ** 2).sum() - 1.0) <= 2e-15
-
-
-def check_pendulum(steps):
-    """A stiff string pendulum without damping, 1 ms steps: the energy of the start, through slack and taut."""
-    arm = (0.1, 0.05, 0.2)
-    string = StringSettings(
-        attached=True, attach=arm, target=(0.0, 0.0, 0.0), frequency=200.0, damping_ratio=0.0, rest_length=1.0
-    )
-    row = spinning((0.4, 1.1, -0.3))
-    row[0:3], row[7:10] = (-0.9, -0.05, -0.3), (0.2, 0.8, 0.1)
-    simulation = flight(
-        make_body(1.3, np.zeros(3), 0.01 * TENSOR),
-        integrator="discrete_gradient",
-        initial=row,
-        gravity=np.array([0.0, 0.0, -9.81]),
-        string=string,
-    )
-    start, kinetic, drift = simulation.kinetic_energy + simulation.potential_energy, simulation.kinetic_energy, 0.0
-    for k in range(1, 201):
-        simulation.advance(k * steps // 200 * SECOND // 1000)
-        assert not simulation.failure
-        kinetic = max(kinetic, simulation.kinetic_energy)
-        drift = max(drift, abs(simulation.kinetic_energy + simulation.potential_energy - start))
-    print(f"pendulum: energy within {drift / kinetic:.1e} of the largest kinetic over {steps:.0e} steps")
-    assert simulation.steps == steps
-    assert drift <= 1e-9 * kinetic
-
-
-def test_string_pendulum_keeps_its_energy_for_a_million_steps():
-    check_pendulum(STEPS)
-
-
-@pytest.mark.stress
-def test_string_pendulum_keeps_its_energy_for_a_hundred_million_steps():
-    check_pendulum(STRESS_STEPS)

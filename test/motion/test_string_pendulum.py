@@ -14,7 +14,7 @@ from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.simulation.commands import MoveString, TieString
 
-ACCURATE = [name for name in ("rk4", "dop853", "discrete_gradient", "auto") if name in INTEGRATORS]
+ACCURATE = [name for name in ("rk4", "dop853", "auto") if name in INTEGRATORS]
 G = 9.81
 MASS, INERTIA_Y, ARM, LENGTH = 1.3, 0.012, 0.15, 0.8
 

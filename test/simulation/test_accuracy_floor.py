@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Where rounding limits a motion and not the accuracy asked for, that is said; and only there."""
 
+import json
+
 import numpy as np
 import pytest
 from flights import SECOND, flight, spinning
 from random_scenes import random_turn
 from reference_motion import angle_between, free_motion
 
+from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.simulation.commands import ReleaseString
 
 BOX = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
 
@@ -51,6 +56,26 @@ def test_a_position_far_from_the_origin_is_known_to_its_last_place():
     near = flight(BOX, integrator="auto", initial=row)
     near.advance(SECOND)
     assert near.accuracy_floor == ""
+
+
+def test_a_floor_that_has_bound_is_told_until_the_reset_whatever_follows():
+    string = StringSettings(True, (0.1, 0.15, 0.2), (0.0, 0.0, 2.0), 0.0, 1e5, 0.0, 1.0, True)
+    simulation = flight(BOX, integrator="auto", accuracy=1e-13, initial=spinning((1, 2, 3)), string=string)
+    assert simulation.accuracy_floor == ""
+    simulation.submit(ReleaseString(), SECOND // 100)
+    simulation.advance(SECOND)
+    assert simulation.string is None
+    assert "32 units" in simulation.accuracy_floor
+    simulation.reset()
+    assert simulation.accuracy_floor == ""
+
+
+def test_simulate_tells_of_a_floor_in_its_json(capsys):
+    fast = ["--set", "initial.angular_velocity=[60000, 70000, -30000]", "--set", "accuracy=1e-12"]
+    for changes, words in (([], ""), (fast, "rounding of the spin")):
+        assert main(["simulate", "t_handle", "--duration", "0.01", "--json", *changes]) == 0
+        told = json.loads(capsys.readouterr().out)["accuracy_floor"]
+        assert words in told and bool(told) == bool(words)
 
 
 def test_fixed_steps_promise_no_accuracy_and_report_no_floor():

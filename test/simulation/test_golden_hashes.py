@@ -75,7 +75,7 @@ BY_AUTO = {
     "jitter": ({}, JITTER),
     "pokes and string": ({}, POKES + STRING),
     "damping": ({"linear_damping": 0.3, "angular_damping": 1e-4}, POKES),
-    "stiff damping": ({"linear_damping": 1e5, "angular_damping": 10.0}, POKES),
+    "fast damping": ({"linear_damping": 1e4, "angular_damping": 1.0}, POKES),
     "fast spin under a weak load": ({"initial.angular_velocity": [300.0, 20.0, 5.0]}, BODY_WRENCH),
     "without the gyroscopic term": ({"gyroscopic": False}, POKES),
     "rope": ({**ROPE, "string.rest_length": 0.3, "gravity": [0.0, 0.0, -9.81]}, IMPULSES),

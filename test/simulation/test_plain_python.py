@@ -71,6 +71,12 @@ def test_every_integrator_and_method_of_auto_flies_alike_in_plain_python() -> No
         assert plain[name] == pytest.approx(row, rel=1e-11, abs=1e-11), name
 
 
+def test_simulate_prints_its_json_in_plain_python() -> None:
+    code = "from rigid_proto_ros.cli.main import main; main()"
+    told = in_plain_python("-c", code, "simulate", "t_handle", "--duration", "0.02", "--json")
+    assert json.loads(told)["time_ns"] == 20_000_000
+
+
 def test_a_selection_of_tests_passes_in_plain_python() -> None:
     said = in_plain_python("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *SELECTION)
     assert " passed" in said

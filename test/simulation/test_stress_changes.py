@@ -14,7 +14,7 @@ from rigid_proto_ros.simulation.commands import Change
 
 TENSOR = np.array([[1.3, 0.2, -0.1], [0.2, 2.0, 0.3], [-0.1, 0.3, 2.9]])
 STEP_NS = 1_000_000
-POKED = ("rk4", "rkmk4", "dop853", "free_body_strang", "free_body_4", "lie_midpoint", "discrete_gradient", "auto")
+POKED = ("rk4", "dop853", "free_body_strang", "lie_midpoint", "auto")
 PHASES = 12
 STRESS_PHASES = 1500
 SCENES = 6
@@ -113,7 +113,7 @@ def check_changes(seeds, name):
         assert parts.refused == whole.refused
 
 
-@pytest.mark.parametrize("name", ["rk4", "auto", "dop853", "discrete_gradient"])
+@pytest.mark.parametrize("name", ["rk4", "auto", "dop853"])
 def test_changes_in_flight_do_not_depend_on_portions(name):
     check_changes(range(SCENES), name)
 

@@ -13,17 +13,14 @@ from __future__ import annotations
 
 from ...base.errors import CommandRefused, InputError
 from .auto import AUTO
-from .discrete_gradient import DISCRETE_GRADIENT
 from .dop853 import DOP853
 from .euler import EULER
 from .free_body import FREE_BODY
-from .free_body_4 import FREE_BODY_4
 from .free_body_strang import FREE_BODY_STRANG
 from .integrator import Integrator
 from .lie_midpoint import LIE_MIDPOINT
 from .midpoint import MIDPOINT
 from .rk4 import RK4
-from .rkmk4 import RKMK4
 from .semi_implicit_euler import SEMI_IMPLICIT_EULER
 from .taylor import TAYLOR
 
@@ -35,14 +32,11 @@ INTEGRATORS: dict[str, Integrator] = {
         MIDPOINT,
         SEMI_IMPLICIT_EULER,
         RK4,
-        RKMK4,
         LIE_MIDPOINT,
         DOP853,
         TAYLOR,
         FREE_BODY,
         FREE_BODY_STRANG,
-        FREE_BODY_4,
-        DISCRETE_GRADIENT,
     )
 }
 

@@ -8,12 +8,10 @@
 | spin, no torque, no force that turns along | one exact step, however long |
 | a body-axes wrench, damping | Taylor series of the spin and what it carries along |
 | loads that depend on the attitude, a string | Taylor series of the whole motion |
-| loads weak against the spin: they show after many turns | free_body_strang, steps as long as the accuracy allows |
-| damping that dies out long before anything else moves | Radau IIA, implicit, steps as long as the accuracy allows |
-| a string too stiff to resolve | discrete_gradient at the fixed step, accuracy not met and said so |
 
 Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's
-problem and start and of the accuracy; steps are functions of what they start from.
+problem and start; steps are functions of what they start from. Strings and damping faster than FASTEST are refused
+(simulation/checks.py): steps of about 1.5/FASTEST would be slower than the clock.
 """
 
 from __future__ import annotations
@@ -26,15 +24,14 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
 from .. import problem as of
+from ..string import most_yielding
 from ..variables import damping_functions
-from . import series_steps, splitting_steps, stiff_steps, taylor_adaptive
-from .discrete_gradient import DISCRETE_GRADIENT
+from . import series_steps, taylor_adaptive
 from .equations import stretch
 from .free_body import free_body_steps
 from .integrator import (
     ADAPTIVE,
     ANGULAR_DAMPING,
-    FIXED_STEPS,
     LOADS,
     NO_GYROSCOPIC_TERM,
     NOTHING,
@@ -45,12 +42,12 @@ from .integrator import (
 )
 from .runge_kutta import is_good
 from .series_steps import degree_of_motion
-from .stiffness import damping_is_stiff
 from .taylor_adaptive import degree_for
 
-FASTEST_STRING = 1e6
-"""rad/s; above it resolving the string's swing would take millions of steps a second."""
-
+FASTEST = 5e5
+"""rad/s of a string's swing, and 1/s of damping, that a core can follow in real time: 3.3e5 steps a second, each 2 to 3
+µs.
+"""
 
 RADIANS_A_STEP = 1.5
 """That a step of a series covers: measured 1 to 3.5 from accuracy 1e-12 to 1e-3."""
@@ -76,8 +73,7 @@ def steady_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
     return n
 
 
-ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, WEAK_LOADS = range(7)
-SLACK_AT_REST, ON_STRING, ON_STIFF_STRING, STIFF = range(7, 11)
+ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRING = range(8)
 """Kinds of segments, as the table above has them; each is one of auto's methods."""
 
 
@@ -89,11 +85,10 @@ def _vector(p: np.ndarray, at: int) -> bool:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def fastest_swing(p: np.ndarray) -> float:
-    """The fastest that the string can swing the body [rad/s]: the knot is lightest where the whole arm counts against
-    the smallest moment.
-    """
-    x, y, z = p[of.ATTACH], p[of.ATTACH + 1], p[of.ATTACH + 2]
-    return math.sqrt(p[of.STIFFNESS] * (1.0 / p[of.MASS] + (x * x + y * y + z * z) / p[of.MOMENTS]))
+    """The fastest that the string can swing the body [rad/s], whatever its direction."""
+    A, I = of.ATTACH, of.MOMENTS
+    yields = most_yielding(p[of.MASS], p[I], p[I + 1], p[I + 2], p[A], p[A + 1], p[A + 2])
+    return math.sqrt(p[of.STIFFNESS] * yields)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -102,21 +97,17 @@ def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
     accelerated = _vector(p, of.ACCELERATION_ADDED) or _vector(p, of.ACCELERATION_BODY)
     if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, of.HAND_VELOCITY)):
         return SLACK_AT_REST
-    if damping_is_stiff(p, y, True):
-        return STIFF
-    return ON_STIFF_STRING if fastest_swing(p) > FASTEST_STRING else ON_STRING
+    return ON_STRING
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def kind_of_segment(p: np.ndarray, y: np.ndarray, accuracy: float) -> int:
-    """Which of the kinds a segment with problem p from variables y on is, at this accuracy."""
+def kind_of_segment(p: np.ndarray, y: np.ndarray) -> int:
+    """Which of the kinds a segment with problem p from variables y on is."""
     spins = _vector(y, 4)
     turned = _vector(p, of.TORQUE_BODY) or p[of.HAS_WORLD_TORQUE] != 0.0 or (spins and p[of.DAMPING_ANGULAR] != 0.0)
     translates = p[of.TRANSLATES] != 0.0
     if p[of.HAS_STRING] != 0.0:
         return _kind_on_string(p, y)
-    if damping_is_stiff(p, y, False):
-        return STIFF
     if not turned:
         if not spins and not translates:
             moves = _vector(p, of.REFERENCE_VELOCITY) or _vector(p, of.REFERENCE_ACCELERATION)
@@ -125,8 +116,6 @@ def kind_of_segment(p: np.ndarray, y: np.ndarray, accuracy: float) -> int:
             return STEADY
         if not translates:
             return FREE
-    if spins and splitting_steps.splitting_pays(p, y, accuracy):
-        return WEAK_LOADS
     return ANY_LOADS if p[of.HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
 
 
@@ -143,14 +132,8 @@ def _series(why: str, degree: Callable[[int], int] = int) -> Callable[..., str]:
     return choice
 
 
-def _stiff(p: np.ndarray, _step_s: float, _accuracy: float) -> str:
-    fastest = fastest_swing(p)
-    return f"auto: discrete_gradient at the fixed step, accuracy not met: a string of {fastest:.3g} rad/s"
-
-
 def _methods(_integrator: Integrator) -> tuple[Method, ...]:
     """A method for each kind of segment."""
-    gradient = DISCRETE_GRADIENT
     series = (series_steps.steps, series_steps.workspace)
     by_kind = {
         ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
@@ -173,12 +156,6 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
             series[1],
             radians=RADIANS_A_STEP,
         ),
-        WEAK_LOADS: Method(
-            ADAPTIVE,
-            splitting_steps.steps,
-            _constant("auto: free_body_strang, loads weak against the spin"),
-            workspace=splitting_steps.workspace,
-        ),
         SLACK_AT_REST: Method(
             NOTHING,
             None,
@@ -193,18 +170,6 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
             workspace=series[1],
             on_string=True,
             radians=RADIANS_A_STEP,
-        ),
-        STIFF: Method(
-            ADAPTIVE,
-            stiff_steps.steps,
-            _constant("auto: radau of order 9, stiff damping"),
-            workspace=stiff_steps.workspace,
-            implicit=True,
-        ),
-        ON_STIFF_STRING: Method(
-            *(FIXED_STEPS, gradient.string_kernel or gradient.kernel, _stiff, gradient.evaluations),
-            floor_binds=True,
-            on_string=True,
         ),
     }
     return tuple(by_kind[kind] for kind in range(len(by_kind)))

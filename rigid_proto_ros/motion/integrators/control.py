@@ -20,7 +20,7 @@ ELAPSED_NS = 3  # committed since the segment's start
 STEPS = 4  # committed
 EVALUATIONS = 5  # in committed steps, one for each series
 PENDING = 6  # evaluations spent on the step that waits
-FLOOR_BINDS = 7  # 1 once rounding, not the accuracy, set the allowance of a step
+FLOOR_RATE = 7  # the largest error rate [1/s] that rounding, and not the accuracy, has allowed a step; 0 for none
 FAILED = 8  # 1 when a nanosecond would be too long a step, or the motion ran away
 SERIES = 9  # 1 while the workspace holds the series from the committed variables on
 # Of the step that waits, where the string's law changes within it (integrators/series_steps.py):
@@ -28,10 +28,8 @@ LAW = 10  # the string's law at its start
 SWITCH = 11  # time after which the last series holds and no more the first [s]; infinite for none
 LAST_START = 12  # where the last series starts [s]
 LAST_LAW = 13  # the law of the last series
-NEXT = 14  # length proposed for the next step [s], by those methods that reject steps; 0 at a segment's start
-EXCESS = 15  # what committed steps have erred above the accuracy's share, by those methods that estimate errors
-PENDING_EXCESS = 16  # of the step that waits
-SIZE = 17
+PASSAGES = 14  # steps past the free end of a string that pushes, which keep no accuracy
+SIZE = 15
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
@@ -42,7 +40,7 @@ def accept(control: np.ndarray, length_ns: int) -> None:
     """Let a step of this length wait for its commitment, its allowance no less than the floor."""
     control[ACCEPTED_NS] = length_ns
     if control[ACCURACY] * length_ns * 1e-9 < FLOOR:
-        control[FLOOR_BINDS] = 1.0
+        control[FLOOR_RATE] = max(control[FLOOR_RATE], FLOOR / (length_ns * 1e-9))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

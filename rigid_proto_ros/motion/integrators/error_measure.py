@@ -61,35 +61,6 @@ def heavier(
     return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
 
 
-_SQUARED = 1e140
-"""Up to this number, and down to one over it, squares and their sums stay well within a double."""
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def length_of(x: float, y: float, z: float, w: float) -> float:
-    """√(x² + y² + z² + w²), scaled by a power of two where squares would over- or underflow."""
-    square = x * x + y * y + z * z + w * w
-    if 1.0 / _SQUARED < square < _SQUARED:
-        return math.sqrt(square)
-    largest = max(abs(x), abs(y), abs(z), abs(w))
-    if largest == 0.0 or not math.isfinite(largest):
-        return largest
-    scale = math.ldexp(1.0, math.frexp(largest)[1] - 1)
-    x, y, z, w = x / scale, y / scale, z / scale, w / scale
-    return scale * math.sqrt(x * x + y * y + z * z + w * w)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def size(e: np.ndarray, attitude: float, spin: float, place: float, speed: float) -> float:
-    """The measure of a small difference e (≥ 13,) of variables."""
-    a = attitude * length_of(e[0], e[1], e[2], e[3])
-    a = max(a, spin * length_of(e[4], e[5], e[6], 0.0))
-    if place == 0.0:
-        return a
-    a = max(a, place * length_of(e[7], e[8], e[9], 0.0))
-    return max(a, speed * length_of(e[10], e[11], e[12], 0.0))
-
-
 @njit(cache=True, error_model="numpy", allocates=False)
 def jump_of_displacement(p: np.ndarray, spin: float, speed: float) -> float:
     """Error that a displacement by one unit of the measure causes when a damped string jerks taut that

@@ -118,20 +118,6 @@ def free_step(
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def circulation(i1: float, i2: float, i3: float, wx: float, wy: float, wz: float) -> tuple[float, float]:
-    """ω_p [1/s] and m₁ (0 on the separatrix, at most 1) of the free motion with angular velocity w,
-    moments i1 ≤ i2 ≤ i3.
-    """
-    side = i3 * (i3 - i2) * wz * wz - i1 * (i2 - i1) * wx * wx
-    A, C, outer = (i1, i3, wz) if side > 0.0 or (side == 0.0 and i3 - i2 >= i2 - i1) else (i3, i1, wx)
-    P = i2 * abs(i2 - A) * wy * wy + C * abs(C - A) * outer * outer
-    swing = abs(C - i2) * P
-    if swing == 0.0:
-        return 0.0, 1.0
-    return math.sqrt(swing / (A * i2 * C)), abs(C - A) * abs(side) / swing
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
 def _circulate(A: float, B: float, C: float, w1: float, w2: float, w3: float, h: float) -> tuple[float, ...]:
     """The turn r xyzw (not normalized) over h, and w after it."""
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)

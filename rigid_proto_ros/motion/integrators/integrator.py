@@ -47,9 +47,8 @@ class Method:
     kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps,
     or samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations:
     of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
-    sleeps: nothing moves. floor_binds: whatever the steps, they don't follow from the accuracy. on_string: for segments
-    with a string alone. radians: of the fastest turn or swing that a step covers, about; 0 where steps don't follow it.
-    implicit: steps follow what moves beside the damping.
+    sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or swing that a
+    step covers, about; 0 where steps don't follow it.
     """
 
     way: int
@@ -58,10 +57,8 @@ class Method:
     evaluations: int = 0
     workspace: Callable[[int], np.ndarray] | None = None
     sleeps: bool = False
-    floor_binds: bool = False
     on_string: bool = False
     radians: float = 0.0
-    implicit: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class Integrator:
     of a string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
     kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result
     isn't finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another.
-    stiff: bounded at any ω_s h. make_methods: the ways in which segments are stepped; chooses: by what a segment holds
+    make_methods: the ways in which segments are stepped; chooses: by what a segment holds
     (auto), else by whether a string is tied.
     """
 
@@ -85,7 +82,6 @@ class Integrator:
     kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None
     make_methods: Callable[[Integrator], tuple[Method, ...]]
     string_kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None = None
-    stiff: bool = False
     chooses: bool = False
 
     @cached_property

@@ -29,9 +29,8 @@ from .error_measure import (
 )
 from .first_root import NONE
 from .motion_series import A_KNOT, COLUMNS, motion_at, motion_series, stretch_at
-from .passage import before_passage, may_pass, pass_by
 from .runge_kutta import is_good
-from .string_law import PASSES, PULLS, SHORTENS, is_one_sided, knot_at, law_of, next_law
+from .string_law import PASSES, PULLS, SHORTENS, before_passage, is_one_sided, knot_at, law_of, may_pass, next_law
 from .taylor_adaptive import MAX_DEGREE, PART, length_for, log2_growth
 
 PART_ON_A_STRING = 0.1
@@ -121,8 +120,10 @@ def _lay_out(
         if may_pass(p):
             h, length_ns = before_passage(series, p, degree, knot, h)
             if length_ns > 0:
-                control[ctl.LAW] = PASSES
-                return length_ns
+                motion_series(y, p, knot, degree, False, c)
+                control[ctl.LAW], control[ctl.SERIES] = PASSES, 0.0
+                control[ctl.PASSAGES] += 1.0
+                return length_ns if length_ns * 1e-9 <= allowed_length(c, degree, weights, accuracy, part) else 0
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
             return 0
         if not is_one_sided(p) or parts >= _MAX_PARTS:
@@ -160,9 +161,6 @@ def _reach(p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _move(c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, out: np.ndarray) -> None:
-    if law == PASSES:
-        pass_by(out, p, h, out)
-        return
     motion_at(c, p, degree, h, out)
     if law == SHORTENS:
         # Stretched but not pulling: the damper takes what is left of ½ k x².

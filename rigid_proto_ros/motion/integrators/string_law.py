@@ -6,6 +6,13 @@ than its damper lets it pull. Each law ends where a polynomial rises above zero,
 (integrators/first_root.py): slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial however
 near the knot passes its free end; the other two where the tension, or the stretch, changes sign, whose series are at
 hand.
+
+A bilateral string with a rest length pushes at the full length of that when its knot meets the free end, in a
+direction n = a/l that has no limit at l = 0. A knot that goes straight through meets no pole of its series, which lead
+on as if l became negative; one that passes at a small distance b meets a pair of them at b/|a'| from the nearest point,
+too weak to show in any coefficient. So steps end before the nearest point, and the nanoseconds around it are a step of
+their own, without the string: before and after that point it pushes alike, in opposite directions, so that little is
+lost of its impulse, but no accuracy is kept, and that is reported.
 """
 
 from __future__ import annotations
@@ -15,12 +22,15 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.simd import filled, load, number
 from .. import problem as of
+from ..string import NO_DIRECTION
 from .equations import knot as moving_knot
 from .first_root import NONE, first_rise
 from .knot import Knot, knot_and_stretch
 from .motion_series import (
     A_KNOT,
+    COLUMNS,
     DISTANCE,
     STRETCH,
     TENSION,
@@ -29,7 +39,7 @@ from .motion_series import (
 )
 
 SLACK, PULLS, SHORTENS, PASSES = 0.0, 1.0, 2.0, 3.0
-"""PASSES: of a step past the free end of a string that pushes at no length (integrators/passage.py)."""
+"""PASSES: of a step past the free end of a string that pushes at no length."""
 
 _AGREEMENT = 0.03
 _AGREEMENT_SLACK = 1e-3
@@ -41,6 +51,20 @@ of it.
 
 _NEGLIGIBLE = 1e-19
 """Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
+
+AT_ONCE = 4e-9
+"""Before the nearest point [s]: nearer than this a step of a series would be too short."""
+FARTHEST = 64e-9
+"""From the nearest point [s], by the knot's speed: farther than this steps of series are always long enough."""
+MISSES = 1e-9
+"""Distance of the nearest point by the knot's speed [s], below which series say nothing of it."""
+
+_NEAR = 0.2
+"""Of the distance at a step's start: a point no nearer than this shows in the coefficients."""
+_SAMPLES = 8
+_HALVINGS = 40
+_BEFORE = 0.75
+"""Of the time until the nearest point, a step is no longer."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -179,3 +203,80 @@ def _converges(c: np.ndarray, p: np.ndarray, degree: int, t: float, tolerance: f
     wrong = abs(stiffness * x + damping * rate - tension)
     speed = abs(c[1, A_KNOT]) + abs(c[1, A_KNOT + 1]) + abs(c[1, A_KNOT + 2])
     return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed
+
+
+@njit(cache=True, error_model="numpy")
+def may_pass(p: np.ndarray) -> bool:
+    """Whether the string is one that pushes at no length."""
+    return p[of.HAS_STRING] != 0.0 and p[of.BILATERAL] != 0.0 and p[of.REST_LENGTH] != 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def before_passage(c: np.ndarray, p: np.ndarray, degree: int, knot: Knot, h: float) -> tuple[float, int]:
+    """h cut down so that a step along the series c ends before the knot passes its free end; or, where that is at hand,
+    the length [ns] of the step that passes it, else 0. knot: at the series' start.
+    """
+    ax, ay, az, length, _ = knot
+    vx, vy, vz = c[1, A_KNOT], c[1, A_KNOT + 1], c[1, A_KNOT + 2]
+    square = vx * vx + vy * vy + vz * vz
+    speed, shortest = math.sqrt(square), NO_DIRECTION * p[of.REST_LENGTH]
+    if speed > 0.0 and length <= FARTHEST * speed:
+        nearest = -(ax * vx + ay * vy + az * vz) / square
+        bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest
+        straight = math.sqrt(bx * bx + by * by + bz * bz) <= MISSES * speed
+        inside = length < shortest and speed * 1e-9 > shortest
+        if h * 1e9 < 1.0 or inside or (straight and 0.0 <= nearest <= AT_ONCE):
+            return h, max(int(math.ceil((2.0 * nearest if nearest > 0.0 else -nearest) * 1e9)), 2)
+    if length < shortest:
+        # No direction, no tension: not for longer than until there is one.
+        push = abs(c[2, A_KNOT]) + abs(c[2, A_KNOT + 1]) + abs(c[2, A_KNOT + 2])
+        leaves = math.inf
+        if speed > 0.0:
+            leaves = shortest / speed
+        if push > 0.0:
+            leaves = min(leaves, math.sqrt(shortest / push))
+        return min(h, max(leaves, 1.1e-9)), 0
+    return min(h, _BEFORE * _nearest_time(c, degree, length, h)), 0
+
+
+@njit(cache=True, error_model="numpy")
+def _at(c: np.ndarray, degree: int, t: float) -> tuple[float, float]:
+    """l² and a·a' at time t of the series."""
+    a, b = filled(0.0, 4), filled(0.0, 4)
+    at = degree * COLUMNS + A_KNOT
+    for _ in range(degree + 1):
+        b = b * t + a
+        a = a * t + load(c, at, a)
+        at -= COLUMNS
+    x, y, z = number(a, 0), number(a, 1), number(a, 2)
+    return x * x + y * y + z * z, x * number(b, 0) + y * number(b, 1) + z * number(b, 2)
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest_time(c: np.ndarray, degree: int, length: float, h: float) -> float:
+    """When the knot first is much nearer to its free end than before and after, infinite if never within h seconds."""
+    reach, power = 0.0, 1.0
+    for k in range(1, degree + 1):
+        power *= h
+        reach += (abs(c[k, A_KNOT]) + abs(c[k, A_KNOT + 1]) + abs(c[k, A_KNOT + 2])) * power
+    if reach < (1.0 - _NEAR) * length:
+        return math.inf
+    low, approaches = 0.0, _at(c, degree, 0.0)[1] < 0.0
+    for i in range(1, _SAMPLES + 1):
+        high = h * (i / _SAMPLES)
+        approached = approaches
+        approaches = _at(c, degree, high)[1] < 0.0
+        if approached and not approaches:
+            least = math.inf
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                square, slope = _at(c, degree, middle)
+                least = min(least, square)
+                if slope < 0.0:
+                    low = middle
+                else:
+                    high = middle
+            if least < (_NEAR * length) ** 2:
+                return low
+        low = h * (i / _SAMPLES)
+    return math.inf

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""auto follows damping and strings up to the rate that it can resolve in real time; beyond, they are refused with what the body takes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flights import SECOND, flight, flight_setup, spinning, wrench
+from mpmath import mp, mpc, mpf
+from reference_motion import angle_between
+
+from rigid_proto_ros.base.errors import CommandRefused
+from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.integrators import integrator_named
+from rigid_proto_ros.motion.integrators.auto import FASTEST
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.simulation.commands import Change, MoveString, TieString
+
+MOMENTS = (0.02, 0.03, 0.04)
+BODY = make_body(2.0, np.zeros(3), np.diag(MOMENTS))
+ARM = (0.1, 0.15, 0.2)
+DURATION_NS = SECOND // 20
+
+
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("rate", [2e4, 0.99 * FASTEST / 2])
+def test_a_spin_soon_goes_as_fast_as_its_torque_keeps_up(rate, accuracy):
+    damping, torque, spin, time = rate * MOMENTS[2], 3.0 * rate * MOMENTS[2], 20.0, DURATION_NS * 1e-9
+    simulation = flight(
+        BODY, integrator="auto", accuracy=accuracy, initial=spinning((0, 0, spin)), angular_damping=damping
+    )
+    simulation.submit(wrench("body@com", torque=(0, 0, torque)))
+    row = simulation.advance(DURATION_NS).row
+    with mp.workdps(40):
+        slow, fast = mpf(torque) / mpf(damping), mpf(damping) / mpf(MOMENTS[2])
+        kept = mp.exp(-fast * mpf(time))
+        angle = slow * mpf(time) + (spin - slow) * (1 - kept) / fast
+        half = [float(mp.sin(angle / 2)), float(mp.cos(angle / 2))]
+        speed = float(slow + (spin - slow) * kept)
+    # A step's floor of rounding is 32 ε.
+    allowed = accuracy * time + simulation.steps * 32.0 * 2.0**-52
+    assert 2.0 * np.abs(row[5:7] - half).max() <= allowed
+    assert abs(row[12] - speed) / max(speed, 1.0) <= allowed
+    assert not row[[3, 4, 10, 11]].any()
+
+
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-9])
+def test_a_force_that_turns_with_the_body_pushes_it_round_through_honey(accuracy):
+    rate, spin = 0.99 * FASTEST, 5.0
+    force, time = 4.0 * rate, DURATION_NS * 1e-9
+    row = spinning((0, 0, spin))
+    row[7] = 0.5
+    simulation = flight(BODY, integrator="auto", accuracy=accuracy, initial=row, linear_damping=rate * BODY.mass)
+    simulation.submit(wrench("body@com", (force, 0, 0)))
+    row = simulation.advance(DURATION_NS).row
+    with mp.workdps(40):
+        c, g, turn, t = mpf(rate), mpf(force) / 2, mpc(0, spin), mpf(time)
+        round_, kept = mp.exp(turn * t), mp.exp(-c * t)
+        velocity = g * (round_ - kept) / (turn + c) + mpf("0.5") * kept
+        place = g / (turn + c) * ((round_ - 1) / turn - (1 - kept) / c) + mpf("0.5") * (1 - kept) / c
+    allowed = accuracy * time + simulation.steps * 32.0 * 2.0**-52
+    assert np.abs(row[0:2] - [float(place.real), float(place.imag)]).max() <= allowed
+    assert np.abs(row[7:9] - [float(velocity.real), float(velocity.imag)]).max() <= allowed * max(
+        1.0, float(abs(velocity))
+    )
+
+
+def test_a_user_who_damps_a_toy_by_one_newton_metre_second_still_flies():
+    toy = make_body(0.15, np.zeros(3), np.diag((5e-5, 6e-5, 1e-4)))
+    simulation = flight(toy, integrator="auto", initial=spinning((1.0, 2.0, 3.0)), angular_damping=1.0)
+    assert np.abs(simulation.advance(SECOND // 100).angular_velocity_body).max() <= 1e-9
+
+
+def tied(**settings):
+    return StringSettings(attached=True, attach=ARM, rest_length=0.5, timeout_ns=0, **settings)
+
+
+REFUSED = {
+    "angular_damping": ({"angular_damping": 2e4}, 1e4),
+    "linear_damping": ({"linear_damping": 4e6}, 1e6),
+    "string.stiffness": ({"string": tied(stiffness=1e13)}, None),
+    "string.frequency": ({"string": tied(frequency=1e6)}, None),
+    "string.damping_ratio": ({"string": tied(frequency=1e3, damping_ratio=1e4)}, None),
+}
+
+
+@pytest.mark.parametrize("parameter", REFUSED)
+def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(parameter):
+    changes, most = REFUSED[parameter]
+    with pytest.raises(CommandRefused) as refusal:
+        flight(BODY, integrator="auto", **changes)
+    assert (refusal.value.reason, refusal.value.field) == ("integrator", parameter)
+    said = float(refusal.value.accepted.split()[2])
+    assert most is None or said == most
+    # A hair less is taken, and a hair more isn't.
+    name = parameter.removeprefix("string.")
+    for part, taken in ((0.99, True), (1.01, False)):
+        if name == parameter:
+            changed = {name: part * said}
+        else:
+            changed = {"string": replace(changes["string"], **{name: part * said})}
+        if taken:
+            flight(BODY, integrator="auto", **changed)
+        else:
+            with pytest.raises(CommandRefused):
+                flight(BODY, integrator="auto", **changed)
+    # Fixed steps are the user's own choice.
+    flight(BODY, integrator="rk4", **changes)
+
+
+def test_tying_and_changing_in_flight_are_refused_and_counted():
+    settings = replace(tied(stiffness=1e13), attached=False)
+    setup = flight_setup(BODY, integrator="auto", string=settings)
+    simulation = flight(BODY, integrator="auto", string=settings)
+    simulation.submit(MoveString((0.0, 0.0, 1.0)), 1000)
+    simulation.submit(Change({}, lambda: replace(setup, angular_damping=1e6)), 2000)
+    simulation.submit(Change({}, lambda: replace(setup, string=replace(settings, stiffness=10.0))), 3000)
+    simulation.submit(MoveString((0.0, 0.0, 1.0)), 4000)
+    simulation.submit(Change({}, lambda: replace(setup, string=settings)), 5000)
+    # At the COM a string of 1e11 N/m swings the body slowly enough, at ARM it doesn't.
+    simulation.submit(TieString("mesh", (0.0, 0.0, 0.0)), 6000)
+    softer = replace(settings, stiffness=3e11)
+    simulation.submit(Change({}, lambda: replace(setup, string=softer)), 7000)
+    simulation.submit(TieString("mesh", ARM), 8000)
+    simulation.advance(10_000)
+    assert simulation.refused == {"integrator": 4}
+    assert simulation.string is not None and simulation.string.attach == (0.0, 0.0, 0.0)
+    assert simulation.string.stiffness == 3e11
+    fixed = flight(BODY, integrator="rk4", string=settings)
+    fixed.submit(MoveString((0.0, 0.0, 1.0)), 1000)
+    fixed.submit(Change({}, lambda: replace(setup, integrator=integrator_named("auto"))), 2000)
+    fixed.advance(10_000)
+    assert fixed.refused == {"integrator": 1}
+
+
+def test_a_motion_that_takes_more_steps_than_the_clock_leaves_time_for_says_so():
+    tiny = flight(BODY, integrator="rk4", step_s=1e-7, initial=spinning((1, 2, 3)))
+    assert "1e+07 steps" in tiny.too_slow
+    tiny.advance(SECOND // 50)
+    assert "slower than real time" in tiny.too_slow
+    # Without the gyroscopic term the force turns along with a spin of 2e6 rad/s, which nothing slows down.
+    spun = flight(BODY, integrator="auto", initial=spinning((0, 0, 2e6)), gyroscopic=False)
+    assert spun.too_slow == ""
+    spun.submit(wrench("body@com", (1.0, 0.0, 0.0)))
+    spun.advance(1)
+    assert "1.3e+06 steps" in spun.too_slow
+
+
+def test_a_string_that_swings_too_fast_for_the_clock_says_so():
+    string = replace(tied(stiffness=0.0, frequency=1.6e5, damping_ratio=0.0), rest_length=0.0)
+    start = np.array([0.1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.1])
+    simulation = flight(BODY, integrator="auto", initial=start, string=string)
+    # Before, by the swing; and after, by what it took.
+    assert "steps for a second of the motion, slower than real time" in simulation.too_slow
+    simulation.advance(SECOND // 10)
+    assert "slower than real time" in simulation.too_slow
+
+
+def test_portions_have_no_bearing_on_fast_damping():
+    def state(portion_ns):
+        simulation = flight(BODY, integrator="auto", initial=spinning((3, 4, 5)), angular_damping=1e3, string=tied())
+        for at in range(portion_ns, SECOND // 50, portion_ns):
+            simulation.advance(at)
+        return simulation.advance(SECOND // 50)
+
+    whole, parts = state(10**9), state(123_457)
+    assert whole.sha256() == parts.sha256()
+    assert angle_between(whole.orientation_xyzw, np.eye(3)) < 1.0
