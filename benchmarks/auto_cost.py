@@ -132,7 +132,7 @@ def compare(name: str, make, until_ns: int, accuracy: float) -> dict:
         "auto_s": auto_s,
         "auto_choice": flown.choice.replace(",", ";"),
         "auto_steps": flown.steps,
-        "floor_binds": flown.floor_binds,
+        "floor_binds": bool(flown.accuracy_floor),
         "catalogue_s": best[0],
         "catalogue_integrator": best[1],
         "catalogue_step_s": best[2],

@@ -5,7 +5,7 @@
 python msg_examples/tune_controller.py                 # 625 pairs of gains, 16 starts each, on all cores
 python msg_examples/tune_controller.py --side 5 --starts 4
 
-Each flight begins with a random spin and is closed over four thrusters with lag and limit at 50 Hz.
+Each flight begins with a random spin and is closed over four thrusters with a limit at 50 Hz.
 """
 
 import argparse
@@ -21,7 +21,7 @@ POINTS = np.array([[0, -1, 1], [0, 1, -1], [0, 1, 1], [0, -1, -1]]) * 0.05  # m 
 FORCES = np.array([[2, -1, -1], [2, 1, 1], [2, 1, -1], [2, -1, 1]]) / 6**0.5
 TORQUES = np.cross(POINTS, FORCES).T  # N m per newton of each thruster
 THRUSTERS = {
-    f"thrusters.{name}": [*(point + [0.0, 0.0, 0.0123]), *force, 0.1, 0.03]  # 0.1 N at most, a lag of 30 ms
+    f"thrusters.{name}": [*(point + [0.0, 0.0, 0.0123]), *force, 0.1]  # 0.1 N at most
     for name, point, force in zip("abcd", POINTS, FORCES, strict=True)
 }
 
@@ -35,7 +35,7 @@ class Trial(NamedTuple):
 
 
 def scene() -> Scene:
-    """The T-handle with lagging thrusters."""
+    """The T-handle with thrusters."""
     return load_scene("t_handle", {**THRUSTERS, "wrench_timeout": 0.0})
 
 

@@ -8,7 +8,9 @@ from collections.abc import Mapping
 from .command_receiver import TOPICS
 from .live_simulation import LiveSimulation
 
-REFUSAL_REASONS = ("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tensor", "integrator", "schedule")
+REFUSAL_REASONS = (
+    *("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tensor", "integrator", "schedule", "thrusters"),
+)
 
 COUNTED = ("refused_total", "sequence_gaps", "queue_full", "overruns", "real_time_lost_s")
 """Keys of /diagnostics that only grow, and whose growth is warned of."""

@@ -45,7 +45,7 @@ INTERFACES = (
         SUBSCRIBED,
         "~/thrusters",
         "std_msgs/Float64MultiArray",
-        "forces [N] of the thrusters, in the order of their names as `~/scene` lists them; until the next message, or "
+        "forces [N] of the thrusters, in the alphabetical order of their names; until the next message, or "
         "`wrench_timeout` after the last",
         "thrusters",
     ),

@@ -24,7 +24,7 @@ from ..motion.string import StringSettings, Tied
 from ..simulation.commands import slot_name, slot_number
 from ..simulation.flight import NEVER, NO_SLOT, UNNAMED_SLOT
 from ..simulation.in_flight import FARTHEST_NS, GoingLoad, GoingString, InFlight
-from ..simulation.thrusters import SETTLED, Push
+from ..simulation.thrusters import Push
 from .declaration import HUGE
 from .yaml_text import flow, load_plain_yaml
 
@@ -87,9 +87,8 @@ def _string_fields(string: GoingString) -> dict[str, object]:
 
 
 def _push_fields(push: Push) -> dict[str, object]:
-    if push.until_ns == NEVER:
-        return {"target": push.target}
-    return push._asdict()
+    said: dict[str, object] = {"force": push.force, "on_ns": push.on_ns}
+    return said if push.off_ns == NEVER else {**said, "off_ns": push.off_ns}
 
 
 @lru_cache(maxsize=8)
@@ -168,11 +167,8 @@ def _string(said: _Fields) -> GoingString:
 def _push(said: _Fields | None) -> Push:
     if said is None:
         raise InputError(f"{NAME}, thrusters", None, "a mapping for each")
-    target = said.number("target")
-    push = Push(target, target, 0, NEVER, 0)
-    if said.has("until_ns"):
-        stairs = said.whole("stairs", 0, SETTLED)
-        push = Push(target, said.number("value"), said.time("since_ns", last=0), said.time("until_ns", first=0), stairs)
+    off_ns = said.time("off_ns", first=0) if said.has("off_ns") else NEVER
+    push = Push(said.number("force"), said.time("on_ns", last=0), off_ns)
     said.nothing_else()
     return push
 

@@ -52,6 +52,20 @@ class ExplicitInertia:
 
 
 @dataclass(frozen=True, slots=True)
+class ThrusterRules:
+    """What holds for all thrusters."""
+
+    bidirectional: bool = switch(
+        False,
+        "Thrusters push both ways, up to their limit of either sign; else from 0 to their limit.",
+        changes=READ_ONLY,
+    )
+    minimum_on_time: float = number(
+        0.0, "Once on, a thruster pushes at least so long.", "s", lower=0.0, upper=1e9, changes=READ_ONLY
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class InitialState:
     """What the body does at time 0."""
 
@@ -175,7 +189,7 @@ class Parameters:
     ``parameters.string.stiffness`` here.
 
     ``replaced`` makes one from values by name, with all checks; ``named`` gives those back. contacts: named points of
-    the body. ballast: point masses by name. thrusters: point, direction, limit and lag by name. All in mesh
+    the body. ballast: point masses by name. thrusters: point, direction and limit by name. All in mesh
     coordinates.
     """
 
@@ -306,6 +320,7 @@ class Parameters:
     rerun_port: int = port(9876, "Port on which the live view is served, on this machine only.")
     web_port: int = port(9090, "Port of the browser's viewer page, on this machine only.")
     workbench_port: int = port(8080, "Port of the interactive page, on this machine only.")
+    thruster: ThrusterRules = ThrusterRules()
     contacts: Mapping[str, Vector] = field(default_factory=dict)
     ballast: Mapping[str, PointMass] = field(default_factory=dict)
     thrusters: Mapping[str, ThrusterNumbers] = field(default_factory=dict)
@@ -370,11 +385,11 @@ PATTERNS: dict[str, Parameter] = {
         "doubles",
         None,
         "A thruster on the body, commanded by ~/thrusters: x, y, z and the direction of its force in mesh coordinates; "
-        "behind them, where wanted, the largest force (0 for any) and the time constant of its lag.",
-        "mesh units, N, s",
+        "behind them, where wanted, the largest force (0 for any).",
+        "mesh units, N",
         -HUGE,
         HUGE,
-        lengths=(6, 7, 8),
+        lengths=(6, 7),
         changes=READ_ONLY,
     ),
 }

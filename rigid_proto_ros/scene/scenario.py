@@ -213,7 +213,12 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
         accuracy=parameters.accuracy,
         initial=row,
         initial_string_mass=initial.string_mass,
-        thrusters={name: make_thruster(name, numbers) for name, numbers in sorted(parameters.thrusters.items())},
+        thrusters={
+            name: make_thruster(
+                name, numbers, parameters.thruster.bidirectional, nanoseconds(parameters.thruster.minimum_on_time)
+            )
+            for name, numbers in sorted(parameters.thrusters.items())
+        },
         in_flight=_in_flight(parameters),
     )
     return setup, tuple(properties.warnings)

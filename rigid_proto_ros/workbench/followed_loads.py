@@ -77,9 +77,9 @@ class FollowedLoads:
         timeout_ns = setup.in_flight.thrusters_last_ns + (setup.wrench_timeout_ns or 1 << 62)
         for number, (name, thruster) in enumerate(setup.thrusters.items()):
             push = setup.in_flight.thrusters.get(name)
-            if push is not None and push.target:
-                text = _strength_text((push.target,), False)
-                self._acting.append(_FollowedLoad(True, -1 - number, thruster.load(push.target), text, 0, timeout_ns))
+            if push is not None and push.force:
+                text = _strength_text((push.force,), False)
+                self._acting.append(_FollowedLoad(True, -1 - number, thruster.load(push.force), text, 0, timeout_ns))
 
     @property
     def string(self) -> Tied | None:
@@ -110,13 +110,13 @@ class FollowedLoads:
             self._thrust(command, time_ns, scenario.setup)
 
     def _thrust(self, command: ThrusterCommand, time_ns: int, setup: Setup) -> None:
-        """What they were told to push with, without their lags."""
+        """What they were told to push with, without their least on-time."""
         self._acting = [acting for acting in self._acting if acting.slot >= NO_SLOT]
         until_ns = time_ns + (setup.wrench_timeout_ns or 1 << 62)
         for number, (thruster, force) in enumerate(zip(setup.thrusters.values(), command.forces, strict=True)):
-            if force:
-                text = _strength_text((force,), False)
-                load = thruster.load(thruster.within(force))
+            if within := thruster.within(force):
+                text = _strength_text((within,), False)
+                load = thruster.load(within)
                 self._acting.append(_FollowedLoad(True, -1 - number, load, text, time_ns, until_ns))
 
     def _load(self, command: WrenchCommand, time_ns: int, scenario: Scenario, state: State) -> None:

@@ -87,8 +87,9 @@ FEATURES = {
     "density": 7850.0,
     "initial.angular_velocity": [0.05, 0.1, 12.0],
     "contacts.tip": [0.0, 0.0, 0.07],
-    "thrusters.main": [0.0, 0.0, 0.07, 0.0, 1.0, 0.0, 0.0, 0.2],
+    "thrusters.main": [0.0, 0.0, 0.07, 0.0, 1.0, 0.0],
     "thrusters.side": [0.0, 0.02, 0.0, 1.0, 0.0, 0.0, 0.05],
+    "thruster.minimum_on_time": 0.2,
     "string.timeout": 0.4,
     "string.stiffness": 2.0,
     "wrench_timeout": 0.6,
@@ -214,7 +215,7 @@ def test_a_branch_that_was_edited_begins_with_its_state_under_what_acted():
     assert heavy.string.frequency == pytest.approx(8.0)
     short = begun(wrench_timeout=0.1)
     short.advance(1)
-    # The poke, and the thruster with a lag, on its way to nothing.
+    # The poke, and the thruster that has to stay on.
     assert [acting.shown_kind for acting in short.acting] == ["poke", "thruster"]
     # Without the rest nothing acts.
     alone = begun(initial__flight="")
@@ -254,7 +255,7 @@ def test_what_a_branch_brings_along_comes_back_at_a_reset_and_is_left_out_where_
             "loads, 1",
         ),
         (
-            "{began_ns: -1, state: [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], thrusters: {last_ns: -1, nose: {target: 1}}}",
+            "{began_ns: -1, state: [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], thrusters: {last_ns: -1, nose: {force: 1, on_ns: -1}}}",
             "thruster of the body",
         ),
     ],

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Thrusters push along the body's own axes with what they are told, through limit, lag and timeout."""
+"""Thrusters push along the body's own axes with what they are told, within limit, least on-time and timeout."""
 
 import json
-import math
 
-import numpy as np
 import pytest
 from flights import SECOND
 
@@ -16,7 +14,6 @@ from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.session.replay import Resimulation
 from rigid_proto_ros.simulation.observer import Observer
-from rigid_proto_ros.simulation.thrusters import _decay
 
 BODY = {
     "mesh": "",
@@ -25,7 +22,6 @@ BODY = {
     "explicit_inertia.tensor": [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
     "wrench_timeout": 0.0,
 }
-LAG_S = 0.05
 
 
 class Told(Observer):
@@ -62,34 +58,37 @@ def test_thrusters_push_together_in_the_order_of_their_names() -> None:
     assert told.kinds == {"thruster"} and len(told.acting) == 2
 
 
-def test_a_limit_holds_either_sign_and_0_is_none() -> None:
-    thrusters = {"thrusters.a": [0, 0, 0, 1, 0, 0, 3.0], "thrusters.b": [0, 0, 0, 0, 1, 0, 0.0]}
-    run, _ = flown("[{t: 0, thrusters: [-100, 100]}]", 1.0, **thrusters)
-    assert run.simulation.state.linear_velocity == pytest.approx([-1.5, 50.0, 0.0], rel=1e-12)
+BOTH = {"thrusters.a": [0, 0, 0, 1, 0, 0, 3.0], "thrusters.b": [0, 0, 0, 0, 1, 0, 0.0]}
 
 
-def test_a_lag_of_first_order_gives_the_exact_impulse() -> None:
-    thruster = {"thrusters.a": [0, 0, 0, 1, 0, 0, 0, LAG_S]}
-    # 8 N asked for at 0, none at 1 s: u = 8(1 - exp(-t/lag)), and down again; impulse 8 N s in all.
-    run, told = flown("[{t: 0, thrusters: [8]}, {t: 1, thrusters: [0]}]", 3.0, **thruster)
-    assert run.simulation.state.linear_velocity[0] == pytest.approx(8.0 / 2.0, rel=1e-12)  # measured 2e-16
-    # Displacement ∬u/m: v rises for 1 s by 4 m/s² and lags, and goes on by 4 m/s; a stair's error is (lag/16)²·a/12.
-    assert run.simulation.state.position[0] == pytest.approx(2.0 + 8.0 - 4.0 * LAG_S, abs=1e-5)  # measured 4e-15
-    assert not told.acting and run.simulation.thrusters.due_ns > 3 * SECOND
+def test_a_thruster_pushes_one_way_up_to_its_limit_and_0_is_none() -> None:
+    run, _ = flown("[{t: 0, thrusters: [100, 100]}, {t: 1, thrusters: [-5, -5]}]", 2.0, **BOTH)
+    assert run.simulation.state.linear_velocity == pytest.approx([1.5, 50.0, 0.0], rel=1e-12)
 
 
-def test_a_command_in_the_middle_of_a_stair_goes_on_from_the_force_there_is() -> None:
-    thruster = {"thrusters.a": [0, 0, 0, 1, 0, 0, 0, LAG_S]}
-    script = "[" + ", ".join(f"{{t: {k * 0.0017}, thrusters: [{1 + k % 3}]}}" for k in range(60)) + "]"
-    run, _ = flown(script, 2.0, **thruster)
-    times, targets = [k * 0.0017 for k in range(60)], [1 + k % 3 for k in range(60)]
-    impulse, u = 0.0, 0.0
-    for k, target in enumerate(targets):
-        span = (times[k + 1] if k < 59 else 2.0) - times[k]
-        decay = math.exp(-span / LAG_S)
-        impulse, u = impulse + target * span + (u - target) * LAG_S * (1.0 - decay), target + (u - target) * decay
-    # What a stair that is cut short has given too much or too little is second order in its length.
-    assert run.simulation.state.linear_velocity[0] == pytest.approx(impulse / 2.0, rel=1e-3)  # measured 4e-4
+def test_thrusters_that_push_both_ways_do_so_up_to_their_limit_of_either_sign() -> None:
+    run, _ = flown("[{t: 0, thrusters: [-100, -5]}]", 1.0, **BOTH, **{"thruster.bidirectional": True})
+    assert run.simulation.state.linear_velocity == pytest.approx([-1.5, -2.5, 0.0], rel=1e-12)
+
+
+def test_a_thruster_that_is_on_stays_so_for_its_least_time() -> None:
+    rules = {"thrusters.a": [0, 0, 0, 1, 0, 0], "thruster.minimum_on_time": 0.1}
+    # On at 0 for 0.02 s, which become 0.1 s; on at 0.5 s for 0.3 s, of which the last 0.1 with half the force.
+    script = """[{t: 0, thrusters: [2]}, {t: 0.02, thrusters: [0]}, {t: 0.5, thrusters: [2]}, {t: 0.7, thrusters: [1]},
+        {t: 0.8, thrusters: [0]}]"""
+    run, told = flown(script, 0.05, **rules)
+    assert len(told.acting) == 1
+    run, told = flown(script, 1.0, **rules)
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(0.1 + 0.2 + 0.05, rel=1e-12)
+    assert not told.acting
+    # Asked for again before it is over, it goes on from there; the timeout too leaves it on for so long.
+    script = "[{t: 0, thrusters: [2]}, {t: 0.02, thrusters: [0]}, {t: 0.06, thrusters: [2]}, {t: 0.3, thrusters: [0]}]"
+    run, told = flown(script, 1.0, **rules)
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(0.3, rel=1e-12)
+    run, told = flown("[{t: 0, thrusters: [2]}]", 1.0, **{**rules, "wrench_timeout": 0.04})
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(0.1, rel=1e-12)
+    timeouts = [json.loads(line)["time_ns"] for line in told.lines if '"timeout"' in line]
+    assert timeouts == [SECOND // 25]
 
 
 def test_thrusters_time_out_as_an_event_and_clear_wrench_stops_them_at_once() -> None:
@@ -103,9 +102,10 @@ def test_thrusters_time_out_as_an_event_and_clear_wrench_stops_them_at_once() ->
     assert not told.acting and not any('"timeout"' in line for line in told.lines)
 
 
-@pytest.mark.parametrize("lag", [0.0, LAG_S])
-def test_thrusters_replay_to_the_bit_however_often_they_are_looked_at(lag: float) -> None:
-    scene = {**BODY, "thrusters.a": [0.1, 0.2, 0, 1, 0, 1, 5, lag], "thrusters.b": [0, 0, 0.3, 0, 1, 0, 0, lag]}
+@pytest.mark.parametrize("minimum_on_time", [0.0, 0.13])
+def test_thrusters_replay_to_the_bit_however_often_they_are_looked_at(minimum_on_time: float) -> None:
+    scene = {**BODY, "thrusters.a": [0.1, 0.2, 0, 1, 0, 1, 5], "thrusters.b": [0, 0, 0.3, 0, 1, 0]}
+    scene["thruster.minimum_on_time"] = minimum_on_time
     script = "[{t: 0, thrusters: [8, 1]}, {t: 0.4, force: [0, 1, 0]}, {t: 0.51, thrusters: [0, -2]}]"
     run, told = flown(script, 1.0, **{**scene, "wrench_timeout": 0.3})
     again = Resimulation(make_scenario({**scene, "wrench_timeout": 0.3}), told.lines)
@@ -114,14 +114,15 @@ def test_thrusters_replay_to_the_bit_however_often_they_are_looked_at(lag: float
     assert again.simulation.events.sha256 == json.loads(told.lines[-1])["sha256"]
 
 
-def test_decay_is_the_exponential_to_the_last_digit() -> None:
-    x = np.linspace(0.0, 1.0 / 16.0, 101)
-    assert max(abs(_decay(float(v)) - math.exp(-v)) for v in x) <= 1.2e-16
-
-
 @pytest.mark.parametrize(
     ("numbers", "field"),
-    [([0, 0, 0, 0, 0, 0], "thrusters.a"), ([0, 0, 0, 1, 0, 0, -1], "thrusters.a"), ([1, 2, 3], "thrusters.a")],
+    [
+        ([0, 0, 0, 0, 0, 0], "thrusters.a"),
+        ([0, 0, 0, 1, 0, 0, -1], "thrusters.a"),
+        ([1, 2, 3], "thrusters.a"),
+        # A lag is simulated no more.
+        ([0, 0, 0, 1, 0, 0, 5, 0.02], "thrusters.a"),
+    ],
 )
 def test_what_is_no_thruster_is_refused_by_name(numbers, field) -> None:
     with pytest.raises(InputError, match=field):
@@ -136,7 +137,7 @@ def test_the_wrong_number_of_forces_is_refused_with_the_names() -> None:
 
 
 def test_a_scene_keeps_its_thrusters_and_a_command_its_forces() -> None:
-    numbers = [0.0, 0.1, 0.2, 1.0, 0.0, 0.0, 5.0, 0.01]
+    numbers = [0.0, 0.1, 0.2, 1.0, 0.0, 0.0, 5.0]
     scenario = make_scenario({**BODY, "thrusters.tail": numbers})
     assert f"thrusters.tail: {yaml_value(numbers)}" in scenario.text
     (command,) = parse_script("[{t: 0.5, thrusters: [1, -2.5]}]")
