@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.util
 import os
 import re
 import shutil
@@ -20,20 +21,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
-_MEASURED = "coverage" in sys.modules
 _ABSENT: Any = None
 """What Python takes for a module that isn't there."""
-if not _MEASURED:
-    # numba imports it wherever it is installed, a tenth of its own time; it is of use while something is measured.
-    sys.modules["coverage"] = _ABSENT
+# numba imports these wherever they are installed, a quarter of its own time: coverage is of use while something is
+# measured, and scipy for its version and for linear algebra, which no kernel here uses.
+_HIDDEN = [name for name in ("coverage", "scipy") if name not in sys.modules]
+sys.modules.update(dict.fromkeys(_HIDDEN, _ABSENT))
 try:
     import numba
     from numba import config
     from numba.core import event
     from numba.extending import intrinsic as numba_intrinsic
+    from numba.np import arraymath  # looks for scipy's linear algebra, at the first kernel if not here
 finally:
-    if not _MEASURED:
-        del sys.modules["coverage"]
+    for _name in _HIDDEN:
+        del sys.modules[_name]
+arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SLF001  # for kernels of others
 
 __all__ = ["INTERPRETED", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
 

@@ -86,8 +86,10 @@ def check_rates(setup: Setup, knot: Vector | None) -> None:
     if not setup.integrator.chooses:
         return
     mass, moments = setup.body.mass, setup.body.principal_moments.tolist()
-    _check_rate("linear_damping", setup.linear_damping, "N s/m", setup.linear_damping / mass)
-    _check_rate("angular_damping", setup.angular_damping, "N m s", setup.angular_damping / moments[0])
+    _check_rate("linear_damping", setup.linear_damping, mass * FASTEST, "N s/m", setup.linear_damping / mass)
+    _check_rate(
+        "angular_damping", setup.angular_damping, moments[0] * FASTEST, "N m s", setup.angular_damping / moments[0]
+    )
     if knot is None:
         return
     string = setup.string
@@ -96,21 +98,20 @@ def check_rates(setup: Setup, knot: Vector | None) -> None:
     stiffness = mass * string.frequency * string.frequency if string.frequency > 0.0 else string.stiffness
     swing = math.sqrt(stiffness * yields)
     if string.frequency > 0.0:
-        _check_rate("string.frequency", string.frequency, "rad/s", swing)
+        _check_rate("string.frequency", string.frequency, FASTEST / math.sqrt(mass * yields), "rad/s", swing)
     else:
-        _check_rate("string.stiffness", string.stiffness, "N/m", swing, power=2)
-    damping = 2.0 * string.damping_ratio * math.sqrt(stiffness * mass) * yields
-    _check_rate("string.damping_ratio", string.damping_ratio, "", damping)
+        _check_rate("string.stiffness", string.stiffness, FASTEST * FASTEST / yields, "N/m", swing)
+    damping = 2.0 * math.sqrt(stiffness * mass) * yields
+    most = FASTEST / damping if damping > 0.0 else math.inf
+    _check_rate("string.damping_ratio", string.damping_ratio, most, "", string.damping_ratio * damping)
 
 
-def _check_rate(parameter: str, value: float, unit: str, rate: float, power: int = 1) -> None:
-    """power: by which the value grows with the rate [1/s or rad/s]."""
+def _check_rate(parameter: str, value: float, most: float, unit: str, rate: float) -> None:
+    """most: the value that gives the rate FASTEST [1/s or rad/s]."""
     if rate > FASTEST:
-        most = f"{value * (FASTEST / rate) ** power:.3g} {unit}".rstrip()
-        accepted = (
-            f"at most {most} for this body: auto follows rates up to {FASTEST:g} /s, and this is one of {rate:.3g} /s"
-        )
-        raise CommandRefused("integrator", parameter, value, accepted)
+        accepted = f"at most {most:.3g} {unit}".rstrip()
+        why = f"auto follows rates up to {FASTEST:g} /s, and this is one of {rate:.3g} /s"
+        raise CommandRefused("integrator", parameter, value, f"{accepted} for this body: {why}")
 
 
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:

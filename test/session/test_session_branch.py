@@ -89,7 +89,8 @@ FEATURES = {
     "contacts.tip": [0.0, 0.0, 0.07],
     "thrusters.main": [0.0, 0.0, 0.07, 0.0, 1.0, 0.0],
     "thrusters.side": [0.0, 0.02, 0.0, 1.0, 0.0, 0.0, 0.05],
-    "thruster.minimum_on_time": 0.2,
+    "thruster.bidirectional": True,
+    "thruster.minimum_on_time": 0.5,
     "string.timeout": 0.4,
     "string.stiffness": 2.0,
     "wrench_timeout": 0.6,
@@ -215,8 +216,8 @@ def test_a_branch_that_was_edited_begins_with_its_state_under_what_acted():
     assert heavy.string.frequency == pytest.approx(8.0)
     short = begun(wrench_timeout=0.1)
     short.advance(1)
-    # The poke, and the thruster that has to stay on.
-    assert [acting.shown_kind for acting in short.acting] == ["poke", "thruster"]
+    # The poke, and the thrusters, which have to stay on.
+    assert [acting.shown_kind for acting in short.acting] == ["poke", "thruster", "thruster"]
     # Without the rest nothing acts.
     alone = begun(initial__flight="")
     assert not alone.acting and alone.string is None
