@@ -20,7 +20,7 @@ MODULES = {
 }
 ORDER = (
     *("base", "mesh", "mass", "motion", "simulation", "messages", "scene", "session"),
-    *("rerun_view", "live", "ros", "workbench", "sweep", "identify", "export", "robots", "cli"),
+    *("picture", "rerun_view", "live", "ros", "workbench", "sweep", "identify", "export", "robots", "cli"),
 )
 """Folders in the order of imports: each knows only those before it."""
 STRANGERS = {

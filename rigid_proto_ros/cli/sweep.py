@@ -16,6 +16,7 @@ from .options import add_json
 
 if TYPE_CHECKING:
     from ..sweep.study import Study
+    from ..sweep.variation import Variation
 
 EXAMPLES = (
     ("rigid_proto sweep box_tensor -o out/box_tensor.parquet", "a bundled study, on all cores"),
@@ -36,8 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resume", action="store_true", help="continue a run that was stopped or killed")
     parser.add_argument("--yes", action="store_true", help="allow more than ten million rows")
     parser.add_argument("--row", type=int, metavar="N", help="simulate one row only")
-    parser.add_argument("--ghosts", metavar="N,N,...", help="with --record: these rows side by side in one recording")
-    parser.add_argument("--record", metavar="FILE.rrd", help="with --row or --ghosts: record it for Rerun")
+    parser.add_argument("--record", metavar="FILE.rrd", help="with --row: record it for Rerun")
     parser.add_argument(
         "--as-scene", metavar="FILE.yaml", help="with --row: write it as a scene, and its script beside"
     )
@@ -51,16 +51,12 @@ def run(args: argparse.Namespace) -> int:
 
     if args.threads < 0 or args.threads > 1024:
         raise InputError("--threads", args.threads, "1 to 1024, or 0 for one per core")
-    if args.ghosts is not None and args.row is not None:
-        raise InputError("--ghosts", "can't be combined with --row")
-    for option, needs in (("record", "--row or --ghosts"), ("as_scene", "--row")):
-        if getattr(args, option) and args.row is None and (option == "as_scene" or args.ghosts is None):
-            raise InputError(f"--{option.replace('_', '-')}", f"needs {needs}")
+    for option in ("record", "as_scene"):
+        if getattr(args, option) and args.row is None:
+            raise InputError(f"--{option.replace('_', '-')}", "needs --row")
     study = read_study(args.study, args.yes)
     if args.row is not None:
         return _one_row(study, args)
-    if args.ghosts is not None:
-        return _ghosts(study, args)
     return _whole(study, args)
 
 
@@ -112,14 +108,13 @@ def _row_number(text: str | int, study: Study) -> int:
 def _one_row(study: Study, args: argparse.Namespace) -> int:
     from ..sweep.chunk import row_summary
     from ..sweep.variation import variation, write_scene
-    from .sweep_recordings import record_row
 
     row = _row_number(args.row, study)
     summary = row_summary(study, row)
     if args.as_scene:
         summary.update(write_scene(study, variation(study, row), Path(args.as_scene), summary["time"]))
     if args.record:
-        record_row(study, variation(study, row), args.record, _print)
+        _record_row(study, variation(study, row), args.record)
         summary["recorded"] = args.record
     if args.json:
         print(json.dumps(summary))
@@ -129,15 +124,17 @@ def _one_row(study: Study, args: argparse.Namespace) -> int:
     return 1 if summary["failure"] else 0
 
 
-def _ghosts(study: Study, args: argparse.Namespace) -> int:
-    from .sweep_recordings import MAX_GHOSTS, record_ghosts
+def _record_row(study: Study, row: Variation, file: str) -> None:
+    """Fly the row once more with a recorder that sees everything."""
+    from ..rerun_view.session_files import make_recorder
+    from ..scene.offline import OfflineRun
 
-    rows = [_row_number(text, study) for text in args.ghosts.split(",")]
-    if not args.record or not 1 <= len(rows) <= MAX_GHOSTS:
-        raise InputError("--ghosts", args.ghosts, f"1 to {MAX_GHOSTS} rows, with --record FILE.rrd")
-    record_ghosts(study, rows, args.record)
-    print(json.dumps({"recorded": args.record, "rows": rows}) if args.json else f"recorded {args.record}")
-    return 0
+    OfflineRun(row.scenario, row.commands)  # a row that is refused overwrites no recording
+    observer = make_recorder(file, parameters=row.parameters, on_error=_print, simulated_log=True)
+    try:
+        OfflineRun(row.scenario, row.commands, observer).advance(study.duration_ns)
+    finally:
+        observer.close()
 
 
 def _print(message: str) -> None:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import InputError
-from ..rerun_view.surface_normals import shaded_surface
+from ..picture.surface import shaded_surface
 from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
-from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
-from ..rerun_view.string_curve import POINTS
+from ..picture.string import POINTS
+from ..picture.style import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from .animation import Animation
 from .flight_record import DrawnBody, DrawnMesh, FlightRecord
 from .interpolation import Keys

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import InputError
-from ..rerun_view.inertia_shapes import PrincipalFrame
+from ..mass.tensor import equimomental_shapes, principal_axes
 from .flight_record import DrawnBody, FlightRecord
 from .interpolation import attitude_angles, blend
 from .state_source import POSE, StateSource
@@ -55,7 +55,8 @@ def body_size(record: FlightRecord) -> float:
     def size(drawn: DrawnBody) -> float:
         if drawn.mesh >= 0:
             return float(np.linalg.norm(np.ptp(record.meshes[drawn.mesh].vertices, axis=0) * drawn.body.scale))
-        return float(np.linalg.norm(PrincipalFrame.of(drawn.body.inertia).box_sides(drawn.body.mass)))
+        moments, _ = principal_axes(drawn.body.inertia)
+        return float(np.linalg.norm(equimomental_shapes(drawn.body.mass, moments)[0]))
 
     return min(map(size, record.bodies), default=0.0) or 1.0
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.rotation import matrix_from_quaternion
-from ..rerun_view.string_curve import curve_points, sags
+from ..picture.string import curve_points, sags
 from ..simulation.observer import ShownString
 from .flight_record import FlightRecord
 from .interpolation import Keys, fewest_keys, rounded

@@ -14,8 +14,8 @@ import numpy as np
 from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
-from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
-from ..rerun_view.inertia_shapes import PrincipalFrame
+from ..mass.tensor import principal_axes
+from ..picture.style import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
 from ..simulation.observer import BodySnapshot
 from .animation import Animation
 from .flight_record import DrawnMesh, FlightRecord
@@ -212,9 +212,9 @@ def _add_mass(mass: Any, steps: list[tuple[float, BodySnapshot]], rate: float) -
     attributes = mass.CreateMassAttr(), mass.CreateDiagonalInertiaAttr(), mass.CreatePrincipalAxesAttr()
     before: tuple[Any, ...] | None = None
     for seconds, body in steps:
-        frame = PrincipalFrame.of(np.asarray(body.inertia, dtype=float))
-        x, y, z, w = quaternion_from_matrix(frame.axes).tolist()
-        values = body.mass, Gf.Vec3f(*frame.moments.tolist()), Gf.Quatf(w, x, y, z)
+        moments, axes = principal_axes(body.inertia)
+        x, y, z, w = quaternion_from_matrix(axes).tolist()
+        values = body.mass, Gf.Vec3f(*moments.tolist()), Gf.Quatf(w, x, y, z)
         for n, attribute in enumerate(attributes):
             if before is None:
                 attribute.Set(values[n])

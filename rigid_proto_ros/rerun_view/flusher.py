@@ -8,16 +8,13 @@ a recording of its own; see observer.py for what users see of that.
 from __future__ import annotations
 
 import threading
-import time
 import uuid
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
 from ..simulation.mailbox import Block, Mailbox, Mark
 from .rerun_internals import forget_closed_recordings
-from .rrd_file import add_index
 from .streams import (
     FileStream,
     LiveServer,
@@ -28,9 +25,6 @@ from .writer import SceneWriter
 
 FLUSH_PERIOD_S = 0.5
 """What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead."""
-
-INDEX_S = 3.0
-"""What the files of a session may take for their index, all together: whoever ends a node waits 5 s for it."""
 
 TIMEOUT_S = 10.0
 """A disk that doesn't take what waits in this time is given up."""
@@ -53,7 +47,6 @@ class Flusher:
         self._run = 1
         self._on_error = on_error
         self._open_ended = open_ended
-        self._without_index: list[Path] = []
         self._writer = SceneWriter(initial_view)
         self._ghost_block: Block | None = None
         self._ghost_sent = 0
@@ -109,8 +102,6 @@ class Flusher:
             closing = self.mailbox.closed
             try:
                 self._flush()
-                if closing:
-                    self._writer.send_pictures()
             except Exception as error:
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
                 self._finish_file()
@@ -192,12 +183,13 @@ class Flusher:
         self.run_id = uuid.uuid4().hex
         for stream in streams:
             if isinstance(stream, FileStream):
-                writer.fit_axes(stream)
+                writer.finish(stream)
         writer.streams.clear()
         writer.restart()
         for stream in streams:
             if isinstance(stream, LiveStream) and self.server is not None:
                 live = self.server.open_run(self.run_id, self.run_name)
+                live.subject = stream.subject  # viewers keep the layout from run to run
                 self.server.end_run(stream)
                 writer.attach(live)
             elif isinstance(stream, FileStream):
@@ -205,7 +197,7 @@ class Flusher:
                     stream.close()
                     if moved:
                         kept = f"{stream.path.stem}.run{self._run - 1}{stream.path.suffix}"
-                        self._without_index.append(stream.path.rename(stream.path.with_name(kept)))
+                        stream.path.rename(stream.path.with_name(kept))
                     file = FileStream(stream.path, self.run_id, self.run_name, self._open_ended)
                 except (OSError, InputError) as error:
                     self._lost(str(error))
@@ -222,25 +214,10 @@ class Flusher:
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
             self._writer.streams.remove(stream)
             try:
-                self._writer.send_pictures()
-                self._writer.fit_axes(stream)
+                self._writer.finish(stream)
                 stream.close()
             except OSError as error:
                 self._lost(str(error))
-                continue
-            self._without_index.append(stream.path)
-        self._add_indices()
-
-    def _add_indices(self) -> None:
-        """What a file of unknown length lacks, once it is whole; a process that is killed meanwhile
-        leaves it as it was.
-        """
-        end = time.monotonic() + INDEX_S
-        while self._open_ended and self._without_index:
-            path = self._without_index.pop(0)
-            reason = add_index(path, max(0.0, end - time.monotonic()))
-            if reason:
-                self._on_error(f"{path}: no index ({reason}); rigid_proto replay {path} --repair COPY.rrd makes one")
 
     def _give_up_file(self, error: OSError) -> None:
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:

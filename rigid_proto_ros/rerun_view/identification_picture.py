@@ -14,17 +14,16 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from . import appearance
+from ..mass.tensor import equimomental_shapes, principal_axes
+from ..picture import style
+from ..picture.surface import shaded_surface
 from . import entities as e
-from .columns import scalar_columns, time_columns
-from .inertia_shapes import PrincipalFrame
-from .statics import drawn_mesh
+from .backend import drawn_mesh, scalar_columns, time_columns
 from .streams import FileStream, Stream
-from .surface_normals import shaded_surface
 
 ELLIPSOIDS = "ellipsoids"
 REPORT = "report"
-FOUND_COLOUR, OTHERS_COLOUR = appearance.GHOST_COLOUR, appearance.ORANGE
+FOUND_COLOUR, OTHERS_COLOUR = style.GHOST_COLOUR, style.ORANGE
 APART = 2.6
 """Of ellipsoids side by side, in the largest semi-axis of all."""
 TRACK_SAMPLES_MAX = 20_000
@@ -83,7 +82,7 @@ def record_identification(
     stream = FileStream(Path(path), str(uuid.uuid4()), "identified from motion")
     try:
         stream.recording.send_blueprint(_blueprint(flights, tensors))
-        stream.log_static(e.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        stream.log_static(style.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         stream.log_static(REPORT, rr.TextDocument(f"```\n{report}\n```", media_type="text/markdown"))
         size = _size(tensors, mesh)
         for number, flight in enumerate(flights, 1):
@@ -99,33 +98,33 @@ def _size(tensors: Sequence[DrawnTensor], mesh: tuple[np.ndarray, np.ndarray] | 
         return float(np.linalg.norm(np.ptp(mesh[0], axis=0)))
     if not tensors:
         return 0.2
-    return 2.0 * float(PrincipalFrame.of(tensors[0].inertia).ellipsoid_semi_axes(tensors[0].mass).max())
+    return 2.0 * _reach(tensors[0])
 
 
 def _send_flight(
     stream: Stream, number: int, flight: TrackedFlight, mesh: tuple[np.ndarray, np.ndarray] | None, size: float
 ) -> None:
-    measured, fitted = f"{e.WORLD}/measured_{number}", f"{e.WORLD}/fitted_{number}"
+    measured, fitted = f"{style.WORLD}/measured_{number}", f"{style.WORLD}/fitted_{number}"
     # The pose as it came, with the mesh on it, and the fitted one drawn through it.
     if len(flight.measured_positions) and len(flight.measured_attitudes):
         times = time_columns(flight.measured_times_ns, flight.measured_times_ns)
         poses = rr.Transform3D.columns(translation=flight.measured_positions, quaternion=flight.measured_attitudes)
         stream.send(measured, times, poses)
-        _send_body(stream, measured, mesh, (*appearance.BODY_COLOUR, 255), size)
+        _send_body(stream, measured, mesh, (*style.BODY_COLOUR, 255), size)
     if len(flight.measured_positions):
         every = 1 + len(flight.measured_positions) // TRACK_SAMPLES_MAX
-        points = rr.Points3D(flight.measured_positions[::every], colors=[appearance.TRAIL_COLOUR], radii=[0.01 * size])
-        stream.log_static(f"{e.WORLD}/measured_track_{number}", points)
+        points = rr.Points3D(flight.measured_positions[::every], colors=[style.TRAIL_COLOUR], radii=[0.01 * size])
+        stream.log_static(f"{style.WORLD}/measured_track_{number}", points)
     times = time_columns(flight.times_ns, flight.times_ns)
     stream.send(fitted, times, rr.Transform3D.columns(translation=flight.positions, quaternion=flight.attitudes))
-    _send_body(stream, fitted, mesh, (*appearance.GHOST_COLOUR, 110), size)
+    _send_body(stream, fitted, mesh, (*style.GHOST_COLOUR, 110), size)
     every = 1 + len(flight.positions) // TRACK_SAMPLES_MAX
-    line = rr.LineStrips3D([flight.positions[::every]], colors=[appearance.GHOST_COLOUR], radii=[0.005 * size])
-    stream.log_static(f"{e.WORLD}/fitted_track_{number}", line)
+    line = rr.LineStrips3D([flight.positions[::every]], colors=[style.GHOST_COLOUR], radii=[0.005 * size])
+    stream.log_static(f"{style.WORLD}/fitted_track_{number}", line)
     for k, left in enumerate(flight.residuals):
         entity = _plot(number, k)
         names = rr.SeriesPoints(
-            names=["x", "y", "z"], colors=appearance.AXES_COLOURS, marker_sizes=[2.0] * 3, markers=["circle"] * 3
+            names=["x", "y", "z"], colors=style.AXES_COLOURS, marker_sizes=[2.0] * 3, markers=["circle"] * 3
         )
         stream.log_static(entity, names)
         stream.send(entity, time_columns(left.times_ns, left.times_ns), scalar_columns(left.scaled))
@@ -139,7 +138,7 @@ def _send_body(
         return
     axes = rr.Arrows3D(
         vectors=0.5 * size * np.eye(3),
-        colors=[(*axis, colour[3]) for axis in appearance.AXES_COLOURS],
+        colors=[(*axis, colour[3]) for axis in style.AXES_COLOURS],
         radii=0.02 * size,
     )
     stream.log_static(f"{entity}/axes", axes)
@@ -171,7 +170,13 @@ def _send_ellipsoids(stream: Stream, tensors: Sequence[DrawnTensor]) -> None:
 
 def _reach(tensor: DrawnTensor) -> float:
     """The ellipsoid's largest semi-axis [m]."""
-    return float(PrincipalFrame.of(tensor.inertia).ellipsoid_semi_axes(tensor.mass).max())
+    return float(_ellipsoid(tensor)[0].max())
+
+
+def _ellipsoid(tensor: DrawnTensor) -> tuple[np.ndarray, np.ndarray]:
+    """Semi-axes (3,) [m] and axes (3, 3), columns, of the ellipsoid of equal mass and inertia."""
+    moments, axes = principal_axes(tensor.inertia)
+    return equimomental_shapes(tensor.mass, moments)[1], axes
 
 
 def _send_ellipsoid(
@@ -182,11 +187,11 @@ def _send_ellipsoid(
     colour: tuple[int, ...],
     is_named: bool = True,
 ) -> None:
-    frame = PrincipalFrame.of(tensor.inertia)
-    stream.log_static(entity, rr.Transform3D(translation=tensor.center_of_mass + place, mat3x3=frame.axes))
+    semi_axes, axes = _ellipsoid(tensor)
+    stream.log_static(entity, rr.Transform3D(translation=tensor.center_of_mass + place, mat3x3=axes))
     is_found = colour == FOUND_COLOUR
     shape = rr.Ellipsoids3D(
-        half_sizes=[frame.ellipsoid_semi_axes(tensor.mass)],
+        half_sizes=[semi_axes],
         colors=[colour],
         fill_mode="majorwireframe",
         labels=[tensor.label] if is_found else None,
@@ -225,7 +230,7 @@ def _blueprint(flights: Sequence[TrackedFlight], tensors: Sequence[DrawnTensor])
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
-                rrb.Spatial3DView(origin="/" + e.WORLD, name="Measured motion, and the fitted one as a ghost"),
+                rrb.Spatial3DView(origin="/" + style.WORLD, name="Measured motion, and the fitted one as a ghost"),
                 rrb.Vertical(
                     rrb.Spatial3DView(
                         origin="/" + ELLIPSOIDS,

@@ -18,7 +18,7 @@ from ..mass.export import quaternion_wxyz
 from ..mass.inspection import Inspection
 from ..mass.model_difference import ModelDifference
 from ..mass.tensor import equimomental_shapes, principal_axes
-from .surface_normals import shaded_surface
+from ..picture.surface import shaded_surface
 
 MESH_COLOR = (150, 170, 190, 230)
 AXIS_COLORS = ((220, 70, 60), (70, 170, 80), (70, 110, 220))

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from . import appearance
+from ..picture import style
 from . import entities as e
 
 TRAIL_SECONDS = 3.0
@@ -25,9 +25,6 @@ LEGEND_ROOM = 0.45
 """Width left free for the legend at the right end of a plot, in widths of the curves; the longest takes
 .42 of a small plot.
 """
-
-BACKGROUND = (24, 27, 34)
-
 
 FAR_SECONDS = 3600.0
 """[simulated s] Of the path of a COM that falls: all of it."""
@@ -55,74 +52,145 @@ class Subject:
         return self.ghost or self.skewed
 
 
-@dataclass(frozen=True)
-class Layout:
-    """A blueprint, its views of the body, and its plots by entity."""
-
-    blueprint: Any
-    body_views: tuple[Any, ...]
-    plots: dict[str, list[Any]]
-
-
-class PlotViews:
-    """Makes plots, and remembers which."""
-
-    def __init__(self) -> None:
-        self.made: dict[str, list[Any]] = {}
-
-    def plot(self, entity: str) -> Any:
-        """Scalars of one entity over time."""
-        view = rrb.TimeSeriesView(
-            origin="/" + entity,
-            name=TITLES[entity],
-            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(e.SERIES[entity]) > 1),
-            axis_x=time_axis(),
-            time_ranges=_up_to_cursor(rrb.TimeRangeBoundary.infinite()),
-        )
-        self.made.setdefault(entity, []).append(view)
-        return view
-
-
 def _title(name: str, unit: str) -> str:
     return f"{name} [{unit}]"
 
 
 TITLES = {
-    e.ENERGY: _title(appearance.ENERGY_TITLE, appearance.ENERGY_UNIT),
-    e.ANGULAR_VELOCITY_PRINCIPAL: _title(appearance.OMEGA_TITLE, appearance.OMEGA_UNIT),
-    e.ANGULAR_MOMENTUM: _title(appearance.MOMENTUM_TITLE, appearance.MOMENTUM_UNIT),
-    e.ANGULAR_MOMENTUM_ANGLE: _title(appearance.MOMENTUM_ANGLE_TITLE, appearance.ANGLE_UNIT),
-    e.GHOST_ANGLE: _title(appearance.GHOST_ANGLE_TITLE, appearance.ANGLE_UNIT),
-    e.POSITION: "Position of the COM [m]",
-    e.STRING_TENSION: "Tension of the string [N]",
-    e.STRING_LINE_DISTANCE: "Distance of the COM from the string's line [m]",
-    e.DRIFT: "Drift since the last command",
-    e.EFFORT: "Effort per simulated second",
+    style.ENERGY: _title(style.ENERGY_TITLE, style.ENERGY_UNIT),
+    style.ANGULAR_VELOCITY_PRINCIPAL: _title(style.OMEGA_TITLE, style.OMEGA_UNIT),
+    style.ANGULAR_MOMENTUM: _title(style.MOMENTUM_TITLE, style.MOMENTUM_UNIT),
+    style.ANGULAR_MOMENTUM_ANGLE: _title(style.MOMENTUM_ANGLE_TITLE, style.ANGLE_UNIT),
+    style.GHOST_ANGLE: _title(style.GHOST_ANGLE_TITLE, style.ANGLE_UNIT),
+    style.POSITION: "Position of the COM [m]",
+    style.STRING_TENSION: "Tension of the string [N]",
+    style.STRING_LINE_DISTANCE: "Distance of the COM from the string's line [m]",
+    style.DRIFT: "Drift since the last command",
+    style.EFFORT: "Effort per simulated second",
 }
 
+LESSON_HIDES = (style.BOUNDING_BOX, style.INERTIA_BOX, style.INERTIA_ELLIPSOID, style.PRINCIPAL_AXES)
+PLAIN_HIDES = (
+    *(*LESSON_HIDES, style.BODY_AXES, style.OMEGA, style.MOMENTUM),
+    *(style.TRAIL, style.COM_TRAIL, style.STRING_LINE),
+)
+"""What views of the body leave out; everything else below ``world`` is shown."""
 
-def layout(initial_view: str, subject: Subject) -> Layout:
-    """Three tabs, ``initial_view`` in front."""
-    plots = PlotViews()
-    lesson_hides = tuple(entity for entity in LESSON if not (subject.boxed and entity == e.BOUNDING_BOX))
-    body_views = (
-        body_view("Motion", lesson_hides, subject),
-        body_view("All shapes", DEBUGGING, subject),
-        body_view("Plain", PLAIN, subject),
-    )
-    tabs = {
-        "lesson": lesson_layout(body_views[0], subject, plots),
-        "debugging": debugging(body_views[1], plots),
-        "plain": body_views[2],
-    }
-    blueprint = rrb.Blueprint(
-        rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
-        rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        auto_views=False,
-    )
-    return Layout(blueprint, body_views, plots.made)
+
+@dataclass(frozen=True)
+class Finished:
+    """A run that is complete: duration_s [simulated], the ends of the axis of each plot that has values, by name, and
+    whether any command was logged.
+    """
+
+    duration_s: float
+    axes: dict[str, tuple[float, float]]
+    commanded: bool
+
+
+class Layout:
+    """Makes the views for what a flight is about; of one that goes on all that may come to show something, of one that
+    is finished those that do.
+    """
+
+    def __init__(self, subject: Subject, finished: Finished | None = None) -> None:
+        self._subject = subject
+        self._finished = finished
+
+    def blueprint(self, initial_view: str) -> Any:
+        """Three tabs, ``initial_view`` in front."""
+        boxed = self._subject.boxed
+        hidden = tuple(name for name in LESSON_HIDES if not (boxed and name == style.BOUNDING_BOX))
+        tabs = {
+            "lesson": self._lesson(self._body_view("Motion", hidden)),
+            "debugging": self._debugging(self._body_view("All shapes", ())),
+            "plain": self._body_view("Plain", PLAIN_HIDES),
+        }
+        return rrb.Blueprint(
+            rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
+            rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
+            rrb.BlueprintPanel(state="collapsed"),
+            rrb.SelectionPanel(state="collapsed"),
+            auto_views=False,
+        )
+
+    def _lesson(self, flight: Any) -> Any:
+        """How the tensor governs the motion: the flight, and beside it what tells most of a flight of its kind."""
+        subject = self._subject
+        poinsot = [poinsot_view()]
+        if subject.ghost:
+            # How far the two have come apart matters more than the energy, which both keep.
+            names = [style.GHOST_ANGLE, style.ANGULAR_VELOCITY_PRINCIPAL, style.ANGULAR_MOMENTUM]
+        elif subject.dropped_term:
+            poinsot = []
+            names = [style.ANGULAR_MOMENTUM_ANGLE, style.ANGULAR_MOMENTUM, style.ENERGY]
+        elif subject.tied:
+            poinsot = []
+            names = [style.STRING_LINE_DISTANCE, style.STRING_TENSION, style.ENERGY]
+        elif subject.falls:
+            poinsot = []
+            names = [style.POSITION, style.ANGULAR_VELOCITY_PRINCIPAL, style.ENERGY]
+        else:
+            names = [style.ANGULAR_VELOCITY_PRINCIPAL, style.ANGULAR_MOMENTUM, style.ENERGY]
+        plots = [self._plot(name) for name in names if self._shows(name)]
+        views = [flight, command_view()] if self._finished is None or self._finished.commanded else [flight]
+        return rrb.Horizontal(
+            rrb.Vertical(*views, row_shares=[5, 1][: len(views)]),
+            # Nearly equal shares: a smaller plot has no room for the four lines of a legend.
+            rrb.Vertical(*poinsot, *plots, row_shares=[5] * len(poinsot) + [4] * len(plots)),
+            column_shares=[3, 2],
+            name="Lesson",
+        )
+
+    def _debugging(self, flight: Any) -> Any:
+        """Everything that is logged: every plot, the state line, the event lines as they are."""
+        logs = [rrb.TextDocumentView(origin=e.SCENE, name="Scene")]
+        if self._finished is None or self._finished.commanded:
+            logs = [rrb.TextLogView(origin=e.EVENTS, name="Events"), command_view(), *logs]
+        return rrb.Horizontal(
+            rrb.Vertical(
+                flight,
+                rrb.StateTimelineView(origin=e.STATUS, name="State"),
+                rrb.Tabs(*logs),
+                row_shares=[9, 9, 4],
+            ),
+            rrb.Grid(*(self._plot(name) for name in TITLES if self._shows(name)), grid_columns=2),
+            name="Debugging",
+        )
+
+    def _shows(self, plot: str) -> bool:
+        """Whether a plot has, or may come to have, something to show."""
+        if self._finished is not None:
+            return plot in self._finished.axes
+        return self._subject.ghost or plot != style.GHOST_ANGLE
+
+    def _plot(self, name: str) -> Any:
+        """Scalars of one entity over time."""
+        return rrb.TimeSeriesView(
+            origin="/" + name,
+            name=TITLES[name],
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(style.SERIES[name]) > 1),
+            axis_x=_time_axis(None if self._finished is None else self._finished.duration_s),
+            time_ranges=_up_to_cursor(rrb.TimeRangeBoundary.infinite()),
+            axis_y=None if self._finished is None else rrb.ScalarAxis(range=self._finished.axes[name]),
+        )
+
+    def _body_view(self, name: str, hidden: tuple[str, ...]) -> Any:
+        """The body in the world, followed by the camera, with its trail."""
+        return rrb.Spatial3DView(
+            origin="/" + e.VIEW,
+            contents=[f"+ /{style.WORLD}/**", *(f"- /{entity}/**" for entity in hidden)],
+            name=name,
+            line_grid=rrb.LineGrid3D(visible=False),
+            eye_controls=camera(self._subject),
+            overrides={
+                "/" + trail: [] if trail in hidden else [_last_seconds(seconds)]
+                for trail, seconds in (
+                    (style.TRAIL, TRAIL_SECONDS),
+                    (style.COM_TRAIL, FAR_SECONDS if self._subject.falls else TRAIL_SECONDS),
+                )
+            },
+        )
 
 
 def camera(subject: Subject) -> Any:
@@ -131,86 +199,19 @@ def camera(subject: Subject) -> Any:
         # Beside the plane of a throw along x, and above the body, where it has come from.
         middle = np.array([-0.1, 0.0, 0.2])
         return _orbital(PATH_SIZES * (middle + [0.3, -1.2, 0.2]), PATH_SIZES * middle)
-    return _orbital(np.array([0.95, -0.75, 0.5]), np.zeros(3))
+    return _orbital(np.array([1.25, -1.0, 0.65]), np.zeros(3))
 
 
 def _orbital(position: np.ndarray, target: np.ndarray) -> Any:
     return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=[0.0, 0.0, 1.0])
 
 
-def lesson_layout(flight: Any, subject: Subject, plots: PlotViews) -> Any:
-    """How the tensor governs the motion: the flight, and beside it what tells most of a flight of its kind."""
-    if subject.ghost:
-        # How far the two have come apart matters more than the energy, which both keep.
-        beside = [poinsot_view(), e.GHOST_ANGLE, e.ANGULAR_VELOCITY_PRINCIPAL, e.ANGULAR_MOMENTUM]
-    elif subject.dropped_term:
-        beside = [e.ANGULAR_MOMENTUM_ANGLE, e.ANGULAR_MOMENTUM, e.ENERGY]
-    elif subject.tied:
-        beside = [e.STRING_LINE_DISTANCE, e.STRING_TENSION, e.ENERGY]
-    elif subject.falls:
-        beside = [e.POSITION, e.ANGULAR_VELOCITY_PRINCIPAL, e.ENERGY]
-    else:
-        beside = [poinsot_view(), e.ANGULAR_VELOCITY_PRINCIPAL, e.ANGULAR_MOMENTUM, e.ENERGY]
-    views = [plots.plot(view) if isinstance(view, str) else view for view in beside]
-    return rrb.Horizontal(
-        rrb.Vertical(flight, command_view(), row_shares=[5, 1]),
-        # Nearly equal shares: a smaller plot has no room for the four lines of a legend.
-        rrb.Vertical(*views, row_shares=[4 if isinstance(view, str) else 5 for view in beside]),
-        column_shares=[3, 2],
-        name="Lesson",
-    )
-
-
-def debugging(flight: Any, plots: PlotViews) -> Any:
-    """Everything that is logged: every plot, the state line, the event lines as they are."""
-    return rrb.Horizontal(
-        rrb.Vertical(
-            flight,
-            rrb.StateTimelineView(origin=e.STATUS, name="State"),
-            rrb.Tabs(
-                rrb.TextLogView(origin=e.EVENTS, name="Events"),
-                command_view(),
-                rrb.TextDocumentView(origin=e.SCENE, name="Scene"),
-            ),
-            row_shares=[9, 9, 4],
-        ),
-        rrb.Grid(*(plots.plot(entity) for entity in TITLES), grid_columns=2),
-        name="Debugging",
-    )
-
-
-# What the flight views leave out; everything else below ``world`` is shown.
-LESSON = (e.BOUNDING_BOX, e.INERTIA_BOX, e.INERTIA_ELLIPSOID)
-DEBUGGING: tuple[str, ...] = ()
-PLAIN = (*LESSON, e.BODY_AXES, e.ANGULAR_VELOCITY, e.MOMENTUM, e.TRAIL, e.COM_TRAIL, e.STRING_LINE)
-
-
-def body_view(name: str, hidden: tuple[str, ...], subject: Subject) -> Any:
-    """The body in the world, followed by the camera, with its trail."""
-    return rrb.Spatial3DView(
-        origin="/" + e.VIEW,
-        contents=[f"+ /{e.WORLD}/**", *(f"- /{entity}/**" for entity in hidden)],
-        name=name,
-        background=list(BACKGROUND),
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=camera(subject),
-        overrides={
-            "/" + trail: [] if trail in hidden else [_last_seconds(seconds)]
-            for trail, seconds in (
-                (e.TRAIL, TRAIL_SECONDS),
-                (e.COM_TRAIL, FAR_SECONDS if subject.falls else TRAIL_SECONDS),
-            )
-        },
-    )
-
-
 def poinsot_view() -> Any:
     """The ellipsoid of inertia rolling on the invariable plane."""
     return rrb.Spatial3DView(
-        origin="/" + e.POINSOT,
+        origin="/" + style.POINSOT,
         contents="$origin/**",
         name="Poinsot: the inertia ellipsoid rolls on the invariable plane",
-        background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
@@ -218,7 +219,7 @@ def poinsot_view() -> Any:
             look_target=[0.0, 0.0, -0.45],
             eye_up=[0.0, 0.0, 1.0],
         ),
-        overrides={"/" + e.POINSOT_HERPOLHODE: [_last_seconds(HERPOLHODE_SECONDS)]},
+        overrides={"/" + style.POINSOT_HERPOLHODE: [_last_seconds(HERPOLHODE_SECONDS)]},
     )
 
 
@@ -235,7 +236,7 @@ def _up_to_cursor(start: Any) -> Any:
     )
 
 
-def time_axis(duration_s: float | None = None) -> Any:
+def _time_axis(duration_s: float | None = None) -> Any:
     """Time axis of the plots of a run that has ended after ``duration_s``, or that goes on. Curves end at the cursor,
     and room for the legend follows. Ends relative to the cursor hold on both timelines, absolute ones on one alone.
     """

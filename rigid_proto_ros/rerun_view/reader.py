@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
+from ..picture.style import BODY_MESH
 from ..session.recorded_session import RecordedSession
 from . import entities as e
 from .rrd_file import whole_bytes, whole_part
@@ -92,7 +93,7 @@ def _read(path: Path, session: RecordedSession) -> None:
             _read_properties(entity, batch, session)
         elif entity == e.SCENE:
             session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
-        elif entity.startswith(e.BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
+        elif entity.startswith(BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
             session.mesh_chunks += 1
         elif entity.startswith(e.SESSION_MESH) and (first_mesh is None or entity <= first_mesh):
             # A run may have had several; it began with the first.

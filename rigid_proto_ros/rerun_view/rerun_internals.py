@@ -3,8 +3,7 @@
 
 Tried with rerun-sdk 0.41.0; test_rerun_internals.py says which of these names another version lacks.
 
-* ``rr.send_blueprint`` keeps a stream of every layout for ever: two threads and a third of a megabyte each. A layout
-  that is kept here can be sent again with other cameras.
+* ``rr.send_blueprint`` keeps a stream of every layout for ever: two threads and a third of a megabyte each.
 * The SDK keeps threads and memory of recordings that are closed until the process ends, and offers nothing to let go
   of them.
 """
@@ -20,30 +19,18 @@ from rerun.recording_stream import RecordingStream
 # ruff: noqa: SLF001 (what this module is for)
 
 
-class BlueprintStream:
-    """A layout's own stream: what is logged to it is sent to any recording, as often as wanted."""
-
-    def __init__(self, application_id: str, blueprint: Any) -> None:
-        self._stream = RecordingStream._from_native(
-            rerun_bindings.new_blueprint(
-                application_id=application_id, make_default=False, make_thread_default=False, default_enabled=True
-            )
+def send_blueprint(application_id: str, blueprint: Any, recording: rr.RecordingStream) -> None:
+    """Make a blueprint the layout of a recording, in force and default."""
+    stream = RecordingStream._from_native(
+        rerun_bindings.new_blueprint(
+            application_id=application_id, make_default=False, make_thread_default=False, default_enabled=True
         )
-        self._stream.set_time("blueprint", sequence=0)
-        blueprint._log_to_stream(self._stream)
-        self._messages = self._stream.memory_recording().storage
-
-    def log(self, path: str, value: Any) -> None:
-        """Change one part of the layout."""
-        self._stream.log(path, value)
-
-    def send(self, recording: rr.RecordingStream) -> None:
-        """Make it the layout of a recording, in force and default."""
-        rerun_bindings.send_blueprint(self._messages, True, True, recording=recording.to_native())
-
-    def close(self) -> None:
-        """Let go of the SDK's threads."""
-        self._stream.disconnect()
+    )
+    stream.set_time("blueprint", sequence=0)
+    blueprint._log_to_stream(stream)
+    messages = stream.memory_recording().storage
+    rerun_bindings.send_blueprint(messages, True, True, recording=recording.to_native())
+    stream.disconnect()
 
 
 def forget_closed_recordings() -> None:

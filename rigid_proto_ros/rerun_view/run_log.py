@@ -6,13 +6,17 @@ of what holds since when.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import rerun as rr
 
 from . import entities as e
-from .columns import Send, one_time, time_columns
+from .backend import time_columns
+
+Send = Callable[[str, list[Any], Any], None]
+"""Sends (entity, time columns, component columns) to whoever is to get them."""
 
 
 class StateTimeline:
@@ -43,8 +47,9 @@ class StateTimeline:
 
     def repeat(self, time_ns: int, wall_ns: int, send: Send) -> None:
         """Send the present values to a stream that knows none."""
+        times = time_columns(np.array([time_ns]), np.array([wall_ns]))
         for track, value in self._sent.items():
-            send(f"{e.STATUS}/{track}", one_time(time_ns, wall_ns), rr.StateChange.columns(state=[value]))
+            send(f"{e.STATUS}/{track}", times, rr.StateChange.columns(state=[value]))
 
 
 class TextLog:
@@ -52,6 +57,8 @@ class TextLog:
 
     def __init__(self) -> None:
         self._lines: dict[str, list[tuple[int, int, str, str]]] = {}
+        self.used = False
+        """Whether there was any."""
 
     def event(self, time_ns: int, wall_ns: int, line: str) -> None:
         """A line of the event log: exactly as it is, and readable."""
@@ -64,6 +71,7 @@ class TextLog:
 
     def _add(self, entity: str, *line: Any) -> None:
         self._lines.setdefault(entity, []).append(line)
+        self.used = True
 
     def send(self, send: Send) -> None:
         """Send the lines collected so far."""

@@ -20,10 +20,11 @@ import rerun as rr
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.provenance import cpu, versions
-from .layout import Subject
+from ..picture.backend import DrawnMesh
+from .layout import Finished, Layout, Subject
 from .ports import LOOPBACK, PortTakenError
+from .rerun_internals import send_blueprint
 from .rrd_file import end_without_index
-from .sent_layout import SentLayout
 
 APPLICATION_ID = "rigid_proto_ros"
 FLUSH_TIMEOUT_S = 5.0
@@ -52,13 +53,14 @@ class Stream(ABC):
     missed = False
     """Whether something was left out while it was behind: kept by who sends."""
 
-    mesh_number: int | None = None
-    """Which of the run's meshes it knows, and ``knows_ghost`` whether it knows how the ghost looks: as before."""
+    subject: Subject | None = None
+    """What the layout is for that its viewers were sent."""
 
-    knows_ghost = False
-
-    def __init__(self, recording_id: str, sink: Any, name: str, sent_layout: SentLayout | None = None) -> None:
-        self.layout = sent_layout or SentLayout(APPLICATION_ID)
+    def __init__(self, recording_id: str, sink: Any, name: str) -> None:
+        self.meshes: dict[str, tuple[int, DrawnMesh]] = {}
+        """By part the mesh that it was sent last, and how many before it, from 1."""
+        self.styled: dict[str, float] = {}
+        """By entity what its style was sent for: a size, or a number of columns."""
         self.recording = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
         self.recording.send_recording_name(name)
@@ -78,9 +80,16 @@ class Stream(ABC):
         """Log values that hold at all times."""
         rr.log(entity, *values, static=True, recording=self.recording)
 
-    def send_layout(self, initial_view: str, subject: Subject) -> None:
-        """Make a viewer open with the layout for what the flight is about."""
-        self.layout.fit(self.recording, initial_view, subject)
+    def send_layout(self, initial_view: str, subject: Subject, finished: Finished | None = None) -> None:
+        """Make a viewer open with the layout for what the flight is about.
+
+        A run that begins with a ghost, after one without, or the other way round, brings another layout; within a run,
+        and at other resets, the layout stays, so that nothing that somebody has arranged is undone.
+        """
+        if finished is None and self.subject is not None and self.subject.ghost == subject.ghost:
+            return
+        self.subject = subject
+        send_blueprint(APPLICATION_ID, Layout(subject, finished).blueprint(initial_view), self.recording)
 
     @abstractmethod
     def flush(self) -> None:
@@ -132,7 +141,6 @@ class FileStream(Stream):
 
     def abandon(self) -> None:
         """Let go of a file that can't be written."""
-        self.layout.close()
         super().close()
 
 
@@ -178,13 +186,11 @@ class LiveServer:
                 # A server that can't listen says so to nobody but who waits for what was sent.
                 host.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
             except RuntimeError as error:
-                host.layout.close()
                 host.close()
                 raise PortTakenError(_last_line(error)) from error
             self._host = host
             return host
-        # Viewers keep the layout from run to run.
-        return LiveStream(recording_id, rr.GrpcSink(self.address), name, self._host.layout)
+        return LiveStream(recording_id, rr.GrpcSink(self.address), name)
 
     def end_run(self, stream: LiveStream) -> None:
         """Finish a run that no more data follows; the server stays."""
@@ -196,7 +202,6 @@ class LiveServer:
         """Shut the server down; returns whether that is done, or whether some viewer doesn't read what was sent."""
         deadline = time.monotonic() + LEAVE_S
         if self._host is not None:
-            self._host.layout.close()
             self._leaving.append(self._host.leave())
         for thread in self._leaving:
             thread.join(max(0.0, deadline - time.monotonic()))

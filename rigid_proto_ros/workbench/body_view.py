@@ -12,8 +12,8 @@ import viser
 from ..base.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ..mass.tensor import equimomental_shapes
 from ..motion.surface import Surface
-from ..rerun_view.appearance import AXES_COLOURS, BODY_COLOUR, GHOST_COLOUR, MOMENTUM_COLOUR
-from ..rerun_view.surface_normals import shaded_surface
+from ..picture.style import AXES_COLOURS, BODY_COLOUR, GHOST_COLOUR, MOMENTUM_COLOUR
+from ..picture.surface import shaded_surface
 from ..scene.scenario import Scenario
 from .pair_names import PairNames
 

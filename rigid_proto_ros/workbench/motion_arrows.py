@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..rerun_view.appearance import MOMENTUM_COLOUR, MOMENTUM_UNIT, OMEGA_COLOUR, OMEGA_UNIT
-from ..rerun_view.plot_range import nice_step
+from ..picture.plot_range import nice_step
+from ..picture.style import MOMENTUM_COLOUR, MOMENTUM_UNIT, OMEGA_COLOUR, OMEGA_UNIT
 from .poke_mark import UNWRITTEN
 
 SHORTEST, USUAL, LONGEST = 0.57, 1.0, 1.05

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR
+from ..picture.style import BODY_COLOUR, GHOST_COLOUR
 from .poke_mark import UNWRITTEN
 
 AWAY = 0.9

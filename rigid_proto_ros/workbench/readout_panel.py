@@ -13,7 +13,9 @@ import viser
 
 from ..mass.tensor import principal_axes
 from ..motion.state import State
-from ..rerun_view.appearance import (
+from ..picture.plot_range import AXIS_PIXELS, PlotRange, plot_range
+from ..picture.plots import angle_to
+from ..picture.style import (
     ANGLE_UNIT,
     ENERGY_SERIES,
     ENERGY_TITLE,
@@ -30,8 +32,6 @@ from ..rerun_view.appearance import (
     TOTAL_ENERGY_SERIES,
     css,
 )
-from ..rerun_view.derived import angle_to
-from ..rerun_view.plot_range import AXIS_PIXELS, PlotRange, plot_range
 from ..scene.scenario import Scenario
 
 PLOTTED_S = 20.0

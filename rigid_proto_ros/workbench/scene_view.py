@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..rerun_view.appearance import FORCE_COLOUR, HAND_COLOUR, STRING_COLOUR
-from ..rerun_view.plot_range import nice_step
-from ..rerun_view.string_curve import string_curves
+from ..picture.plot_range import nice_step
+from ..picture.string import string_curves
+from ..picture.style import FORCE_COLOUR, HAND_COLOUR, STRING_COLOUR
 from ..scene.scenario import Scenario
 from .body_view import BodyView, Switches, body_corners, set_visible
 from .followed_loads import Hit

@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from ..motion.state import State
-from ..rerun_view.appearance import BODY_COLOUR, GHOST_COLOUR, css
+from ..picture.style import BODY_COLOUR, GHOST_COLOUR, css
 from ..scene.scenario import Scenario
 from ..simulation.quantities import attitude_angle
 from .tensors import TITLES

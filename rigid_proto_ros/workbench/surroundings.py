@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..rerun_view.appearance import GREY
+from ..picture.style import GREY
 from .motion_arrows import length_text
 from .poke_mark import UNWRITTEN
 

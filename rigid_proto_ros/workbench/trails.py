@@ -11,7 +11,7 @@ import numpy as np
 from ..base.rotation import matrix_from_quaternion
 from ..motion.body import Body
 from ..motion.surface import Surface
-from ..rerun_view.appearance import POINT_TRAIL_COLOUR, TRAIL_COLOUR
+from ..picture.style import POINT_TRAIL_COLOUR, TRAIL_COLOUR
 
 LASTS_S = 4.0
 """[s, simulated] Length of a path."""

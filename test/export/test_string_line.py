@@ -15,7 +15,7 @@ from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.export.string_line import string_keys, string_points
-from rigid_proto_ros.rerun_view.string_curve import POINTS, string_curves
+from rigid_proto_ros.picture.string import POINTS, string_curves
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 

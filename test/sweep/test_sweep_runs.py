@@ -212,16 +212,6 @@ def test_nothing_above_zero_has_no_logarithmic_axis(axis, tmp_path, monkeypatch,
     assert Path("s.parquet").exists() and not Path("s.svg").exists()
 
 
-def test_rows_are_recorded_side_by_side(tmp_path) -> None:
-    chunk = pytest.importorskip("rerun.chunk")
-    file = tmp_path / "ghosts.rrd"
-    assert main(["sweep", "box_tensor", "--ghosts", "0,600,1999", "--record", str(file)]) == 0
-    entities = {str(c.entity_path) for c in chunk.RrdReader(file).stream()}
-    for row in (0, 600, 1999):
-        assert {f"/world/row_{row}", f"/world/row_{row}/mesh"} <= entities
-    assert main(["sweep", "box_tensor", "--ghosts", ",".join(map(str, range(13))), "--record", str(file)]) == 2
-
-
 def test_one_row_is_recorded_with_all_that_a_flight_shows(tmp_path, capsys) -> None:
     chunk = pytest.importorskip("rerun.chunk")
     file = tmp_path / "row.rrd"

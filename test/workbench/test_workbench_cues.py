@@ -16,7 +16,7 @@ pytest.importorskip("viser", reason="viser is not installed: no interactive page
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.rerun_view.plot_range import plot_range
+from rigid_proto_ros.picture.plot_range import plot_range
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import readout_panel

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_proto_ros.rerun_view.string_curve import POINTS, sags, string_curves
+from rigid_proto_ros.picture.string import POINTS, sags, string_curves
 
 DOWN = np.array([0.0, 0.0, -9.81])
 

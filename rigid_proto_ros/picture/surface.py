@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Shading normals of a triangle mesh: smooth over curved parts, flat at sharp edges."""
+"""Surfaces with normals for shading, smooth over curved parts and flat at sharp edges; box and ball."""
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
+
+from .backend import DrawnMesh
 
 CREASE_ANGLE = np.deg2rad(35.0)
 """[rad] Faces that meet at more than this are drawn with an edge between them."""
@@ -12,8 +16,8 @@ CREASED_TRIANGLES_MAX = 200_000
 """Above this every vertex is shaded smoothly: the facets are finer than a picture shows, and the pairs too many."""
 
 
-def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices (p, 3), triangles (m, 3) and unit normals (p, 3), all float32/uint32, of the surface to draw.
+def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> DrawnMesh:
+    """The surface to draw, in float32 and uint32.
 
     vertices (n, 3), triangles (m, 3) as loaded. A vertex on a sharp edge is split into one per smooth side, so p ≥ the
     number of referenced vertices; the order of triangles is kept.
@@ -26,7 +30,7 @@ def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
         normals = np.zeros((len(vertices), 3))
         for k in range(3):
             np.add.at(normals, triangles[:, k], face_area_normals)
-        return vertices.astype(np.float32), triangles.astype(np.uint32), _unit(normals).astype(np.float32)
+        return DrawnMesh(vertices.astype(np.float32), triangles.astype(np.uint32), _unit(normals).astype(np.float32))
 
     corner_vertex = triangles.ravel()
     corner_face = np.repeat(np.arange(len(triangles)), 3)
@@ -35,7 +39,7 @@ def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
     key = np.column_stack([corner_vertex, np.rint(corner_normals * 1e4).astype(np.int64)])
     _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     drawn = vertices[corner_vertex[first]]
-    return (
+    return DrawnMesh(
         drawn.astype(np.float32),
         inverse.reshape(-1, 3).astype(np.uint32),
         corner_normals[first].astype(np.float32),
@@ -69,3 +73,40 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     """Rows (n, 3) at unit length; a zero row becomes +z, since a viewer can't shade with a zero normal."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
+
+
+BOX_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+BOX_TRIANGLES = np.array(
+    [
+        *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
+        *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
+    ]
+)
+BOX_EDGES = np.array([(k, k | 1 << axis) for axis in range(3) for k in range(8) if not k >> axis & 1])
+"""Pairs (12, 2) of corners."""
+
+
+@functools.cache
+def box_mesh() -> DrawnMesh:
+    """The box from -1 to 1 along each axis."""
+    return shaded_surface(BOX_CORNERS, BOX_TRIANGLES)
+
+
+def box_edges(centre: np.ndarray, half_sizes: np.ndarray) -> list[np.ndarray]:
+    """The twelve edges (2, 3) of a box along the axes."""
+    return list((centre + half_sizes * BOX_CORNERS)[BOX_EDGES])
+
+
+@functools.cache
+def ball_mesh() -> DrawnMesh:
+    """The ball of radius 1 about the origin."""
+    rings, sides = 24, 48
+    polar, around = np.meshgrid(
+        np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2.0 * np.pi, sides + 1), indexing="ij"
+    )
+    points = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1)
+    index = np.arange((rings + 1) * (sides + 1)).reshape(rings + 1, sides + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    points = points.reshape(-1, 3).astype(np.float32)
+    return DrawnMesh(points, triangles.astype(np.uint32), points)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""How long arrows are, and the arrows of the loads that act: at their true points, in their true directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..simulation.observer import ShownLoad
+from .style import LOAD_COLOURS
+
+USUAL = 0.6
+"""Body sizes of the first arrow of its kind: it reaches out of most bodies, and one four times as long can be seen."""
+
+LEAST, LONGEST = 0.005, 3.0
+"""Body sizes: a shorter arrow isn't drawn, nor its label; none is drawn longer, and a label says its value."""
+
+IMPULSE_SHOWN_NS = 150_000_000
+"""[ns of simulated time] An impulse acts at an instant; its arrow stays this long so that it can be seen."""
+
+PARTS = ("force", "torque")
+
+
+class ArrowScales:
+    """Values per metre of each kind of arrow, proportional to the value: one scale of a kind as long as it is known."""
+
+    def __init__(self) -> None:
+        self._per_metre: dict[str, float] = {}
+
+    def lengths(self, kind: str, values: np.ndarray, size: float, usual: float = 0.0) -> np.ndarray:
+        """Lengths (n,) [m] of arrows for values (n,) >= 0 on a body of this size [m]; 0 where nothing is to be drawn.
+
+        The first value of a kind sets its scale; one that is none, or next to ``usual`` none, has ``usual`` set it.
+        """
+        known = self._per_metre.get(kind, 0.0)
+        if known == 0.0 and len(values):
+            first = float(values[0])
+            known = (first if first > 1e-6 * usual else usual) / (USUAL * size)
+            self._per_metre[kind] = known
+        if not known > 0.0:
+            return np.zeros(len(values))
+        lengths = np.minimum(values / known, LONGEST * size)
+        return np.where(lengths < LEAST * size, 0.0, lengths)
+
+    def per_metre(self, kind: str) -> float:
+        """The value of an arrow a metre long; 0 where there hasn't been any."""
+        return self._per_metre.get(kind, 0.0)
+
+    def forget(self) -> None:
+        """Another body: scales of its own."""
+        self._per_metre.clear()
+
+
+@dataclass
+class _Acting:
+    """A load from begin_ns to end_ns. shown: whether some state showed it. pushes: its force pushes into the body,
+    decided at the first state.
+    """
+
+    load: ShownLoad
+    begin_ns: int
+    end_ns: float = np.inf
+    shown: bool = False
+    pushes: bool | None = None
+
+
+@dataclass
+class LoadArrowRows:
+    """The arrows of one kind of load at n states: counts (n,), then of all of them origins and vectors (m, 3), the
+    places (m, 3) and texts of their labels.
+    """
+
+    counts: np.ndarray
+    origins: np.ndarray
+    vectors: np.ndarray
+    label_positions: np.ndarray
+    texts: list[str] = field(default_factory=list)
+
+
+class Loads:
+    """The loads of one run, by when they act; a load that ends before any state shows it is shown at the next one."""
+
+    def __init__(self) -> None:
+        self._acting: dict[int, _Acting] = {}
+        self._ended: list[_Acting] = []
+        self._drawn: set[tuple[str, str]] = set()
+
+    def began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
+        """A load begins to act."""
+        if load.kind == "impulse":
+            self._ended.append(_Acting(load, time_ns, time_ns + IMPULSE_SHOWN_NS))
+        else:
+            self._acting[load_id] = _Acting(load, time_ns)
+
+    def ended(self, time_ns: int, load_id: int) -> None:
+        """A load acts no longer."""
+        acting = self._acting.pop(load_id, None)
+        if acting is not None:
+            acting.end_ns = time_ns
+            self._ended.append(acting)
+
+    @property
+    def kinds(self) -> list[str]:
+        """Kinds of the loads that act now, each once."""
+        kinds = {acting.load.kind for acting in self._acting.values()}
+        return [kind for kind in LOAD_COLOURS if kind in kinds]
+
+    def disturbed(self, times_ns: np.ndarray, before_ns: int) -> np.ndarray:
+        """At which of the times (n,) a load acts or has acted since the time before, ``before_ns`` for the first."""
+        since = np.concatenate([[before_ns], times_ns[:-1]])
+        found = np.zeros(len(times_ns), dtype=bool)
+        for acting in (*self._acting.values(), *self._ended):
+            end_ns = acting.begin_ns + 1 if acting.load.kind == "impulse" else acting.end_ns
+            found |= (times_ns >= acting.begin_ns) & (since < end_ns)
+        return found
+
+    def rows(
+        self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray, scales: ArrowScales, size: float, weight: float
+    ) -> dict[tuple[str, str], LoadArrowRows]:
+        """By kind and part the arrows at times (n,), states (n, 13) and attitudes R (n, 3, 3), of a body of this size
+        [m] and weight on earth [N]: none, once, where they ended.
+        """
+        found: dict[tuple[str, str], list[tuple[np.ndarray, Any, str]]] = {}
+        for acting in (*self._acting.values(), *self._ended):
+            present = (times_ns >= acting.begin_ns) & (times_ns < acting.end_ns)
+            if not present.any() and not acting.shown and acting.end_ns < np.inf:
+                present[np.searchsorted(times_ns, acting.begin_ns) :][:1] = True
+            if not present.any():
+                continue
+            acting.shown = True
+            load, point = acting.load, np.asarray(acting.load.point, dtype=float)
+            if acting.pushes is None:
+                force = load.force if load.axes == "body" else R[present][0].T @ load.force
+                acting.pushes = bool(point @ force < 0.0)
+            impulsive = load.kind == "impulse"
+            for part, value, unit in (("force", load.force, "N"), ("torque", load.torque, "N m")):
+                value, unit = np.asarray(value, dtype=float), f"{unit} s" if impulsive else unit
+                magnitude = float(np.linalg.norm(value))
+                usual = weight * (1.0 if part == "force" else 0.5 * size)
+                (length,) = scales.lengths(unit, np.array([magnitude]), size, usual) if magnitude else (0.0,)
+                if length == 0.0:
+                    continue
+                vectors = np.broadcast_to(value * (length / magnitude), (len(times_ns), 3))
+                vectors = np.einsum("nij,nj->ni", R, vectors) if load.axes == "body" else vectors
+                origins = rows[:, 0:3] + R @ point
+                # A force that pushes has its tip at the point, as a finger would stand: inside the body none is seen.
+                if part == "force" and acting.pushes:
+                    origins = origins - vectors
+                    ends = origins
+                else:
+                    ends = origins + vectors
+                arrow = (vectors, origins, ends)
+                found.setdefault((load.kind, part), []).append((present, arrow, f"{_short(magnitude)} {unit}"))
+        self._ended = [acting for acting in self._ended if acting.end_ns > times_ns[-1] or not acting.shown]
+        none = np.zeros(len(times_ns), dtype=int)
+        drawn = {key: LoadArrowRows(none, *np.zeros((3, 0, 3))) for key in self._drawn - found.keys()}
+        drawn |= {key: _in_order(arrows) for key, arrows in found.items()}
+        self._drawn = set(found)
+        return drawn
+
+
+def _in_order(arrows: Sequence[tuple[np.ndarray, Any, str]]) -> LoadArrowRows:
+    """Arrows of several loads, by state."""
+    present = np.stack([shown for shown, _, _ in arrows], axis=1)
+    vectors, origins, ends = (np.stack([own[k] for _, own, _ in arrows], axis=1)[present] for k in range(3))
+    texts = [arrows[k][2] for k in np.nonzero(present)[1].tolist()]
+    return LoadArrowRows(present.sum(axis=1), origins, vectors, ends, texts)
+
+
+def _short(value: float) -> str:
+    """Three figures, without an exponent where people wouldn't write one."""
+    return f"{value:.0f}" if 1e3 <= value < 1e5 else f"{value:.3g}"

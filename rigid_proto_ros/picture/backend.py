@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""What a picture is drawn with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .style import Colour
+
+
+class DrawnMesh(NamedTuple):
+    """A surface in single precision: vertices (p, 3), triangles (m, 3) and unit normals (p, 3)."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    normals: np.ndarray
+
+
+class Backend:
+    """Null object, and the interface: override what is drawn.
+
+    Parts are named by paths (style.py), a tree of frames: what is below a part moves with it. Lengths are in metres.
+    ``begin`` says of which n states the calls that follow are. counts (n,) is how many of the m arrows, lines, points
+    or labels belong to each of them, in order; none end those of the state before. A backend that shows the present
+    alone takes what belongs to the last state.
+    """
+
+    def begin(self, times_ns: np.ndarray) -> None:
+        """Simulated times (n,) [ns], ascending."""
+
+    def resize(self, size: float) -> None:
+        """A length [m] that stands for the body: widths in STYLES are in it."""
+
+    def mesh(self, name: str, surface: DrawnMesh | None) -> None:
+        """A surface that is fixed in the part's frame, in place of the one before; None for none."""
+
+    def place(
+        self,
+        name: str,
+        positions: np.ndarray | None = None,
+        attitudes: np.ndarray | None = None,
+        scale: np.ndarray | None = None,
+    ) -> None:
+        """The part's frame: positions (n, 3), attitudes (n, 4) xyzw, scale (3,) that stays; None leaves it out."""
+
+    def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
+        """Vectors (m, 3) from origins (m, 3), or from the frame's."""
+
+    def lines(
+        self, name: str, counts: np.ndarray, strips: Sequence[np.ndarray], colours: Sequence[Colour] | None = None
+    ) -> None:
+        """m strips (p, 3) of p points each; colours of each, or the style's."""
+
+    def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
+        """Positions (m, 3)."""
+
+    def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
+        """m texts at positions (m, 3)."""
+
+    def scalars(self, name: str, values: np.ndarray) -> None:
+        """Plotted values (n, k), named by SERIES."""

@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: MIT
+"""What is seen of a flight: from its states, and from what acts on the body, the parts that a backend draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..base.rotation import matrix_from_quaternion, quaternion_from_matrix
+from ..mass.tensor import equimomental_shapes, principal_axes
+from ..simulation.observer import BodySnapshot, ShownLoad, ShownString
+from ..simulation.quantities import attitude_angle
+from . import style
+from .arrows import ArrowScales, Loads
+from .backend import Backend, DrawnMesh
+from .plots import Plots
+from .poinsot import PoinsotPicture
+from .string import StringRows, Strings, string_curves
+from .surface import ball_mesh, box_edges, box_mesh, shaded_surface
+from .trail import Trail
+
+RATE = 250
+"""[1/s, simulated] Of what is only looked at, arrows, trails and plots; the body's place is that of every state."""
+
+REDRAWN_RATE = 20
+"""[1/s, simulated] How often Poinsot's curve and plane are drawn anew while a torque changes T and L."""
+
+AXIS_LENGTH = 0.25
+"""In body sizes."""
+
+LABEL_BEYOND = 1.06
+"""Of an arrow's length: where its label stands."""
+
+TRAIL_SPACING = 1.5
+"""Of a trail's points, in their radii."""
+
+LINE_SIZES = 1.1
+"""Body sizes that the line of a string that pulls is drawn on beyond its knot."""
+
+SKEWED = 0.1
+"""Least product of inertia of a skewed body, against the largest difference of two moments: axes some 6° off."""
+
+
+def skewed(inertia: np.ndarray) -> bool:
+    """Whether the principal axes of a tensor (3, 3) are clearly others than its own axes, so that products of inertia
+    tell.
+    """
+    products = np.abs(inertia - np.diag(np.diag(inertia))).max()
+    return bool(products > SKEWED * max(np.ptp(principal_axes(inertia)[0]), 1e-300))
+
+
+class Ticks:
+    """Picks the first state in each 1/rate s of simulated time."""
+
+    def __init__(self, rate: int) -> None:
+        self._period_ns = 1_000_000_000 // rate
+        self._last: int | None = None
+
+    def choose(self, times_ns: np.ndarray) -> np.ndarray:
+        """Indices of those to show of the times (n,)."""
+        ticks = times_ns // self._period_ns
+        before = int(ticks[0]) - 1 if self._last is None else self._last
+        self._last = int(ticks[-1])
+        return np.flatnonzero(np.diff(ticks, prepend=before) > 0)
+
+
+class Shape:
+    """Mesh and body together. size [m]: a length that stands for the body, the diagonal of the mesh's box or of the box
+    of equal inertia. tip (3,) [m, body axes]: the vertex farthest from the COM. centre, half_sizes (3,) [m, body axes]:
+    of the box along the mesh axes; these without a mesh None. moments (3,), axes (3, 3): principal, ascending.
+    """
+
+    def __init__(self, vertices: np.ndarray | None, body: BodySnapshot) -> None:
+        self.moments, self.axes = principal_axes(body.inertia)
+        self.box_sides, self.semi_axes = equimomental_shapes(body.mass, self.moments)
+        self.tip = self.centre = self.half_sizes = None
+        extent = self.box_sides
+        if vertices is not None:
+            at = vertices * body.scale - body.center_of_mass
+            low, high = at.min(axis=0), at.max(axis=0)
+            self.centre, self.half_sizes, extent = 0.5 * (low + high), 0.5 * (high - low), high - low
+            self.tip = at[np.argmax(np.einsum("ij,ij->i", at, at))]
+        self.size = float(np.linalg.norm(extent)) or 1.0
+
+
+class Picture:
+    """Told of what changes, and given states, it calls its backend. wanted(name) says whether a part is to be drawn;
+    nothing is computed for those that aren't.
+    """
+
+    def __init__(self, backend: Backend, wanted: Callable[[str], bool] = lambda _: True, rate: int = RATE) -> None:
+        self.backend = backend
+        self.body: BodySnapshot | None = None
+        self.ghost: BodySnapshot | None = None
+        self.shape: Shape | None = None
+        self.scales = ArrowScales()
+        self._wanted = wanted
+        self._rate = rate
+        self._vertices: np.ndarray | None = None
+        self._middle = np.zeros(3)
+        self._mesh: DrawnMesh | None = None
+        self.restart()
+
+    def restart(self) -> None:
+        """A new run: simulated time starts again at 0; mesh, body and scales stay."""
+        self._ticks, self._redraw_ticks = Ticks(self._rate), Ticks(REDRAWN_RATE)
+        self._drawn_ns = -1
+        self._trail, self._com_trail = Trail(), Trail()
+        self._plots = Plots()
+        self._poinsot = PoinsotPicture()
+        self.loads = Loads()
+        self.string = Strings()
+        self._body_times, self._body_attitudes = np.empty(0, np.int64), np.empty((0, 4))
+        if self.shape is not None:
+            self._poinsot.set_body(self.shape.moments, self.shape.axes)
+
+    # What changes
+
+    def set_mesh(self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
+        """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); ``set_body`` follows."""
+        self._vertices = self._mesh = None
+        if vertices is not None and triangles is not None and len(triangles):
+            self._vertices = np.array(vertices, dtype=float)
+            # Single precision has no digits for a mesh far from its origin.
+            self._middle = 0.5 * (self._vertices.min(axis=0) + self._vertices.max(axis=0))
+            self._mesh = shaded_surface(self._vertices - self._middle, triangles)
+        self.scales.forget()
+        self.backend.begin(np.array([time_ns]))
+        self._describe_mesh(self.backend)
+
+    def set_body(self, time_ns: int, body: BodySnapshot) -> None:
+        """The body is this one from ``time_ns`` on."""
+        size = 0.0 if self.shape is None else self.shape.size
+        self.body = body
+        self.shape = Shape(self._vertices, body)
+        self._poinsot.set_body(self.shape.moments, self.shape.axes)
+        self._plots.body_changed()
+        self.backend.begin(np.array([time_ns]))
+        if self.shape.size != size:
+            self.backend.resize(self.shape.size)
+        self._describe_body(self.backend)
+
+    def set_ghost(self, time_ns: int, ghost: BodySnapshot | None) -> None:
+        """The ghost is this one from ``time_ns`` on."""
+        first = self.ghost is None
+        self.ghost = ghost
+        self.backend.begin(np.array([time_ns]))
+        if first:
+            self.backend.mesh(style.GHOST_MESH, self._mesh)
+        self._describe_ghost(self.backend)
+
+    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
+        """A load begins to act."""
+        self.loads.began(time_ns, load_id, load)
+
+    def load_ended(self, time_ns: int, load_id: int) -> None:
+        """A load acts no longer."""
+        self.loads.ended(time_ns, load_id)
+
+    def set_string(self, time_ns: int, string: ShownString | None) -> None:
+        """How the string is tied from ``time_ns`` on."""
+        self.string.change(time_ns, string)
+
+    def describe(self, backend: Backend) -> None:
+        """Draw on a backend that comes late what is drawn only when it changes; after its ``begin`` with one time."""
+        if self.shape is not None:
+            backend.resize(self.shape.size)
+        self._describe_mesh(backend)
+        self._describe_body(backend)
+        self._describe_ghost(backend)
+
+    def _describe_mesh(self, backend: Backend) -> None:
+        backend.mesh(style.BODY_MESH, self._mesh)
+        if self.ghost is not None:
+            backend.mesh(style.GHOST_MESH, self._mesh)
+
+    def _describe_body(self, backend: Backend) -> None:
+        body, shape = self.body, self.shape
+        if body is None or shape is None:
+            return
+        if self._mesh is not None:
+            place = self._middle * body.scale - body.center_of_mass
+            backend.place(style.BODY_MESH, place[np.newaxis], scale=body.scale)
+        box = [] if shape.centre is None or shape.half_sizes is None else box_edges(shape.centre, shape.half_sizes)
+        backend.lines(style.BOUNDING_BOX, np.array([len(box)]), box)
+        principal = quaternion_from_matrix(shape.axes)[np.newaxis]
+        for name, mesh, sizes in (
+            (style.INERTIA_BOX, box_mesh(), 0.5 * shape.box_sides),
+            (style.INERTIA_ELLIPSOID, ball_mesh(), shape.semi_axes),
+        ):
+            if self._wanted(name):
+                backend.mesh(name, mesh)
+                backend.place(name, attitudes=principal, scale=sizes)
+        three = np.array([3])
+        backend.arrows(style.BODY_AXES, three, AXIS_LENGTH * shape.size * np.eye(3))
+        # All end outside the body, the shortest of a rod too.
+        lengths = 0.5 * shape.size * (1.0 + 0.35 * np.sqrt(shape.moments / shape.moments[2]))
+        ends = lengths[:, np.newaxis] * shape.axes.T
+        backend.arrows(style.PRINCIPAL_AXES, three, ends)
+        backend.labels(style.PRINCIPAL_AXES, three, LABEL_BEYOND * ends, ["I₁", "I₂", "I₃"])
+        if self._wanted(style.POINSOT):
+            self._poinsot.describe(backend)
+
+    def _describe_ghost(self, backend: Backend) -> None:
+        ghost = self.ghost
+        if ghost is None:
+            return
+        moments, axes = principal_axes(ghost.inertia)
+        if self._mesh is not None:
+            place = self._middle * ghost.scale - ghost.center_of_mass
+            backend.place(style.GHOST_MESH, place[np.newaxis], scale=ghost.scale)
+        sides, _ = equimomental_shapes(ghost.mass, moments)
+        backend.place(style.GHOST_BOX, attitudes=quaternion_from_matrix(axes)[np.newaxis])
+        backend.lines(style.GHOST_BOX, np.array([12]), box_edges(np.zeros(3), 0.5 * sides))
+
+    # States
+
+    def draw(self, times_ns: np.ndarray, rows: np.ndarray) -> None:
+        """States (n, 13) at times (n,) [ns] of the present body, all those since the call before."""
+        if self.body is None or self.shape is None or not len(times_ns):
+            return
+        backend = self.backend
+        backend.begin(times_ns)
+        backend.place(style.BODY, rows[:, 0:3], rows[:, 3:7])
+        backend.place(style.CENTRE, rows[:, 0:3])
+        if self.ghost is not None:
+            self._body_times = np.concatenate([self._body_times, times_ns])
+            self._body_attitudes = np.vstack([self._body_attitudes, rows[:, 3:7]])
+        chosen = self._ticks.choose(times_ns)
+        if not len(chosen):
+            return
+        times_ns, rows = times_ns[chosen], rows[chosen]
+        backend.begin(times_ns)
+        body, shape = self.body, self.shape
+        R = matrix_from_quaternion(rows[:, 3:7])
+        spin = np.einsum("nij,nj->ni", R, rows[:, 10:13])
+        L = np.einsum("nij,jk,nk->ni", R, body.inertia, rows[:, 10:13])
+        redrawn = self._redraw_ticks.choose(times_ns)
+        if self._wanted(style.POINSOT):
+            self._poinsot.draw(backend, times_ns, rows, spin, L, redrawn)
+        self._draw_motion(spin, L)
+        self._draw_trails(times_ns, rows, R)
+        string = self.string.rows(times_ns, rows, R) if self.string.was_tied else None
+        disturbed = self.loads.disturbed(times_ns, self._drawn_ns)
+        self._draw_loads(times_ns, rows, R)
+        string_energy = None
+        if string is not None:
+            disturbed |= string.tied
+            string_energy = np.zeros(len(rows))
+            string_energy[string.tied] = string.energies
+            self._draw_string(string, rows)
+            self.string.forget_before(int(times_ns[-1]))
+        if self._wanted("plots"):
+            self._plots.draw(backend, rows, L, rows[:, 10:13] @ shape.axes, body, disturbed, string_energy)
+        self._drawn_ns = int(times_ns[-1])
+
+    def _draw_motion(self, spin: np.ndarray, L: np.ndarray) -> None:
+        """Arrows of ω and L at the COM (n, 3)."""
+        assert self.shape is not None
+        natural = np.sqrt(9.81 / self.shape.size)
+        moment = float(self.shape.moments.mean())
+        for name, symbol, vectors, usual in (
+            (style.OMEGA, "ω", spin, natural),
+            (style.MOMENTUM, "L", L, moment * natural),
+        ):
+            if not self._wanted(name):
+                continue
+            values = np.linalg.norm(vectors, axis=1)
+            lengths = self.scales.lengths(symbol, values, self.shape.size, usual)
+            seen = lengths > 0.0
+            drawn = vectors[seen] * (lengths[seen] / values[seen])[:, np.newaxis]
+            counts = seen.astype(int)
+            self.backend.arrows(name, counts, drawn)
+            self.backend.labels(name, counts, LABEL_BEYOND * drawn, [symbol] * len(drawn))
+
+    def _draw_trails(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> None:
+        assert self.shape is not None
+        spacing = TRAIL_SPACING * style.STYLES[style.TRAIL].width * self.shape.size
+        if self.shape.tip is not None and self._wanted(style.TRAIL):
+            self.backend.points(style.TRAIL, *self._trail.between(times_ns, rows, R, self.shape.tip, spacing))
+        if rows[:, 7:10].any() and self._wanted(style.COM_TRAIL):
+            self.backend.points(style.COM_TRAIL, *self._com_trail.between(times_ns, rows, R, np.zeros(3), spacing))
+
+    def _draw_loads(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> None:
+        assert self.body is not None and self.shape is not None
+        weight = 9.81 * self.body.mass
+        drawn = self.loads.rows(times_ns, rows, R, self.scales, self.shape.size, weight)
+        for (kind, part), arrows in drawn.items():
+            name = style.load_part(kind, part)
+            if self._wanted(name):
+                self.backend.arrows(name, arrows.counts, arrows.vectors, arrows.origins)
+                self.backend.labels(name, arrows.counts, arrows.label_positions, arrows.texts)
+
+    def _draw_string(self, string: StringRows, rows: np.ndarray) -> None:
+        assert self.body is not None and self.shape is not None
+        backend, tied, counts = self.backend, string.tied, string.tied.astype(int)
+        directions, pulls = string.directions, string.tensions > 0.0
+        distances = np.linalg.norm(np.cross(directions, rows[tied, 0:3] - string.free), axis=1)
+        if self._wanted(style.STRING):
+            slack = np.linalg.norm(string.knots - string.free, axis=1) < string.lengths
+            strips = list(np.stack([string.free, string.knots], axis=1))
+            curves = string_curves(
+                string.free[slack], string.knots[slack], string.lengths[slack], np.asarray(self.body.gravity)
+            )
+            for k, curve in zip(np.flatnonzero(slack), curves, strict=True):
+                strips[k] = curve
+            colours = [style.STRING_COLOUR if pull else style.SLACK_COLOUR for pull in pulls]
+            backend.lines(style.STRING, counts, strips, colours)
+            backend.points(style.HAND, counts, string.free)
+        if self._wanted(style.STRING_LINE):
+            pulling = counts.copy()
+            pulling[tied] = pulls
+            ends = string.knots + LINE_SIZES * self.shape.size * directions
+            backend.lines(style.STRING_LINE, pulling, list(np.stack([string.knots, ends], axis=1)[pulls]))
+        if self._wanted("plots"):
+            for name, values in ((style.STRING_TENSION, string.tensions), (style.STRING_LINE_DISTANCE, distances)):
+                plotted = np.zeros((len(rows), 1))
+                plotted[tied, 0] = values
+                backend.scalars(name, plotted)
+
+    def draw_ghost(self, times_ns: np.ndarray, rows: np.ndarray) -> None:
+        """States (n, 13) of the ghost, after the body's of the same times."""
+        if not len(times_ns):
+            return
+        self.backend.begin(times_ns)
+        self.backend.place(style.GHOST, rows[:, 0:3], rows[:, 3:7])
+        times, attitudes = self._body_times, self._body_attitudes
+        keep = times > times_ns[-1]
+        self._body_times, self._body_attitudes = times[keep], attitudes[keep]
+        same, own, ghosts = np.intersect1d(times, times_ns, return_indices=True)
+        if len(same):
+            pairs = zip(attitudes[own], rows[ghosts, 3:7], strict=True)
+            angles = np.degrees([attitude_angle(body, ghost) for body, ghost in pairs])
+            self.backend.begin(same)
+            self.backend.scalars(style.GHOST_ANGLE, angles[:, np.newaxis])

@@ -1,0 +1,403 @@
+# SPDX-License-Identifier: MIT
+"""What is drawn of a flight is true: shapes of the inertia, Poinsot's construction, arrows, trail, string, ghost, drift."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import rerun_flight as flight
+from drawn import Drawn
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.mass.tensor import principal_axes
+from rigid_proto_ros.picture import style
+from rigid_proto_ros.picture.arrows import LONGEST, USUAL, ArrowScales
+from rigid_proto_ros.picture.picture import Picture, Shape
+from rigid_proto_ros.picture.plots import angle_to
+from rigid_proto_ros.picture.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
+from rigid_proto_ros.picture.surface import ball_mesh, box_mesh, shaded_surface
+from rigid_proto_ros.picture.trail import Trail
+from rigid_proto_ros.simulation.observer import BodySnapshot, ShownLoad, ShownString
+from rigid_proto_ros.simulation.quantities import attitude_angle
+
+MOMENTS = st.tuples(*[st.floats(0.1, 10.0)] * 3).map(
+    lambda s: np.sort(np.array([s[1] + s[2], s[0] + s[2], s[0] + s[1]])),
+)
+"""Principal moments of bodies that exist: sums of two of three positive second moments."""
+
+SPINS = st.tuples(*[st.floats(-5.0, 5.0)] * 3).map(np.array).filter(lambda w: np.linalg.norm(w) > 1e-3)
+
+
+@settings(deadline=None)
+@given(MOMENTS, SPINS)
+def test_the_polhode_has_the_bodys_energy_and_momentum_and_passes_through_its_spin(moments, w):
+    energy, squared_L = 0.5 * moments @ (w * w), (moments * w) @ (moments * w)
+    curve = polhode(moments, energy, w)
+    assert np.allclose(curve**2 @ moments, 2.0 * energy, rtol=1e-9)
+    assert np.allclose((curve * moments) ** 2 @ np.ones(3), squared_L, rtol=1e-9)
+    spacing = np.linalg.norm(np.diff(curve, axis=0), axis=1).max()
+    assert np.linalg.norm(curve - w, axis=1).min() <= spacing + 1e-7 * np.linalg.norm(w)
+
+
+@settings(deadline=None)
+@given(MOMENTS, st.floats(0.01, 100.0))
+def test_the_separatrix_is_where_momentum_is_that_of_the_middle_axis(moments, energy):
+    for curve in separatrix(moments, energy):
+        assert np.allclose(curve**2 @ moments, 2.0 * energy, rtol=1e-9)
+        assert np.allclose((curve * moments) ** 2 @ np.ones(3), 2.0 * energy * moments[1], rtol=1e-7)
+        assert np.isclose(abs(curve[:, 1]).max(), semi_axes(moments, energy)[1])
+
+
+def test_a_symmetric_top_has_no_separatrix():
+    assert separatrix(np.array([1.0, 1.0, 1.5]), 1.0) == []
+    assert separatrix(np.array([1.0, 1.5, 1.5]), 1.0) == []
+
+
+@settings(deadline=None)
+@given(SPINS)
+def test_the_floor_is_square_to_the_angular_momentum(L):
+    (R,) = matrix_from_quaternion(plane_rotation(L)[np.newaxis])
+    assert np.allclose(R @ [0.0, 0.0, 1.0], L / np.linalg.norm(L), atol=1e-6)
+    (back,) = matrix_from_quaternion(inverse(plane_rotation(L))[np.newaxis])
+    assert np.allclose(back @ R, np.eye(3), atol=1e-12)
+
+
+@settings(deadline=None)
+@given(MOMENTS, st.floats(0.01, 100.0))
+def test_box_and_ellipsoid_have_the_mass_and_the_tensor_they_stand_for(moments, mass):
+    body = BodySnapshot(mass, np.zeros(3), np.diag(moments), np.ones(3), np.zeros(3), "explicit", "rk4")
+    shape = Shape(None, body)
+    a = shape.box_sides
+    box = mass / 12.0 * np.array([a[1] ** 2 + a[2] ** 2, a[0] ** 2 + a[2] ** 2, a[0] ** 2 + a[1] ** 2])
+    b = shape.semi_axes
+    ellipsoid = mass / 5.0 * np.array([b[1] ** 2 + b[2] ** 2, b[0] ** 2 + b[2] ** 2, b[0] ** 2 + b[1] ** 2])
+    assert np.allclose(box, shape.moments, rtol=1e-12)
+    assert np.allclose(ellipsoid, shape.moments, rtol=1e-12)
+    assert np.linalg.det(shape.axes) > 0.0
+
+
+def test_the_bounding_box_follows_scale_mirroring_included():
+    body = BodySnapshot(
+        1.0, np.array([-0.3, 0.1, 0.05]), np.eye(3), np.array([-2.0, 1.0, 1.0]), np.zeros(3), "solid", "rk4"
+    )
+    shape = Shape(flight.VERTICES, body)
+    assert np.allclose(shape.centre, 0.0, atol=1e-15)
+    assert np.allclose(shape.half_sizes, [0.3, 0.1, 0.05])
+
+
+def test_a_brick_is_drawn_with_flat_faces_and_a_ball_smooth():
+    vertices, triangles, normals = shaded_surface(flight.VERTICES, flight.TRIANGLES)
+    assert len(vertices) == 24
+    for corner_normals, corners in zip(normals[triangles], vertices[triangles], strict=True):
+        face = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        assert np.allclose(corner_normals, face / np.linalg.norm(face), atol=1e-6)
+
+    # A ball of 24 by 48 facets: edges bend by 7.5 degrees, well below a crease.
+    polar, around = np.meshgrid(np.linspace(0.1, np.pi - 0.1, 24), np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))
+    ball = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1)
+    index = np.arange(polar.size).reshape(polar.shape)
+    a, b = index[:, :-1], np.roll(index, -1, axis=0)[:, :-1]
+    c, d = np.roll(index, -1, axis=0)[:, 1:], index[:, 1:]
+    faces = np.concatenate([np.stack([a, d, c], -1).reshape(-1, 3), np.stack([a, c, b], -1).reshape(-1, 3)])
+    points, _, normals = shaded_surface(ball.reshape(-1, 3), faces)
+    assert len(points) == polar.size
+    assert np.einsum("ij,ij->i", points, normals).min() > np.cos(np.deg2rad(6.0))
+
+
+def test_the_trail_stays_on_the_path_of_its_point_between_states():
+    # A point on a wheel that rolls: a cycloid, known in closed form. States every 10 ms, spin 6 rad/s.
+    times_ns = np.arange(101) * 10_000_000
+    t, spin, radius = 1e-9 * times_ns, 6.0, 0.5
+    rows = np.zeros((101, 13))
+    rows[:, 0], rows[:, 7], rows[:, 11] = spin * radius * t, spin * radius, spin
+    rows[:, 4], rows[:, 6] = np.sin(0.5 * spin * t), np.cos(0.5 * spin * t)
+    counts, points = Trail().between(
+        times_ns, rows, matrix_from_quaternion(rows[:, 3:7]), np.array([0.0, 0.0, radius]), spacing=0.01
+    )
+    assert counts.sum() == len(points) > 300
+    angle = spin * np.concatenate(
+        [t[k - 1] + (t[k] - t[k - 1]) * np.arange(1, n + 1) / n for k, n in enumerate(counts) if k]
+    )
+    cycloid = np.column_stack([radius * angle + radius * np.sin(angle), 0 * angle, radius * np.cos(angle)])
+    # Between states a cubic: its error is (0.06 rad)^4/384 of the radius.
+    assert np.abs(points[counts[0] :] - cycloid).max() < 2e-8
+
+
+@settings(deadline=None)
+@given(SPINS, st.floats(-14.0, 0.49))
+def test_the_ghosts_angle_is_accurate_down_to_round_off(axis, log_angle):
+    angle = 10.0**log_angle
+    turn = np.append(np.sin(0.5 * angle) * axis / np.linalg.norm(axis), np.cos(0.5 * angle))
+    start = np.array([0.5, -0.5, 0.5, 0.5])
+    x, y, z, w = start
+    a, b, c, d = turn
+    turned = np.array(
+        [
+            w * a + x * d + y * c - z * b,
+            w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d,
+            w * d - x * a - y * b - z * c,
+        ]
+    )
+    for second in (turned, -turned):
+        found = attitude_angle(start, second)
+        assert abs(found - angle) < 1e-15 + 1e-13 * angle
+
+
+def test_box_and_ball_are_closed_and_wound_outward():
+    for mesh in (box_mesh(), ball_mesh()):
+        corners = mesh.vertices[mesh.triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        outward = np.einsum("ij,ij->i", normals, corners.mean(axis=1))
+        assert (outward >= 0.0).all()
+        volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+        assert volume == pytest.approx(8.0 if mesh is box_mesh() else 4.19, rel=0.02)
+        assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
+
+
+def spinning(spin: float, count: int = 20) -> np.ndarray:
+    """States (count, 13) of a body that turns about its z."""
+    rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, spin], (count, 1))
+    half = 0.5 * spin * 1e-9 * flight.PERIOD_NS * np.arange(count)
+    rows[:, 5], rows[:, 6] = np.sin(half), np.cos(half)
+    return rows
+
+
+def times(count: int, first: int = 0) -> np.ndarray:
+    return flight.PERIOD_NS * np.arange(first, first + count)
+
+
+def pictured(body: BodySnapshot = flight.BODY) -> tuple[Picture, Drawn]:
+    drawn = Drawn()
+    picture = Picture(drawn)
+    picture.set_mesh(0, flight.VERTICES, flight.TRIANGLES)
+    picture.set_body(0, body)
+    return picture, drawn
+
+
+WEIGHTLESS = BodySnapshot(flight.MASS, flight.COM, flight.INERTIA, flight.SCALE, np.zeros(3), "solid", "rk4")
+
+
+def test_arrows_are_as_long_as_their_values_through_all_runs_of_a_body():
+    picture, drawn = pictured(WEIGHTLESS)
+    lengths = {}
+    for spin in (15.0, 30.0, 60.0):
+        picture.draw(times(20), spinning(spin))
+        for name in (style.OMEGA, style.MOMENTUM):
+            lengths.setdefault(name, []).append(np.linalg.norm(drawn.at_end(name)[0]))
+        picture.restart()
+    for found in lengths.values():
+        assert np.allclose(np.divide(found, found[0]), [1.0, 2.0, 4.0], rtol=1e-12)
+    assert lengths[style.OMEGA][0] == pytest.approx(USUAL * picture.shape.size)
+
+
+def test_of_a_body_at_rest_no_arrow_and_no_label_is_drawn():
+    picture, drawn = pictured(WEIGHTLESS)
+    # What rounding leaves of a spin that a string has stopped.
+    picture.draw(times(5), spinning(4e-11, 5))
+    for name in (style.OMEGA, style.MOMENTUM):
+        assert not drawn.at_end(name).size and not drawn.at_end(name + "/label").size
+    # The first true spin has an arrow of a usual length, and so it is nothing beside it later.
+    picture.draw(times(5, 5), spinning(8.0, 5))
+    assert 0.1 < np.linalg.norm(drawn.at_end(style.OMEGA)) / picture.shape.size < 2.0
+    picture.draw(times(5, 10), spinning(4e-11, 5))
+    assert not drawn.at_end(style.OMEGA).size
+
+
+@settings(deadline=None)
+@given(st.floats(1e-9, 1e6), st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
+def test_a_stronger_load_has_a_longer_arrow_that_never_leaves_the_picture(first, size, factor):
+    scales = ArrowScales()
+    own, other = scales.lengths("N", np.array([first, factor * first]), size)
+    assert own == pytest.approx(USUAL * size)
+    if 0.01 < factor < LONGEST / USUAL:
+        assert other == pytest.approx(factor * own)
+    assert other <= LONGEST * size
+
+
+def test_labels_stand_beyond_the_tips_of_their_arrows():
+    picture, drawn = pictured(WEIGHTLESS)
+    picture.draw(times(20), spinning(15.0))
+    (tip,), (label,) = drawn.at_end(style.MOMENTUM), drawn.at_end(style.MOMENTUM + "/label")
+    assert np.allclose(np.cross(tip, label), 0.0, atol=1e-12) and np.linalg.norm(label) > 1.02 * np.linalg.norm(tip)
+
+
+def test_arrows_stand_at_their_points_and_only_while_the_load_acts():
+    picture, drawn = pictured()
+    states = flight.rows(50)
+    picture.load_began(200_000_000, 1, flight.POKE)
+    picture.draw(times(30), states[:30])
+    picture.load_ended(400_000_000, 1)
+    picture.draw(times(20, 30), states[30:])
+    name = style.load_part("poke", "force")
+    rows = drawn.rows(name)
+    assert {t for t, own in rows.items() if len(own)} == set(range(200_000_000, 400_000_000, flight.PERIOD_NS))
+    for time_ns, vectors in rows.items():
+        if not len(vectors):
+            continue
+        row = states[time_ns // flight.PERIOD_NS]
+        t = 2.0 * np.cross(row[3:6], flight.POKE.point)
+        point = row[0:3] + flight.POKE.point + row[6] * t + np.cross(row[3:6], t)
+        (origin,) = drawn.origins[name][time_ns]
+        ends = np.array([origin, origin + vectors[0]])
+        assert min(np.linalg.norm(ends - point, axis=1)) < 1e-12
+        assert np.allclose(np.cross(vectors[0], flight.POKE.force), 0.0, atol=1e-12)
+        assert np.dot(vectors[0], flight.POKE.force) > 0.0
+
+
+def test_a_load_shorter_than_the_time_between_two_states_is_shown_at_the_next_one():
+    picture, drawn = pictured()
+    picture.load_began(203_000_000, 1, flight.POKE)
+    picture.load_ended(205_000_000, 1)
+    picture.draw(times(30), flight.rows(30))
+    rows = drawn.rows(style.load_part("poke", "force"))
+    assert [t for t, own in rows.items() if len(own)] == [210_000_000]
+
+
+def test_an_impulse_is_shown_from_its_instant_for_a_moment():
+    picture, drawn = pictured()
+    push = ShownLoad("impulse", "body", np.array([0.1, 0, 0]), np.array([0.0, 0.0, 2.0]), np.zeros(3))
+    picture.load_began(100_000_000, 1, push)
+    picture.draw(times(60), flight.rows(60))
+    rows = drawn.rows(style.load_part("impulse", "force"))
+    shown = [t for t, own in rows.items() if len(own)]
+    assert shown[0] == 100_000_000 and shown[-1] == 240_000_000
+    assert len(shown) == 15 and not len(rows[250_000_000])
+
+
+def test_drift_counts_from_the_last_command_and_is_zero_while_one_acts():
+    rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 2], (50, 1))
+    # Spin that grows by a millionth a state, in mid-air and under the poke alike.
+    rows[:, 12] *= 1.0 + 1e-6 * np.arange(50)
+    picture, drawn = pictured(WEIGHTLESS)
+    picture.draw(times(10), rows[:10])
+    picture.load_began(200_000_001, 1, flight.POKE)
+    picture.load_ended(250_000_005, 1)
+    picture.draw(times(40, 10), rows[10:])
+    momentum = np.array([own[1] for own in drawn.rows(style.DRIFT).values()])
+    since = np.concatenate([np.arange(21), np.zeros(6), np.arange(1, 24)])
+    assert np.allclose(momentum, 1e-6 * since, rtol=1e-4, atol=1e-15)
+    L = 0.4 * rows[:, 12]
+    assert np.isclose(momentum[20], (L[20] - L[0]) / L[0], rtol=1e-9)
+
+
+def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let_go():
+    rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (60, 1))
+    # The body rises towards the hand at 1 m/s: 0.4 m long, the string goes slack half-way.
+    rows[:, 2], rows[:, 9] = 0.01 * np.arange(60), 1.0
+    knot, hand = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8])
+    picture, drawn = pictured()
+    picture.set_string(0, ShownString(knot, hand, hand, 0, 0, 50.0, 0.0, 0.4, False))
+    picture.set_string(495_000_000, None)
+    picture.draw(times(60), rows)
+    strips = drawn.rows(style.STRING)
+    assert [t for t, own in strips.items() if own] == times(50).tolist()
+    tensions = np.ravel(list(drawn.rows(style.STRING_TENSION).values()))
+    stretch = 0.8 - 0.1 - rows[:50, 2] - 0.4
+    assert np.allclose(tensions[:50], np.maximum(50.0 * stretch, 0.0), atol=1e-12)
+    assert not tensions[50:].any()
+    energies = np.array(list(drawn.rows(style.ENERGY).values()))
+    assert np.allclose(energies[:50, 4], 25.0 * np.maximum(stretch, 0.0) ** 2, atol=1e-12)
+    assert np.allclose(energies[:, 3], energies[:, :3].sum(axis=1) + energies[:, 4], rtol=1e-14)
+    for k in range(50):
+        (points,) = strips[k * flight.PERIOD_NS]
+        assert np.allclose(points[0], hand, atol=1e-12) and np.allclose(points[-1], rows[k, 0:3] + knot, atol=1e-12)
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        # 25 points of a parabola are a little shorter than it.
+        assert np.isclose(length, max(0.4, 0.4 + stretch[k]), rtol=5e-3)
+
+
+def test_without_a_string_the_energies_are_three_and_their_total():
+    picture, drawn = pictured()
+    picture.draw(times(20), flight.rows(20))
+    assert {len(own) for own in drawn.rows(style.ENERGY).values()} == {4}
+    assert style.STRING_TENSION not in drawn.parts
+
+
+def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends():
+    rows = flight.rows(60)
+    rows[-10:, 10:13] = 0.0
+    picture, drawn = pictured()
+    picture.draw(times(60), rows)
+    omegas, polhodes = drawn.rows(style.POINSOT_OMEGA), drawn.rows(style.POINSOT_POLHODE)
+    _, _, sizes = drawn.places[style.POINSOT_ELLIPSOID]
+    moments, axes = principal_axes(flight.INERTIA)
+    touched, planes = 0, drawn.rows(style.POINSOT_PLANE)
+    for time_ns, lines in planes.items():
+        row = rows[time_ns // flight.PERIOD_NS]
+        if not row[10:13].any():
+            assert not lines and not polhodes[time_ns]
+            continue
+        touched += 1
+        (tip,) = omegas[time_ns]
+        corners = np.array([lines[0][0], lines[0][1], lines[8][0]])
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normal *= np.sign(normal @ corners[0]) / np.linalg.norm(normal)
+        assert np.isclose(tip @ normal, corners[0] @ normal, rtol=1e-9)
+        (R,) = matrix_from_quaternion(row[np.newaxis, 3:7])
+        principal = axes.T @ R.T @ tip
+        assert np.isclose(np.sum((principal / sizes) ** 2), 1.0, rtol=1e-9)
+        # The plane is square to the ellipsoid there: its normal is the gradient I ω.
+        gradient = R @ axes @ (moments * principal)
+        assert np.allclose(gradient / np.linalg.norm(gradient), normal, atol=1e-9)
+        (curve,) = polhodes[time_ns]
+        assert np.linalg.norm(curve - principal, axis=1).min() < 0.1
+    assert touched >= 8 and touched < len(planes)
+
+
+def test_the_ghost_is_compared_with_the_body_at_equal_times():
+    picture, drawn = pictured()
+    picture.set_ghost(0, BodySnapshot(12.0, flight.COM, np.eye(3), flight.SCALE, flight.GRAVITY, "explicit", "rk4"))
+    body, ghost = flight.rows(30, seed=1), flight.rows(30, seed=2)
+    picture.draw(times(20), body[:20])
+    picture.draw_ghost(times(12), ghost[:12])
+    picture.draw(times(10, 20), body[20:])
+    picture.draw_ghost(times(18, 12), ghost[12:])
+    found = drawn.rows(style.GHOST_ANGLE)
+    assert list(found) == times(30).tolist()
+    apart = [attitude_angle(*pair) for pair in zip(body[:, 3:7], ghost[:, 3:7], strict=True)]
+    assert np.allclose(np.radians(np.ravel(list(found.values()))), apart, rtol=1e-14)
+
+
+def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
+    far = flight.VERTICES + 1e7
+    drawn = Drawn()
+    picture = Picture(drawn)
+    picture.set_mesh(0, far, flight.TRIANGLES)
+    com = np.array([0.15, 0.1, 0.05]) + 1e7
+    picture.set_body(0, BodySnapshot(1.0, com, np.eye(3), np.ones(3), np.zeros(3), "solid", "rk4"))
+    place, _, scale = drawn.places[style.BODY_MESH]
+    corners = drawn.meshes[style.BODY_MESH].vertices * scale + place
+    assert np.allclose(np.ptp(corners, axis=0), [0.3, 0.2, 0.1], rtol=1e-6)
+    assert np.allclose(corners.mean(axis=0), 0.0, atol=1e-8)
+
+
+def test_what_is_not_wanted_is_not_drawn():
+    drawn = Drawn()
+    picture = Picture(drawn, wanted=lambda name: name == style.OMEGA)
+    picture.set_mesh(0, flight.VERTICES, flight.TRIANGLES)
+    picture.set_body(0, flight.BODY)
+    picture.draw(times(20), flight.rows(20))
+    moving = {name for name in drawn.parts if name.startswith((style.CENTRE, style.POINSOT, "plots", style.TRAIL))}
+    assert moving == {style.OMEGA, style.OMEGA + "/label"}
+
+
+def test_a_backend_that_comes_late_is_told_what_is_drawn_only_once():
+    picture, drawn = pictured()
+    picture.draw(times(20), flight.rows(20))
+    late = Drawn()
+    late.begin(times(1, 20))
+    picture.describe(late)
+    assert set(late.meshes) == set(drawn.meshes) and late.size == drawn.size
+    assert set(late.places) == set(drawn.places) - {
+        *(style.BODY, style.CENTRE, style.POINSOT_BODY, style.POINSOT_UPRIGHT)
+    }
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.5, 3.0, np.pi - 1e-6, np.pi])
+def test_angles_are_accurate_at_both_ends(angle: float) -> None:
+    other = np.array([np.cos(angle), np.sin(angle), 0.0])
+    assert angle_to(np.array([2.0, 0.0, 0.0]), 5.0 * other[np.newaxis])[0] == pytest.approx(angle, rel=1e-9, abs=1e-16)
+    assert angle_to(np.zeros(3), other[np.newaxis])[0] == 0.0
