@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,11 @@ if TYPE_CHECKING:
     from ..robots.diagnosis import LinkDiagnosis
     from ..robots.fix import FixedLink
 
-_STATUS_STYLES = {"ok": "green", "off": "bold red"}
+_STATUS_STYLES = {
+    "uniform": "green",
+    "not uniform": "green",
+    **dict.fromkeys(("impossible", "impossible for its shape", "explained"), "bold red"),
+}
 SHOWN_ZERO = 5e-7
 """Of a quantity's largest entry: what is smaller is beyond the six digits shown, and stands as 0. JSON has it."""
 
@@ -101,32 +106,29 @@ def _row(values: Iterable[float]) -> str:
 
 
 def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
-    """What ``--compare`` prints: a paragraph for each link, one line for those that merely have no
-    inertial, and a count.
-    """
+    """What ``--compare`` prints: a paragraph for each link, and a count."""
     for d in diagnoses:
-        if d.status == "missing":
-            continue
-        by = f" by its {d.judged_by} shapes" if d.judged_by and d.status != "unknown" else ""
+        name = f" ({d.mesh})" if d.mesh else ""
+        by = f" by its {d.judged_by} shapes" if d.inertia_error is not None else ""
         note = f"; {d.note}" if d.note else ""
-        line((d.link, "bold"), f" ({d.mesh}): ", (d.status, _STATUS_STYLES.get(d.status, "yellow")), f"{by}{note}")
+        line((d.link, "bold"), f"{name}: ", (d.status, _STATUS_STYLES.get(d.status, "yellow")), f"{by}{note}")
         if d.inertia_error is not None:
             off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
             center = f"centre of mass {d.center_of_mass_error:.2g} of the size"
-            line(f"  relative errors: inertia {d.inertia_error:.2g}, {center}{off}")
+            line(f"  differs from the uniform solid: inertia {d.inertia_error:.2g} ({_ratio(d)}), {center}{off}")
         for cause in d.causes:
             line(f"  cause: {cause}")
         for doubt in d.doubts:
             line(f"  doubt: {doubt}")
-        if d.status == "off":
+        if d.status not in ("uniform", "not uniform"):
             _print_expected(d)
-    missing = [d for d in diagnoses if d.status == "missing"]
-    for d in missing:
-        line((d.link, "bold"), f" ({d.mesh}): ", ("missing", "yellow"), f": {', '.join(d.causes)}")
-        _print_expected(d)
-    counts = {status: sum(d.status == status for d in diagnoses) for status in ("ok", "off", "missing", "unknown")}
     if len(diagnoses) > 1:
-        line(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items() if count)}")
+        counts = Counter(d.status for d in diagnoses)
+        line(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items())}")
+
+
+def _ratio(d: LinkDiagnosis) -> str:
+    return f"{d.ratio:.3g} times as large"
 
 
 def _percent(error: float | None) -> str:
@@ -138,7 +140,10 @@ def print_diagnosis_lines(diagnoses: list[LinkDiagnosis]) -> None:
     for d in diagnoses:
         parts = []
         if d.inertia_error is not None:
-            parts = [f"inertia {_percent(d.inertia_error)}", f"centre of mass {_percent(d.center_of_mass_error)}"]
+            parts = [
+                f"inertia {_percent(d.inertia_error)} ({_ratio(d)})",
+                f"centre of mass {_percent(d.center_of_mass_error)}",
+            ]
         if d.mass_error is not None:
             parts.append(f"mass {_percent(d.mass_error)}")
         reasons = "; ".join(d.causes or ((d.note,) if d.inertia_error is None else ()))

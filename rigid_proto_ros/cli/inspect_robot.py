@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..robots.diagnosis import LinkDiagnosis, Options
     from ..robots.fix import FixedLink
 
-_COMPARES = ("link", "fix", "total_mass", "tolerance")
+_COMPARES = ("link", "fix", "all", "total_mass", "tolerance")
 _LUMPS = ("joint", "as_scene")
 
 
@@ -62,7 +62,9 @@ def given(option: str, values: list[tuple[str, float]] | None) -> Given:
 
 def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what concerns robots."""
-    parser.add_argument("--compare", metavar="ROBOT", help="show the errors of the inertials in a URDF, SDF or MJCF")
+    parser.add_argument(
+        "--compare", metavar="ROBOT", help="judge the inertials in a URDF, SDF or MJCF; exit 1 for wrong ones"
+    )
     parser.add_argument("--link", metavar="NAME", help="with --compare: this link alone")
     parser.add_argument(
         "--package-path", type=Path, action="append", default=[], metavar="DIR",
@@ -74,11 +76,10 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=float, metavar="T",
-        help="with --compare: one line per link; exit 1 when one has a relative error above T (default 1e-3)",
+        help="with --compare: one line per link; exit 1 also when one differs from a uniform solid by more than T",
     )  # fmt: skip
-    parser.add_argument(
-        "--fix", metavar="OUT", help="with --compare: write the file to OUT with every inertial that is off rewritten"
-    )
+    parser.add_argument("--fix", metavar="OUT", help="with --compare: write the file to OUT, wrong inertials rewritten")
+    parser.add_argument("--all", action="store_true", help="with --fix: rewrite those that aren't uniform, too")
     parser.add_argument(
         "--total-mass", type=float, metavar="M",
         help="with --compare: the robot weighs M kg, and links without --mass or --density share one density",
@@ -97,7 +98,7 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
     """Refuse options that need a robot, or another of its uses."""
     for names, use in ((_COMPARES, "compare"), (_LUMPS, "lump")):
         for name in names:
-            if getattr(args, use) is None and getattr(args, name) not in (None, []):
+            if getattr(args, use) is None and getattr(args, name) not in (None, False, []):
                 raise InputError(f"--{name.replace('_', '-')}", f"needs --{use} ROBOT")
     for flag, words in (("--package-path", args.package_path), ("--xacro", args.xacro)):
         if words and args.compare is None and args.lump is None:
@@ -112,8 +113,10 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
 
 
 def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
-    """``inspect [MESH] --compare ROBOT``: 0 when every link checked is right to the tolerance, otherwise 1."""
-    from ..robots.diagnosis import OFF, OK, UNKNOWN, compare_robot  # XML and all: only who compares pays for it
+    """``inspect [MESH] --compare ROBOT``: 1 when a link's inertial is wrong, otherwise 0; with a mesh or a tolerance
+    also 1 for one that differs from the uniform solid, and when nothing could be compared.
+    """
+    from ..robots.diagnosis import NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
 
     _check(args, mesh, scale)
     chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
@@ -127,11 +130,12 @@ def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass
         print_diagnosis_lines(diagnoses)
     else:
         print_diagnoses(diagnoses)
-    if args.tolerance is None:
-        return 0 if all(d.status == OK for d in diagnoses) else 1
-    # A check of nothing must not look like one that found nothing.
-    off, unknown = (sum(d.status == status for d in diagnoses) for status in (OFF, UNKNOWN))
-    return 1 if off or unknown == len(diagnoses) else 0
+    strict = mesh is not None or args.tolerance is not None
+    counted = (*WRONG, NOT_UNIFORM) if strict else WRONG
+    with_shapes = [d for d in diagnoses if d.mesh]
+    # A comparison of nothing must not look like one that found nothing.
+    nothing = strict and with_shapes and all(d.status == UNKNOWN for d in with_shapes)
+    return 1 if nothing or any(d.status in counted for d in diagnoses) else 0
 
 
 def lump(args: argparse.Namespace) -> int:
@@ -210,6 +214,8 @@ def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> No
         value = getattr(args, name)
         if value is not None and not 0.0 < value < float("inf"):
             raise InputError(f"--{name.replace('_', '-')}", value, "a finite number > 0")
+    if args.all and args.fix is None:
+        raise InputError("--all", "needs --fix OUT")
     if mesh is not None and (args.fix is not None or args.total_mass is not None):
         flag = "--fix" if args.fix is not None else "--total-mass"
         raise InputError(flag, "needs the whole robot: --compare ROBOT without a MESH")
@@ -239,18 +245,18 @@ def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
 
 
 def _fix(args: argparse.Namespace, options: Options) -> int:
-    """Write OUT; 0 when no link is off any longer, otherwise 1."""
-    from ..robots.diagnosis import OFF
+    """Write OUT; 0 when no link's inertial is wrong any longer, otherwise 1."""
+    from ..robots.diagnosis import WRONG
     from ..robots.fix import fix_robot
 
-    data, links = fix_robot(Path(args.compare), options, link=args.link)
+    data, links = fix_robot(Path(args.compare), options, link=args.link, everything=args.all)
     with whole_file("--fix", args.fix) as path:
         path.write_bytes(data)
     if args.json:
         print(json.dumps({"compare": args.compare, "fix": args.fix, "links": [_as_dict(link) for link in links]}))
     else:
         print_fixed_links(links, args.fix)
-    return 1 if any(link.after.status == OFF for link in links) else 0
+    return 1 if any(link.after.status in WRONG for link in links) else 0
 
 
 def _as_dict(link: FixedLink) -> dict:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from .reading import Shape
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""
+
+ANOTHER_DENSITY = "(another density?)"
 
 _INCH = 1.0 / 0.0254
 _POUND = 1.0 / 0.45359237
@@ -33,6 +36,22 @@ _FACTORS = {
     _POUND * _INCH**2: "tensor in lb in²",
 }
 _WEIGHT = np.array([1.0, 2.0, 2.0, 1.0, 2.0, 1.0])  # how often each of the six entries stands in the matrix
+_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_LARGEST_POWER = 9
+"""Of ten, by which a single entry may be off: from kg m² to g mm²."""
+
+
+def _quarter_turns() -> list[np.ndarray]:
+    """The 24 rotations (3, 3) that take the axes to each other."""
+    found = []
+    for order, signs in itertools.product(itertools.permutations(range(3)), itertools.product((1.0, -1.0), repeat=3)):
+        turn = np.eye(3)[list(order)] * np.array(signs)
+        if np.linalg.det(turn) > 0.0:
+            found.append(turn)
+    return found
+
+
+_QUARTER_TURNS = _quarter_turns()
 
 
 def _parallel(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
@@ -61,6 +80,18 @@ def _candidate_shapes(parts: LinkShapes, mass: float) -> list[tuple[str, MassPro
     return shapes
 
 
+def _conjugates(inertia: np.ndarray) -> list[np.ndarray]:
+    """Tensors (3, 3) that come out when the rotation from the principal axes is applied the other way round: one for
+    each choice of which axis is called first and which way it points.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    found = []
+    for turn in _QUARTER_TURNS:
+        rotation = axes @ turn
+        found.append(rotation.T @ (turn.T @ np.diag(moments) @ turn) @ rotation)
+    return found
+
+
 def _frame_mistakes(truth: MassProperties, mass: float, stated: np.ndarray, use: Shape) -> list[tuple[str, np.ndarray]]:
     """The true tensor (3, 3), and what comes out when it is taken about another point or in other axes."""
     com = truth.center_of_mass
@@ -71,6 +102,7 @@ def _frame_mistakes(truth: MassProperties, mass: float, stated: np.ndarray, use:
         ("taken about the stated origin, not about the COM", _parallel(truth.inertia, mass, com - stated)),
         ("moved from the COM to the origin the wrong way round", _parallel(truth.inertia, -mass, com)),
         ("in the mesh's axes, not in the link's", use.rotation.T @ truth.inertia @ use.rotation),
+        *(("turned by the conjugate of the principal rotation", turned) for turned in _conjugates(truth.inertia)),
     ]
 
 
@@ -83,6 +115,7 @@ def _entry_mistakes(inertia: np.ndarray) -> list[tuple[str, np.ndarray]]:
         ("products left out", (xx, 0.0, 0.0, yy, 0.0, zz)),
         ("order of entries: xx yy zz xy xz yz where xx xy xz yy yz zz belongs", (xx, yy, zz, xy, xz, yz)),
         ("order of entries: xx xy xz yy yz zz where xx yy zz xy xz yz belongs", (xx, yy, yz, xy, zz, xz)),
+        ("the first six of nine entries, row by row, where the upper triangle belongs", (xx, xy, xz, xy, yy, yz)),
         ("order of products: xy yz xz", (xx, xy, yz, yy, xz, zz)),
         ("order of products: yz xz xy", (xx, yz, xz, yy, xy, zz)),
     ]
@@ -103,6 +136,18 @@ def _entry_mistakes(inertia: np.ndarray) -> list[tuple[str, np.ndarray]]:
     return [(text, np.array(six)) for text, six in rows]
 
 
+def _one_entry(have: np.ndarray, want: np.ndarray, limit: float) -> str:
+    """The name of the one entry of six that is a power of ten times the wanted one, the others right; "" for none."""
+    wrong = np.abs(have - want) > limit * np.max(np.abs(want))
+    (k,) = np.flatnonzero(wrong) if wrong.sum() == 1 else (None,)
+    if k is None or not have[k] * want[k] > 0.0:
+        return ""
+    power = round(math.log10(have[k] / want[k]))
+    if not 1 <= abs(power) <= _LARGEST_POWER or abs(have[k] / want[k] / 10.0**power - 1.0) > limit:
+        return ""
+    return f"{_NAMES[k]} is 10^{power} times the true one"
+
+
 def explain_inertia(
     given: np.ndarray, mass: float, stated: np.ndarray, parts: LinkShapes, limit: float = LIMIT
 ) -> tuple[str, ...]:
@@ -114,24 +159,42 @@ def explain_inertia(
         return ("all entries zero",)
     have = np.array(six_from_tensor(given))
     found: list[tuple[int, int, tuple[str, ...]]] = []
+
+    def take(*causes: str) -> None:
+        named = tuple(filter(None, causes))
+        found.append((len(named), len(found), named))
+
     for shape, truth in _candidate_shapes(parts, mass):
-        for frame, inertia in _frame_mistakes(truth, mass, stated, parts.first):
-            for entry, want in _entry_mistakes(inertia):
-                size = float(np.sum(_WEIGHT * want * want))
-                fitted = float(np.sum(_WEIGHT * want * have)) / size if size > 0.0 else 0.0
-                for factor in (1.0, fitted):
-                    if factor > 0.0 and np.max(np.abs(have - factor * want)) <= limit * factor * np.max(np.abs(want)):
-                        causes = tuple(
-                            text for text in (shape, frame, entry, _factor_name(factor, mass, limit)) if text
-                        )
-                        found.append((len(causes), len(found), causes))
-                        break
+        frames = _frame_mistakes(truth, mass, stated, parts.first)
+        if not shape and len(parts.parts) > 1:
+            frames.append(("parts summed about their own centres", parts.summed_about_own_centers(mass)))
+        for frame, inertia in frames:
+            single = "" if frame else _one_entry(have, np.array(six_from_tensor(inertia)), limit)
+            if single:
+                take(shape, single)
+            entries = _entry_mistakes(inertia)
+            wants = np.array([six for _, six in entries])
+            sizes = np.einsum("ki,i,ki->k", wants, _WEIGHT, wants)
+            fitted = np.einsum("ki,i,i->k", wants, _WEIGHT, have) / np.maximum(sizes, 1e-300)
+            for factors in (np.ones(len(wants)), fitted):
+                bounds = limit * factors * np.max(np.abs(wants), axis=1)
+                fits = (factors > 0.0) & (np.max(np.abs(have - factors[:, None] * wants), axis=1) <= bounds)
+                for k in np.flatnonzero(fits):
+                    name = _factor_name(float(factors[k]), mass, limit)
+                    # A free factor fits what has few numbers of its own by chance: beside other mistakes, and of bodies
+                    # that are the same about every axis.
+                    if not name.endswith(ANOTHER_DENSITY) or not (frame or entries[k][0] or _is_isotropic(wants[k])):
+                        take(shape, frame, entries[k][0], name)
     if found:
         return min(found)[2]
-    diagonal = np.diag(given)
-    if not np.any(given - np.diag(diagonal)) and np.ptp(diagonal) <= 1e-9 * np.max(np.abs(diagonal)):
-        return (f"a placeholder: {diagonal[0]:g} on the diagonal",)
+    if _is_isotropic(have) and not _is_isotropic(np.array(six_from_tensor(parts.properties(mass).inertia))):
+        return (f"a placeholder: {have[0]:g} on the diagonal",)
     return ()
+
+
+def _is_isotropic(six: np.ndarray) -> bool:
+    """Whether a tensor is the same about every axis."""
+    return bool(np.max(np.abs(six - six[0] * np.array([1, 0, 0, 1, 0, 1]))) <= 1e-9 * abs(six[0]))
 
 
 def _factor_name(factor: float, mass: float, limit: float) -> str:
@@ -142,7 +205,7 @@ def _factor_name(factor: float, mass: float, limit: float) -> str:
             return (
                 f"{text}: {factor:.4g} times too large" if factor > 1.0 else f"{text}: {1 / factor:.4g} times too small"
             )
-    return f"{factor:.6g} times the tensor for this mass: computed for {factor * mass:.6g} kg (another density?)"
+    return f"{factor:.6g} times the tensor for this mass: computed for {factor * mass:.6g} kg {ANOTHER_DENSITY}"
 
 
 def explain_center(

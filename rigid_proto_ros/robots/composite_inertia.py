@@ -14,14 +14,11 @@ import numpy as np
 from ..base.errors import InputError
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
-from ..mesh.hull import box_surface
 from ..mesh.locate import Search
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
+from .link_shapes import primitive_surface
 from .poses import Pose, link_poses
 from .reading import COLLISION, VISUAL, LinkInertial, Shape, links_of, robot_root
-
-SEGMENTS = 48
-"""Corners of a round shape's circle: what a picture needs, for no mass is taken of it."""
 
 
 @dataclass(frozen=True)
@@ -156,35 +153,7 @@ def _surface(shape: Shape, search: Search) -> tuple[np.ndarray, np.ndarray]:
             raise InputError(shape.file, "vertices that are not finite")
         triangles = local.reshape(-1, 3)
         return vertices, triangles[:, ::-1] if np.prod(shape.scale) < 0.0 else triangles
-    size = np.array(shape.size)
-    if shape.kind == "box":
-        return box_surface(-0.5 * size, 0.5 * size)
-    arc = np.linspace(-0.5 * math.pi, 0.5 * math.pi, SEGMENTS // 2 + 1)
-    if shape.kind in ("sphere", "ellipsoid"):
-        vertices, triangles = _revolved(np.cos(arc), np.sin(arc))
-        return vertices * (size if shape.kind == "ellipsoid" else float(size[0])), triangles
-    r, half = float(size[0]), 0.5 * float(size[1])
-    if shape.kind == "cylinder":
-        return _revolved(np.array([0.0, r, r, 0.0]), np.array([-half, -half, half, half]))
-    arc = np.insert(arc, len(arc) // 2, 0.0)
-    return _revolved(r * np.cos(arc), r * np.sin(arc) + np.repeat([-half, half], len(arc) // 2))
-
-
-def _revolved(radius: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The closed surface that a profile (k,), from the axis below to the axis above, leaves around z."""
-    angle = 2.0 * math.pi / SEGMENTS * np.arange(SEGMENTS)
-    x, y = (np.outer(radius[1:-1], turn(angle)) for turn in (np.cos, np.sin))
-    rings = np.stack([x, y, np.repeat(height[1:-1, None], SEGMENTS, axis=1)], axis=2)
-    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, height[0]], [0.0, 0.0, height[-1]]]])
-    near = np.arange(SEGMENTS)
-    far = np.roll(near, -1)
-    last, bottom, top = (len(rings) - 1) * SEGMENTS, len(vertices) - 2, len(vertices) - 1
-    triangles = [np.stack([np.full(SEGMENTS, bottom), far, near], axis=1)]
-    for start in range(0, last, SEGMENTS):
-        a, b, c, d = start + near, start + far, start + SEGMENTS + far, start + SEGMENTS + near
-        triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
-    triangles.append(np.stack([last + near, last + far, np.full(SEGMENTS, top)], axis=1))
-    return vertices, np.concatenate(triangles)
+    return primitive_surface(shape.kind, shape.size)
 
 
 def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:

@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""How far a robot file's inertials are from those of its shapes, and which usual mistake explains the difference.
+"""A verdict on each inertial of a robot file, the first of these words that holds:
+
+* impossible: no body has it (mass > 0, tensor positive definite, A + B >= C);
+* impossible for its shape: no mass distribution inside the link's shapes has it (robots/realizable.py);
+* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
+* not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it;
+* uniform: it is the uniform solid's, to the tolerance and the digits printed;
+* unknown: it can't be compared, for want of a shape that encloses a volume.
 
 The file's mass is taken as it is, so that the tensor and the COM are checked for themselves; with a density (or mass)
-given on the command line the mass is checked, too. A mistake counts as the cause when undoing it brings the difference
-below the limit. What a link shows and what it collides with are diagnosed each, and the better of both is named.
+given on the command line the mass is checked, too. What a link shows and what it collides with are compared each, and
+the better of both is named; a mass distribution may lie in either.
 """
 
 from __future__ import annotations
@@ -19,26 +26,27 @@ import numpy as np
 from ..base.errors import InputError, did_you_mean
 from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.properties import MassProperties
-from ..mass.tensor import check_tensor
 from ..mesh.locate import Search, resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .causes import LIMIT, explain_center, explain_inertia
 from .link_shapes import LinkShapes, primitive_solid
 from .reading import COLLISION, VISUAL, LinkInertial, Shape, read_robot
+from .realizable import MAX_ROUNDING, beyond_shapes, impossible_inertial
 
 WATER = 1000.0
 """kg/m³ of a link of which no mass is known."""
-MAX_ROUNDING = 0.05
-"""A number printed with one digit is right to 50 %, which would excuse anything: this much is excused at most."""
-OK, OFF, MISSING, UNKNOWN = "ok", "off", "missing", "unknown"
-_RANK = {OFF: 0, MISSING: 1, UNKNOWN: 2, OK: 3}
+IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
+NOT_UNIFORM, UNIFORM, UNKNOWN = "not uniform", "uniform", "unknown"
+WRONG = (IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED)
+"""Verdicts on inertials that nobody can have meant."""
+VERDICTS = (*WRONG, NOT_UNIFORM, UNIFORM, UNKNOWN)
 
 
 @dataclass(frozen=True)
 class LinkDiagnosis:
-    """One link: ``status`` is ok, off, missing (no inertial) or unknown; errors are relative (COM over the box's
-    diagonal); ``judged_by`` says whether by its visual or its collision shapes, of which ``volume`` [m³] is the sum;
-    ``doubts``: what they enclose twice."""
+    """One link: ``status`` is one of VERDICTS; errors are relative (COM over the box's diagonal), ``ratio`` is the
+    tensor's size over that of the uniform solid; ``judged_by`` says whether by its visual or its collision shapes, of
+    which ``volume`` [m³] is the sum; ``doubts``: what they enclose twice."""
 
     link: str
     mesh: str
@@ -47,6 +55,7 @@ class LinkDiagnosis:
     mass_error: float | None = None
     center_of_mass_error: float | None = None
     inertia_error: float | None = None
+    ratio: float | None = None
     causes: tuple[str, ...] = ()
     expected: MassProperties | None = None
     note: str = ""
@@ -74,6 +83,7 @@ class LinkDiagnosis:
             "mass_error": self.mass_error,
             "center_of_mass_error": self.center_of_mass_error,
             "inertia_error": self.inertia_error,
+            "ratio": self.ratio,
             "causes": list(self.causes),
             "expected": expected,
             "note": self.note,
@@ -125,54 +135,48 @@ def _tensor_error(link: LinkInertial, truth: MassProperties) -> tuple[float, flo
 
 
 def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by: str = "") -> LinkDiagnosis:
-    """Judge one link by shapes of its own."""
+    """Compare one link with shapes of its own as a solid of one density."""
     plain = LinkDiagnosis(link.link, parts.names, UNKNOWN, link.mass, judged_by=judged_by)
     try:
         volume = parts.volume()
         plain = replace(plain, volume=volume, doubts=parts.doubts)
         wanted = options.mass_of(link.link, volume)
         if link.problem:
-            expected = parts.properties(wanted or WATER * volume)
-            return replace(plain, status=MISSING, mass=math.nan, causes=(link.problem,), expected=expected)
-        if not (0.0 < link.mass < math.inf) or not np.all(np.isfinite(link.inertia)):
+            return replace(plain, note=link.problem, expected=parts.properties(wanted or WATER * volume))
+        finite = np.all(np.isfinite(link.inertia)) and np.all(np.isfinite(link.center_of_mass))
+        if not (0.0 < link.mass < math.inf) or not finite:
             known = wanted or link.mass
-            expected = parts.properties(known) if 0.0 < known < math.inf else None
-            return replace(plain, status=OFF, causes=("mass or tensor not a positive number",), expected=expected)
+            return replace(plain, expected=parts.properties(known) if 0.0 < known < math.inf else None)
         truth = parts.properties(link.mass)
     except InputError as error:
-        if link.problem:
-            return replace(plain, status=MISSING, mass=math.nan, causes=(link.problem,), note=str(error))
-        return replace(plain, note=str(error))
+        return replace(plain, note=": ".join(filter(None, (link.problem, str(error)))))
     diagonal = parts.diagonal
     offset = np.abs(link.center_of_mass - truth.center_of_mass)
     center_left = float(np.max(offset - np.minimum(link.center_step, MAX_ROUNDING * diagonal))) / diagonal
     inertia_error, inertia_left = _tensor_error(link, truth)
     mass_error = abs(link.mass - wanted) / wanted if wanted else None
-    causes: list[str] = []
+    causes: tuple[str, ...] = ()
     if inertia_left > options.tolerance:
-        found = explain_inertia(link.inertia, link.mass, link.center_of_mass, parts)
-        causes += found or ("tensor: no usual cause fits",)
-    try:
-        check_tensor(link.inertia)
-    except InputError as error:
-        causes.append(f"no rigid body has this tensor: {error}")
+        causes += explain_inertia(link.inertia, link.mass, link.center_of_mass, parts)
     if center_left > options.tolerance:
-        causes += explain_center(link.center_of_mass, parts, truth) or ("COM: no usual cause fits",)
+        causes += explain_center(link.center_of_mass, parts, truth)
     if mass_error is not None and mass_error > options.tolerance + min(link.mass_step / link.mass, MAX_ROUNDING):
-        causes.append(f"mass: {wanted:.6g} kg expected")
+        causes += (f"mass: {wanted:.6g} kg expected",)
     note = f"density {link.mass / volume:.4g} kg/m³"
     if not 1.0 <= link.mass / volume <= 25000.0:
         note += ", which no solid has: units of the mesh or of the mass?"
     expected = truth
     if wanted:
         expected = MassProperties(wanted, truth.center_of_mass, truth.inertia * (wanted / link.mass))
+    off = max(inertia_left, center_left) > options.tolerance
     return replace(
         plain,
-        status=OFF if causes else OK,
+        status=EXPLAINED if causes else NOT_UNIFORM if off else UNIFORM,
         mass_error=mass_error,
         center_of_mass_error=float(np.max(offset)) / diagonal,
         inertia_error=inertia_error,
-        causes=tuple(causes),
+        ratio=float(np.sum(link.inertia * truth.inertia) / np.sum(truth.inertia**2)),
+        causes=causes,
         expected=expected,
         note=note,
     )
@@ -210,8 +214,7 @@ class Robot:
         volumes: dict[str, float] = {}
         rest = total
         for link in self.links:
-            diagnosis = self.diagnose(link)
-            volume = diagnosis.volume if diagnosis else 0.0
+            volume = self.diagnose(link).volume
             known = self.options.mass_of(link.link, volume)
             if known or not (volume or link.problem):
                 rest -= known or link.mass
@@ -225,9 +228,8 @@ class Robot:
         return {**given, **{name: density * volume for name, volume in volumes.items()}}
 
     def diagnoses(self, only: str | None = None) -> list[tuple[LinkInertial, LinkDiagnosis]]:
-        """The links that have a shape (or that one) with their diagnoses, in the file's order."""
-        found = [(link, self.diagnose(link)) for link in self.links if only in (None, link.link)]
-        return [(link, diagnosis) for link, diagnosis in found if diagnosis is not None]
+        """The links (or that one) with their diagnoses, in the file's order."""
+        return [(link, self.diagnose(link)) for link in self.links if only in (None, link.link)]
 
     def _body(self, file: str) -> MeshBody:
         mesh = load_mesh(file, max_triangles=self.options.max_triangles, search=self.search)
@@ -246,21 +248,23 @@ class Robot:
                 found.append((shape, None))
         return LinkShapes(found)
 
-    def diagnose(self, link: LinkInertial) -> LinkDiagnosis | None:
-        """The link by what it shows and by what it collides with, the better of both; None without any shape."""
-        diagnoses = []
+    def diagnose(self, link: LinkInertial) -> LinkDiagnosis:
+        """The verdict on a link: by what it shows and by what it collides with, the better of both."""
+        found, inside = [], []
         for role in (VISUAL, COLLISION):
             shapes = [shape for shape in link.shapes if shape.role == role]
             if not shapes:
                 continue
             try:
-                diagnoses.append(diagnose(link, self.parts(shapes), self.options, role))
+                parts = self.parts(shapes)
+                inside.append(parts.points)
+                found.append(diagnose(link, parts, self.options, role))
             except InputError as error:
+                note = ": ".join(filter(None, (link.problem, str(error))))
                 name = shapes[0].file or shapes[0].kind
-                status, causes = (MISSING, (link.problem,)) if link.problem else (UNKNOWN, ())
-                plain = LinkDiagnosis(link.link, name, status, link.mass, causes=causes, note=str(error))
-                diagnoses.append(replace(plain, judged_by=role))
-        return min(diagnoses, key=_quality, default=None)
+                found.append(LinkDiagnosis(link.link, name, UNKNOWN, link.mass, note=note, judged_by=role))
+        bare = LinkDiagnosis(link.link, "", UNKNOWN, link.mass, note=link.problem or "no shape to compare it with")
+        return judged(link, min(found, key=_quality, default=bare), inside)
 
     def fitting(self, body: MeshBody) -> list[tuple[LinkInertial, Shape]]:
         """The links' shapes that are the mesh: by its whole path, else by as many of the path's last parts as agree."""
@@ -279,10 +283,25 @@ class Robot:
             return False
 
 
-def _quality(diagnosis: LinkDiagnosis) -> tuple[int, float]:
-    """The better of two diagnoses of a link has the smaller one: diagnosed before not, then by error."""
-    order = {OK: 0, OFF: 1, MISSING: 2, UNKNOWN: 3}[diagnosis.status]
-    return order + (diagnosis.status == MISSING and diagnosis.expected is None), diagnosis.error
+def judged(link: LinkInertial, diagnosis: LinkDiagnosis, inside: list[np.ndarray]) -> LinkDiagnosis:
+    """The diagnosis with the verdict that the link's inertial is impossible, where it is; ``inside``: points (n, 3) of
+    the shapes.
+    """
+    if link.problem:
+        return diagnosis
+    reasons = impossible_inertial(link)
+    if reasons:
+        return replace(diagnosis, status=IMPOSSIBLE, causes=(*reasons, *diagnosis.causes))
+    beyond = beyond_shapes(link, np.concatenate(inside)) if inside else ""
+    if beyond:
+        return replace(diagnosis, status=BEYOND_SHAPE, causes=(beyond, *diagnosis.causes))
+    return diagnosis
+
+
+def _quality(diagnosis: LinkDiagnosis) -> tuple[int, bool, float]:
+    """The better of two diagnoses of a link has the smaller one: the closest verdict, then by error."""
+    order = {UNIFORM: 0, EXPLAINED: 1, NOT_UNIFORM: 2, UNKNOWN: 3}[diagnosis.status]
+    return order, diagnosis.expected is None, diagnosis.error
 
 
 def _common_parts(first: str, second: str) -> int:
@@ -313,7 +332,8 @@ def _by_mesh(robot: Robot, mesh: str, scale: np.ndarray | None, link_name: str |
     link, shape = pairs[0]
     if scale is not None:
         shape = replace(shape, scale=scale)
-    return diagnose(link, LinkShapes([(shape, body)]), options, shape.role)
+    parts = LinkShapes([(shape, body)])
+    return judged(link, diagnose(link, parts, options, shape.role), [parts.points])
 
 
 def compare_robot(
@@ -324,8 +344,8 @@ def compare_robot(
     scale: np.ndarray | None = None,
     link: str | None = None,
 ) -> list[LinkDiagnosis]:
-    """Diagnoses of a file's links that have a shape, those farthest off first; of ``link`` alone when it is named, and
-    with ``mesh`` of the one link that the mesh belongs to, by that mesh at ``scale``.
+    """Diagnoses of a file's links, the worst verdict and those farthest off first; of ``link`` alone when it is named,
+    and with ``mesh`` of the one link that the mesh belongs to, by that mesh at ``scale``.
 
     Raises InputError when the file, or nothing in it, can be diagnosed.
     """
@@ -334,12 +354,7 @@ def compare_robot(
         robot.require(link)
     if mesh is not None:
         return [_by_mesh(robot, mesh, scale, link)]
-    return ranked(robot, link)
-
-
-def ranked(robot: Robot, link: str | None = None) -> list[LinkDiagnosis]:
-    """Diagnoses of the robot's links (or of that one), those farthest off first; raises InputError when it has none."""
     diagnoses = [diagnosis for _, diagnosis in robot.diagnoses(link)]
     if not diagnoses:
-        raise InputError("compare", robot.path.name, "links with a shape, or a mesh: inspect MESH --compare FILE")
-    return sorted(diagnoses, key=lambda diagnosis: (_RANK[diagnosis.status], -diagnosis.error))
+        raise InputError("compare", path.name, "links with an inertial or a shape")
+    return sorted(diagnoses, key=lambda diagnosis: (VERDICTS.index(diagnosis.status), -diagnosis.error))

@@ -19,7 +19,7 @@ from ..base.files import read_bounded
 from ..mass.export import is_flat, quaternion_wxyz
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
-from .diagnosis import MISSING, OFF, UNKNOWN, LinkDiagnosis, Options, Robot
+from .diagnosis import NOT_UNIFORM, UNIFORM, UNKNOWN, LinkDiagnosis, Options, Robot
 from .reading import MAX_BYTES, LinkInertial, is_xacro, links_of, parse_xml
 
 _SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -28,7 +28,7 @@ _ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 @dataclass(frozen=True)
 class FixedLink:
-    """One link before and after; ``left``: why nothing was written though it is off or has no inertial, else ""."""
+    """One link before and after; ``left``: why nothing was written though it isn't uniform, else ""."""
 
     before: LinkDiagnosis
     after: LinkDiagnosis
@@ -217,14 +217,18 @@ def _indent(data: bytes, start: int) -> bytes:
     return data[line - data[:line].endswith(b"\r") : start]
 
 
-def _reason_to_leave(link: LinkInertial, diagnosis: LinkDiagnosis, options: Options, places: dict) -> str:
-    """Why a link that is off or has no inertial can't, or shan't, be written; "" when it can."""
+def _reason_to_leave(
+    link: LinkInertial, diagnosis: LinkDiagnosis, options: Options, places: dict, everything: bool
+) -> str:
+    """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
+    if diagnosis.status == NOT_UNIFORM and not everything:
+        return "a body of its shapes can have it; --all makes it uniform"
+    if link.problem and not options.mass_of(link.link, diagnosis.volume):
+        return f"{diagnosis.note}; --mass LINK=M or --density LINK=D writes one"
     if diagnosis.expected is None:
-        if diagnosis.status == OFF:
+        if diagnosis.volume:
             return "its mass isn't a positive number; --mass LINK=M or --density LINK=D says what it is"
-        return diagnosis.note or "its shapes can't be taken"
-    if diagnosis.status == MISSING and not options.mass_of(link.link, diagnosis.volume):
-        return f"{link.problem}; --mass LINK=M or --density LINK=D writes one"
+        return diagnosis.note
     if link.element is None or id(link.element) not in places:
         return "it stands in an included file"
     frame = link.element.find("pose")
@@ -233,9 +237,11 @@ def _reason_to_leave(link: LinkInertial, diagnosis: LinkDiagnosis, options: Opti
     return ""
 
 
-def fix_robot(path: Path, options: Options, *, link: str | None = None) -> tuple[bytes, list[FixedLink]]:
-    """The file's bytes with every inertial that is off (or that of ``link`` alone) rewritten from the link's shapes,
-    and what became of each link that has any.
+def fix_robot(
+    path: Path, options: Options, *, link: str | None = None, everything: bool = False
+) -> tuple[bytes, list[FixedLink]]:
+    """The file's bytes with every wrong inertial (or that of ``link`` alone) rewritten from the link's shapes, and what
+    became of each link; ``everything``: those that are possible, but not uniform, as well.
 
     The mass stays unless the options say another one; COM and tensor become those of a solid of one density. Raises
     InputError for a file that can't be read, is xacro, or isn't written in ASCII's bytes.
@@ -260,10 +266,10 @@ def fix_robot(path: Path, options: Options, *, link: str | None = None) -> tuple
     diagnosed = robot.diagnoses(link)
     reasons = []
     for known, diagnosis in diagnosed:
-        if diagnosis.status not in (OFF, MISSING):
+        if diagnosis.status == UNIFORM or (diagnosis.status == UNKNOWN and not known.problem):
             reasons.append(diagnosis.note if diagnosis.status == UNKNOWN else "")
             continue
-        reasons.append(_reason_to_leave(known, diagnosis, robot.options, places))
+        reasons.append(_reason_to_leave(known, diagnosis, robot.options, places, everything))
         if not reasons[-1] and known.element is not None and diagnosis.expected is not None:
             span = places[id(known.element)]
             text = _rewritten(data, span, known, diagnosis.expected, _WRITERS[str(root.tag)])

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -14,8 +13,11 @@ from ..mass.from_mesh import MeshBody
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
 from ..mass.verdict import COUNTED_TWICE, WARNING
-from ..mesh.hull import convex_hull
+from ..mesh.hull import box_surface, convex_hull
 from .reading import Shape
+
+SEGMENTS = 48
+"""Corners of a round shape's circle; a multiple of 4, so that its box is exact."""
 
 
 def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarray]:
@@ -42,14 +44,39 @@ def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarr
     return volume, square
 
 
-def _half_box(shape: Shape) -> np.ndarray:
-    """Half the sides (3,) of a primitive's box in its own frame."""
-    if shape.kind == "box":
-        return 0.5 * np.array(shape.size)
-    if shape.kind in ("sphere", "ellipsoid"):
-        return np.array(shape.size * 3 if shape.kind == "sphere" else shape.size)
-    r, length = shape.size
-    return np.array([r, r, 0.5 * length + (r if shape.kind == "capsule" else 0.0)])
+def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and outward triangles (m, 3) of a primitive about its centre, ``size`` as in Shape; round ones
+    are inscribed.
+    """
+    if kind == "box":
+        half = 0.5 * np.array(size)
+        return box_surface(-half, half)
+    arc = np.linspace(-0.5 * math.pi, 0.5 * math.pi, SEGMENTS // 2 + 1)
+    if kind in ("sphere", "ellipsoid"):
+        vertices, triangles = _revolved(np.cos(arc), np.sin(arc))
+        return vertices * size, triangles
+    r, half_length = size[0], 0.5 * size[1]
+    if kind == "cylinder":
+        return _revolved(np.array([0.0, r, r, 0.0]), half_length * np.array([-1.0, -1.0, 1.0, 1.0]))
+    arc = np.insert(arc, len(arc) // 2, 0.0)
+    return _revolved(r * np.cos(arc), r * np.sin(arc) + np.repeat([-half_length, half_length], len(arc) // 2))
+
+
+def _revolved(radius: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The closed surface that a profile (k,), from the axis below to the axis above, leaves around z."""
+    angle = 2.0 * math.pi / SEGMENTS * np.arange(SEGMENTS)
+    x, y = (np.outer(radius[1:-1], turn(angle)) for turn in (np.cos, np.sin))
+    rings = np.stack([x, y, np.repeat(height[1:-1, None], SEGMENTS, axis=1)], axis=2)
+    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, height[0]], [0.0, 0.0, height[-1]]]])
+    near = np.arange(SEGMENTS)
+    far = np.roll(near, -1)
+    last, bottom, top = (len(rings) - 1) * SEGMENTS, len(vertices) - 2, len(vertices) - 1
+    triangles = [np.stack([np.full(SEGMENTS, bottom), far, near], axis=1)]
+    for start in range(0, last, SEGMENTS):
+        a, b, c, d = start + near, start + far, start + SEGMENTS + far, start + SEGMENTS + near
+        triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    triangles.append(np.stack([last + near, last + far, np.full(SEGMENTS, top)], axis=1))
+    return vertices, np.concatenate(triangles)
 
 
 class LinkShapes:
@@ -77,11 +104,11 @@ class LinkShapes:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """Vertices and corners (n, 3) of boxes around primitives, in the link's frame."""
+        """Vertices (n, 3) of all shapes, round primitives as inscribed surfaces, in the link's frame."""
         found = []
         for shape, body in self.parts:
             if body is None:
-                own = np.array(list(product((-1.0, 1.0), repeat=3))) * _half_box(shape)
+                own, _ = primitive_surface(shape.kind, shape.size)
             else:
                 own = referenced_vertices(body.vertices, body.moments.triangles) * shape.scale
             found.append(own @ shape.rotation.T + shape.position)
@@ -144,6 +171,15 @@ class LinkShapes:
         properties = body.moments.mass_properties(model, scale=shape.scale, mass=size)
         moment = 0.5 * np.trace(properties.inertia) * np.eye(3) - properties.inertia
         return size, R @ properties.center_of_mass + shape.position, R @ moment @ R.T
+
+    def summed_about_own_centers(self, mass: float) -> np.ndarray:
+        """What comes out (3, 3) when the parts' tensors are added as if all had one centre of mass."""
+        measure, moment = 0.0, np.zeros((3, 3))
+        for shape, body in self.parts:
+            size, _, own = self._part(shape, body, "solid")
+            measure += size
+            moment += own
+        return mass / measure * (np.trace(moment) * np.eye(3) - moment)
 
     def hull(self, mass: float) -> MassProperties | None:
         """The convex hull of a single mesh as a solid of ``mass``; None when it has no volume."""

@@ -53,7 +53,7 @@ def test_a_mesh_is_matched_by_its_whole_path(tmp_path):
     path = urdf(tmp_path, shapes + inertial())
     for name in ("visual", "collision"):
         (link,) = compare_robot(path, Options(), mesh=str(tmp_path / name / "base.stl"))
-        assert (link.status, link.judged_by) == ("ok", name) and link.inertia_error < 1e-6
+        assert (link.status, link.judged_by) == ("uniform", name) and link.inertia_error < 1e-6
     (tmp_path / "base.stl").write_bytes(stl(CUBE))
     with pytest.raises(InputError, match="whole path"):
         compare_robot(path, Options(), mesh=str(tmp_path / "base.stl"))
@@ -96,7 +96,7 @@ def test_mjcf_is_read_as_its_compiler_reads_it(tmp_path, text):
     )
     (tmp_path / "geoms.xml").write_text('<mujocoinclude><geom type="mesh" mesh="c" pos="0.3 0 0"/></mujocoinclude>')
     link = judge(path)["b"]
-    assert (link.status, link.causes) == ("ok", ())
+    assert (link.status, link.causes) == ("uniform", ())
     assert link.expected.center_of_mass == pytest.approx([0.3, 0.0, 0.0], abs=1e-7)
     # MuJoCo's own opinion of the same geoms, at a density that gives 1 kg.
     path.write_text(
@@ -140,16 +140,16 @@ def test_packages_are_found_upwards_by_name_by_package_xml_and_where_one_says(tm
         mesh("file://../meshes/a b.stl"),
     ]
     path = urdf(folder / "urdf", *(text + inertial() for text in links))
-    assert {d.status for d in judge(path).values()} == {"ok"}
+    assert {d.status for d in judge(path).values()} == {"uniform"}
     folder.rename(tmp_path / "ws" / "src" / "clone")
     path = tmp_path / "ws" / "src" / "clone" / "urdf" / "robot.urdf"
     assert judge(path)["l0"].status == "unknown"
     assert "--package-path" in judge(path)["l0"].note
     (path.parent.parent / "package.xml").write_text("<package><name>my_robot</name></package>")
-    assert judge(path)["l0"].status == "ok"
+    assert judge(path)["l0"].status == "uniform"
     elsewhere = urdf(tmp_path / "elsewhere", mesh("package://my_robot/meshes/a b.stl") + inertial())
     assert judge(elsewhere)["l0"].status == "unknown"
-    assert judge(elsewhere, folders=(path.parent.parent,))["l0"].status == "ok"
+    assert judge(elsewhere, folders=(path.parent.parent,))["l0"].status == "uniform"
 
 
 def test_several_shapes_of_a_link_are_put_together(tmp_path):
@@ -161,8 +161,15 @@ def test_several_shapes_of_a_link_are_put_together(tmp_path):
     boxes = "".join(
         f'<collision><origin xyz="{x} 0 0"/><geometry><box size="1 1 1"/></geometry></collision>' for x in (-1, 1)
     )
-    links = judge(urdf(tmp_path, two + text, boxes + text))
-    assert [(d.status, d.judged_by) for d in (links["l0"], links["l1"])] == [("ok", "visual"), ("ok", "collision")]
+    apart = (
+        f'<inertial><mass value="1.000000"/><inertia ixx="{SIXTH:.9g}" iyy="{SIXTH:.9g}" izz="{SIXTH:.9g}"/></inertial>'
+    )
+    links = judge(urdf(tmp_path, two + text, boxes + text, boxes + apart))
+    assert (links["l2"].status, links["l2"].causes) == ("explained", ("parts summed about their own centres",))
+    assert [(d.status, d.judged_by) for d in (links["l0"], links["l1"])] == [
+        ("uniform", "visual"),
+        ("uniform", "collision"),
+    ]
 
 
 def test_visual_and_collision_are_judged_and_the_better_is_named(tmp_path):
@@ -176,7 +183,10 @@ def test_visual_and_collision_are_judged_and_the_better_is_named(tmp_path):
             mesh("open.obj") + mesh("cube.obj", role="collision") + inertial(),
         )
     )
-    assert [(d.status, d.judged_by) for d in (links["l0"], links["l1"])] == [("ok", "visual"), ("ok", "collision")]
+    assert [(d.status, d.judged_by) for d in (links["l0"], links["l1"])] == [
+        ("uniform", "visual"),
+        ("uniform", "collision"),
+    ]
 
 
 @pytest.mark.parametrize(("kind", "size"), [("box", (1.0, 2.0, 3.0)), ("cylinder", (0.5, 2.0)), ("sphere", (0.7,)), ("capsule", (0.5, 1.5)), ("ellipsoid", (0.3, 0.5, 0.9))])  # fmt: skip
@@ -207,7 +217,7 @@ def test_the_digits_printed_excuse_what_they_leave_open_and_no_more(tmp_path):
     far = mesh("cube.obj") + inertial("0.012", 0.0132 / 6.0)
     coarse = mesh("cube.obj") + inertial("1.00000", 0.17)
     links = judge(urdf(tmp_path, right, wrong, far, coarse))
-    assert [links[f"l{k}"].status for k in range(4)] == ["ok", "off", "off", "ok"]
+    assert [links[f"l{k}"].status for k in range(4)] == ["uniform", "not uniform", "not uniform", "uniform"]
 
 
 def test_the_last_digits_step_is_of_the_group():
@@ -223,10 +233,12 @@ def test_missing_inertials_stand_apart_and_the_rest_is_ranked(tmp_path, capsys):
     shape = mesh("cube.obj")
     path = urdf(tmp_path, shape, shape + inertial(moment=0.2), shape + inertial(), shape + inertial(moment=20.0))
     diagnoses = compare_robot(path, Options())
-    assert [(d.link, d.status) for d in diagnoses] == [("l3", "off"), ("l1", "off"), ("l0", "missing"), ("l2", "ok")]
+    verdicts = [("l3", "impossible for its shape"), ("l1", "not uniform"), ("l2", "uniform"), ("l0", "unknown")]
+    assert [(d.link, d.status) for d in diagnoses] == verdicts
     assert main(["inspect", "--compare", str(path)]) == 1
     out = capsys.readouterr().out
-    assert "l0 (cube): missing: no <inertial>" in out and "4 links: 1 ok, 2 off, 1 missing" in out
+    assert "l0 (cube): unknown; no <inertial>" in out
+    assert "4 links: 1 impossible for its shape, 1 not uniform, 1 uniform, 1 unknown" in out
     assert main(["inspect", "--compare", str(path), "--link", "l2", "--json"]) == 0
     assert [link["link"] for link in json.loads(capsys.readouterr().out)["links"]] == ["l2"]
 
@@ -247,7 +259,7 @@ def test_xacro_in_comments_is_no_xacro_and_the_rest_is_expanded_where_it_is_inst
     path = urdf(tmp_path, mesh("cube.obj") + inertial())
     plain = path.read_text()
     path.write_text("<!-- made by xacro: <xacro:macro/> -->" + plain)
-    assert judge(path)["l0"].status == "ok"
+    assert judge(path)["l0"].status == "uniform"
     path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
@@ -256,7 +268,7 @@ def test_xacro_in_comments_is_no_xacro_and_the_rest_is_expanded_where_it_is_inst
     program = tmp_path / "xacro"
     program.write_text(f"#!/bin/sh\n/bin/cat <<'END'\n{plain}\nEND\n")
     program.chmod(0o755)
-    assert judge(path)["l0"].status == "ok"
+    assert judge(path)["l0"].status == "uniform"
     program.write_text("#!/bin/sh\necho no such argument >&2\nexit 3\n")
     with pytest.raises(InputError, match="no such argument"):
         judge(path)
@@ -276,7 +288,7 @@ def test_xacro_is_found_beside_the_python_that_runs(tmp_path, monkeypatch):
     path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "python"))
-    assert judge(path)["l0"].status == "ok"
+    assert judge(path)["l0"].status == "uniform"
 
 
 def test_each_meshs_hull_is_made_once_a_link(tmp_path, monkeypatch):
@@ -287,7 +299,7 @@ def test_each_meshs_hull_is_made_once_a_link(tmp_path, monkeypatch):
     monkeypatch.setattr(link_shapes, "convex_hull", lambda points: calls.append(1) or hull(points))
     vertices, triangles = box((1.0, 2.0, 3.0), 3)
     (tmp_path / "part.obj").write_bytes(obj(vertices, triangles))
-    assert judge(urdf(tmp_path, mesh("part.obj") + inertial(moment=7.0, center="0.2 0.3 0.4")))["l0"].status == "off"
+    assert judge(urdf(tmp_path, mesh("part.obj") + inertial(moment=7.0, center="0.2 0.3 0.4")))["l0"].causes
     assert len(calls) == 1
 
 
@@ -328,7 +340,7 @@ def test_xacro_is_told_where_packages_lie_and_given_its_arguments(tmp_path, monk
     )  # fmt: skip
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert judge(path, xacro=("kind:=small",))["l0"].status == "ok"
+    assert judge(path, xacro=("kind:=small",))["l0"].status == "uniform"
     assert main(["inspect", "--compare", str(path), "--xacro", "kind:=small"]) == 0
     assert main(["inspect", "--lump", str(path), "--xacro", "kind:=small"]) == 0
     capsys.readouterr()

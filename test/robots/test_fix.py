@@ -12,7 +12,7 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.robots.diagnosis import Options, compare_robot
+from rigid_proto_ros.robots.diagnosis import WRONG, Options, compare_robot
 from rigid_proto_ros.robots.fix import fix_robot
 from rigid_proto_ros.robots.reading import read_robot
 
@@ -40,7 +40,7 @@ URDF = (
     '\t\t<inertial  >  <!-- weighed: ä -->\r\n\t\t\t<inertia izz = "1" iyy=\'1\' ixx="1"   ixy="0.0" ixz="0" iyz="0" note=">"/>\r\n'
     '\t\t\t<mass   value=" 2.50 "/><!-- <mass value="9"/> -->\r\n\t\t\t<origin rpy="0 0 1.5"/>\r\n\t\t</inertial>\r\n\t</link>\r\n'
     f'<link name="bare"><visual>{MESH}</visual></link>\r\n<link name="open"><visual><geometry><mesh filename="open.obj"/></geometry>'
-    '</visual><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>\r\n'
+    '</visual><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.008" iyz="0" izz="0.004"/></inertial></link>\r\n'
     f'<link name="one"><collision>{MESH}</collision><inertial><mass value="3"/><inertia ixx="7" iyy="1" izz="1"/></inertial></link>'
     '\r\n<joint name="j" type="fixed"><parent link="arm"/><child link="one"/></joint></robot>\r\n<!-- end -->\r\n'
 )  # fmt: skip
@@ -56,7 +56,7 @@ def assert_finds_nothing(path: Path, data: bytes, *left: str) -> None:
     path.write_bytes(data)
     again, links = fixed(path)
     assert again == data
-    assert {name for name, link in links.items() if link.after.status != "ok"} == set(left)
+    assert {name for name, link in links.items() if link.after.status != "uniform"} == set(left)
 
 
 def test_only_the_inertials_of_a_urdf_change(parts):
@@ -65,7 +65,8 @@ def test_only_the_inertials_of_a_urdf_change(parts):
     data, links = fixed(path)
     assert outside(data) == outside(URDF.encode())
     assert [(name, link.before.status, link.after.status, link.written) for name, link in links.items()] == [
-        ("arm", "off", "ok", True), ("bare", "missing", "missing", False), ("open", "unknown", "unknown", False), ("one", "off", "ok", True)
+        ("arm", "impossible for its shape", "uniform", True), ("bare", "unknown", "unknown", False),
+        ("open", "unknown", "unknown", False), ("one", "impossible", "uniform", True)
     ]  # fmt: skip
     assert "--mass LINK=M" in links["bare"].left and "open surface" in links["open"].left
     # Comments, order and the mass stay inside the element, too.
@@ -90,7 +91,7 @@ def test_masses_and_densities_of_links_write_what_was_missing(parts):
     by_name = {link.link: link for link in read_robot(_written(path, data))}
     assert by_name["bare"].mass == 0.5 and by_name["one"].mass == pytest.approx(2000.0 * 0.006, rel=1e-12)
     assert by_name["bare"].inertia == pytest.approx(0.5 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-12)
-    assert links["bare"].before.status == "missing" and links["bare"].after.status == "ok"
+    assert links["bare"].before.status == "unknown" and links["bare"].after.status == "uniform"
     assert_finds_nothing(path, data, "open")
 
 
@@ -174,12 +175,18 @@ def test_the_command_writes_tells_and_leaves(parts, capsys):
     path.write_bytes(URDF.encode())
     assert main(["inspect", "--compare", str(path), "--fix", str(out), "--mass", "bare=0.5"]) == 0
     told = capsys.readouterr().out
-    assert "off -> ok" in told and "left: open" in told and "3 of 4 inertials rewritten, 1 left" in told
+    assert (
+        "impossible for its shape -> uniform" in told
+        and "left: open" in told
+        and "3 of 4 inertials rewritten, 1 left" in told
+    )
     assert "- -> 0.5" in told and "nan" not in told
     assert path.read_bytes() == URDF.encode()
     assert main(["inspect", "--compare", str(out), "--fix", str(out), "--json"]) == 0
     links = {link["link"]: link for link in json.loads(capsys.readouterr().out)["links"]}
-    assert [links[name]["after"]["status"] for name in ("arm", "bare", "open", "one")] == ["ok", "ok", "unknown", "ok"]
+    assert [links[name]["after"]["status"] for name in ("arm", "bare", "open", "one")] == [
+        "uniform", "uniform", "unknown", "uniform"
+    ]  # fmt: skip
     assert not any(link["written"] for link in links.values())
 
 
@@ -193,15 +200,32 @@ def test_a_check_prints_one_line_a_link_and_fails_beyond_the_tolerance(parts, ca
     capsys.readouterr()
     assert main([*check, str(out)]) == 0
     told = capsys.readouterr().out
-    assert "arm: ok: inertia" in told and "bare: missing: no <inertial>" in told
+    assert "arm: uniform: inertia" in told and "bare: unknown: no <inertial>" in told
     # A difference of 0.4 % is beyond 0.1 %, and within 1 %.
     text = out.read_text()
     ixx = re.search(r'ixx="([^"]+)"', text).group(1)
     out.write_text(text.replace(ixx, repr(1.004 * float(ixx))))
     assert main([*check, str(out)]) == 0
-    assert main(["inspect", "--compare", str(out), "--link", "arm"]) == 1
+    assert main(["inspect", "--compare", str(out), "--link", "arm"]) == 0
+    assert main(["inspect", "--compare", str(out), "--link", "arm", "--tolerance", "0.001"]) == 1
     # Where nothing can be judged nothing is right.
     assert main([*check, str(path), "--link", "open"]) == 1
+
+
+def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts, capsys):
+    path, out = parts / "robot.urdf", parts / "fixed.urdf"
+    shape = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+    inertia = '<inertia ixx="0.012" iyy="0.009" izz="0.005"/>'
+    path.write_text(
+        f'<robot name="r"><link name="a">{shape}<inertial><mass value="1.000"/>{inertia}</inertial></link></robot>'
+    )
+    assert main(["inspect", "--compare", str(path), "--fix", str(out)]) == 0
+    assert "--all" in capsys.readouterr().out
+    assert out.read_bytes() == path.read_bytes()
+    assert main(["inspect", "--compare", str(path), "--fix", str(out), "--all"]) == 0
+    assert "not uniform -> uniform" in capsys.readouterr().out
+    assert main(["inspect", "--compare", str(out), "--tolerance", "1e-9"]) == 0
+    assert main(["inspect", "--compare", str(path), "--all"]) == 2
 
 
 @pytest.mark.parametrize(
@@ -263,6 +287,6 @@ def test_every_real_robot_is_mended_outside_nothing_changed_and_inside_all_right
             continue
         data, links = fixed(path, folders=folders)
         assert outside(data) == outside(path.read_bytes()), path
-        assert not [link.before.link for link in links.values() if link.after.status == "off" and not link.left], path
+        assert not [link.before.link for link in links.values() if link.after.status in WRONG and not link.left], path
         mended += sum(link.written for link in links.values())
     assert mended > 100

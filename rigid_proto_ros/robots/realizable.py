@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""Whether any body has an inertial, and whether any mass distribution inside given shapes has it.
+
+Along an axis on which the shapes reach from l to u, a distribution of mean c has at most the variance (c - l)(u - c)
+(Bhatia and Davis, American Mathematical Monthly 107, 2000): all mass at the two ends. A tensor says the variance along
+every axis, so one axis on which it is larger shows that the inertial can't be of these shapes, whatever their density.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..mass.tensor import check_tensor
+from ..mesh.hull import convex_hull
+from .reading import LinkInertial
+
+MARGIN = 1e-3
+"""Part of the shapes' diagonal by which they may be larger than they are drawn."""
+MAX_ROUNDING = 0.05
+"""A number printed with one digit is right to 50 %, which would excuse anything: this much is excused at most."""
+DIRECTIONS = 200
+"""Axes tried over all directions, besides those of the link, of the tensor and the normals of the hull."""
+REFINED = (0.1, 0.03, 0.01, 0.003, 0.001)
+"""Turns [rad] by which the worst axis is then looked for nearby."""
+
+
+def impossible_inertial(link: LinkInertial) -> tuple[str, ...]:
+    """Why no body has the link's inertial; empty when one has."""
+    if not 0.0 < link.mass < math.inf:
+        remedy = "; a link without mass needs no inertial" if link.mass == 0.0 and not np.any(link.inertia) else ""
+        return (f"mass {link.mass:g}, which isn't a positive number{remedy}",)
+    if not np.all(np.isfinite(link.center_of_mass)):
+        return ("a COM that isn't finite",)
+    try:
+        check_tensor(link.inertia)
+    except InputError as error:
+        return (f"no rigid body has this tensor: {error}",)
+    return ()
+
+
+def beyond_shapes(link: LinkInertial, points: np.ndarray) -> str:
+    """Why no mass distribution within the hull of ``points`` (n, 3) has the link's inertial, which some body has; ""
+    when one may have.
+    """
+    c = link.center_of_mass
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    reach = MARGIN * diagonal + np.minimum(link.center_step, MAX_ROUNDING * diagonal)
+    variance = (0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia) / link.mass
+    step = (0.5 * np.trace(link.inertia_step) * np.eye(3) + link.inertia_step) / link.mass
+    step = np.minimum(step, MAX_ROUNDING * np.trace(variance))
+    rounding = 1.0 - min(link.mass_step / link.mass, MAX_ROUNDING)
+    corners, normals = _hull(points)
+
+    def judged(axes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of axes (k, 3): how far the COM lies outside [m], the variance [m²], and the most that it can be [m²]."""
+        along = corners @ axes.T
+        margin = np.abs(axes) @ reach
+        below, above = axes @ c - along.min(axis=0) + margin, along.max(axis=0) - axes @ c + margin
+        own = np.einsum("ki,ij,kj->k", axes, variance, axes) * rounding
+        own -= np.einsum("ki,ij,kj->k", np.abs(axes), step, np.abs(axes))
+        tiny = 1e-12 * diagonal + 1e-150
+        return np.maximum(-below, -above), own, np.maximum(below, tiny) * np.maximum(above, tiny)
+
+    axes = np.concatenate([np.eye(3), np.linalg.eigh(variance)[1].T, _spread(DIRECTIONS), normals])
+    outside, _, _ = judged(axes)
+    if outside.max() > 0.0:
+        axis = axes[outside.argmax()]
+        return f"COM {outside.max() + MARGIN * diagonal:.3g} m outside the hull of its shapes along {_words(axis)}"
+    axis = _worst(axes, judged)
+    _, (own,), (most,) = judged(axis[None])
+    if own <= most:
+        return ""
+    return (
+        f"too wide for its shapes: along {_words(axis)} the mass lies {math.sqrt(own):.3g} m (r.m.s.) from the COM, "
+        f"and inside the shapes at most {math.sqrt(most):.3g} m"
+    )
+
+
+def _worst(axes: np.ndarray, judged: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Of axes (k, 3), and those near the worst of them, the one (3,) with the largest part of its possible variance."""
+
+    def first(axes: np.ndarray) -> np.ndarray:
+        _, own, most = judged(axes)
+        return axes[(own / most).argmax()]
+
+    axis = first(axes)
+    for turn in REFINED:
+        for _ in range(5):
+            near = axis + turn * _spread(16)
+            axis = first(np.concatenate([axis[None], near / np.linalg.norm(near, axis=1)[:, None]]))
+    return axis
+
+
+def _spread(count: int) -> np.ndarray:
+    """``count`` directions (count, 3) spread evenly over the sphere: a Fibonacci lattice."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    angle = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
+    r = np.sqrt(1.0 - z * z)
+    return np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+
+
+def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (n, 3) and normals (m, 3) of the hull; of points in one plane, or without SciPy, all points and none."""
+    try:
+        triangles = convex_hull(points)
+    except InputError:
+        return points, np.zeros((0, 3))
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    size = np.linalg.norm(normals, axis=1)
+    normals = np.unique(np.round(normals[size > 0.0] / size[size > 0.0][:, None], 3), axis=0)
+    normals = normals[:: max(1, len(normals) // 1000)]  # a smooth hull has more than are needed
+    return points[np.unique(triangles)], normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def _words(axis: np.ndarray) -> str:
+    return f"({', '.join(f'{value + 0.0:.2g}' for value in np.round(axis, 3))})"
