@@ -99,14 +99,14 @@ def _string(problem: Problem) -> StringSettings:
 
 def submit(simulation: Simulation, wrenches: tuple[Wrench, ...]) -> None:
     """The problem's wrenches as poke commands, each for its exact time; one without an end is held."""
-    for k, w in enumerate(wrenches):
+    for w in wrenches:
         frame = f"{w.axes}@point/{','.join(repr(float(c)) for c in w.point)}"
         if w.impulse:
             frame += ";impulse"
         elif w.end is not None:
             frame += f";duration={(round(w.end * 1e9) - round(w.begin * 1e9)) / 1e9!r}"
         held = w.end is None and not w.impulse
-        command = WrenchCommand(held, parse_frame(frame), w.force, w.torque, 0, frame, bytes([k]))
+        command = WrenchCommand(held, parse_frame(frame), w.force, w.torque, 0, frame)
         simulation.submit(command, round(w.begin * 1e9))
 
 

@@ -22,6 +22,7 @@ TYPES = {
     "string/attach": "PointStamped",
     "inertia/set": "InertiaStamped",
     "schedule": "String",
+    "thrusters": "Float64MultiArray",
     "pose": "PoseStamped",
     "twist": "TwistStamped",
     "odom": "Odometry",

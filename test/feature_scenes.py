@@ -233,7 +233,7 @@ def _wrenches(loads):
     for k, axes in enumerate(("world", "body")):
         force, point, torque = loads[3 * k : 3 * k + 3]
         frame = f"{axes}@point/{','.join(repr(float(c)) for c in point)};duration={LOAD_S[1] - LOAD_S[0]:.9f}"
-        yield wrench(frame, force.tolist(), torque.tolist(), held=False, tag=bytes([k])), round(LOAD_S[0] * SECOND)
+        yield wrench(frame, force.tolist(), torque.tolist(), held=False), round(LOAD_S[0] * SECOND)
 
 
 def _direction(rng) -> np.ndarray:

@@ -71,8 +71,6 @@ def spinning(angular_velocity_body, orientation_xyzw=(0.0, 0.0, 0.0, 1.0)) -> np
     return np.array([0.0, 0.0, 0.0, *orientation_xyzw, 0.0, 0.0, 0.0, *angular_velocity_body])
 
 
-def wrench(
-    frame: str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), *, held: bool = True, tag: bytes = b""
-) -> WrenchCommand:
+def wrench(frame: str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), *, held: bool = True) -> WrenchCommand:
     """A wrench command as its message would give it."""
-    return WrenchCommand(held, parse_frame(frame), tuple(force), tuple(torque), 0, frame, tag)
+    return WrenchCommand(held, parse_frame(frame), tuple(force), tuple(torque), 0, frame)

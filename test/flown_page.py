@@ -15,7 +15,6 @@ from workbench_page import bare_page
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import rotate
-from rigid_proto_ros.messages.cdr import wrench_stamped
 from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import core_command, of_message, string_attach, string_target
@@ -51,7 +50,7 @@ class FlownLink:
         self.rows: list[tuple[int, np.ndarray]] = []
         self.refused: list[str] = []
         self.received = 0
-        self._told = 0
+        self._told = self._lists = 0
         self._heard = Received()
 
     # The page's side
@@ -72,8 +71,7 @@ class FlownLink:
     def wrench(self, topic, frame_id, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0)) -> None:
         frame = parse_frame(frame_id, self.scenario.setup.contacts, "world", "rigid_body")
         force, torque = tuple(map(float, force)), tuple(map(float, torque))
-        message = wrench_stamped(0, frame_id, force, torque)
-        self._submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id, message))
+        self._submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id))
 
     def point(self, topic, frame_id, point) -> None:
         read = string_attach if topic == "string/attach" else string_target
@@ -88,8 +86,9 @@ class FlownLink:
             self.command(of_message(topic, data))
             return
         entries = read_schedule(read_string(data, topic))
+        self._lists += 1
         for number, command in enumerate(expand_schedule(entries, 1.5)):
-            self.command(command, (data, number) if isinstance(entries, list) else None)
+            self.command(command, (self._lists, number) if isinstance(entries, list) else None)
 
     def command(self, command, listed=None) -> None:
         own = core_command(command, command.t_ns, self.scenario.setup.contacts, self._change, ("world", "rigid_body"))

@@ -7,7 +7,6 @@ import numpy as np
 from flights import EventLines
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.messages.session_messages import PROJECTIONS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
@@ -58,8 +57,7 @@ class HandSession:
         """A message of the wrench or the poke topic."""
         frame = parse_frame(frame_id, self.scenario.setup.contacts)
         force, torque = tuple(map(float, force)), tuple(map(float, torque))
-        message = cdr.wrench_stamped(stamp_ns, frame_id, force, torque)
-        self._submit(WrenchCommand(held, frame, force, torque, stamp_ns, frame_id, message))
+        self._submit(WrenchCommand(held, frame, force, torque, stamp_ns, frame_id))
 
     def tie(self, frame_id: str, point) -> None:
         """A message of ~/string/attach."""
@@ -98,7 +96,7 @@ class HandSession:
             self.heard("scene", self.scenario.text)
             return self.scenario.setup
 
-        self._submit(Change(content, apply, b"i", "inertia", Rank.INERTIA))
+        self._submit(Change(content, apply, "inertia", Rank.INERTIA))
 
     def pause(self) -> None:
         """The mark that stands in the log: commands now pile up at one instant."""

@@ -57,7 +57,7 @@ def random_scene(seed: int, integrator: str, accuracy: float = 1e-9, step_s: flo
         string=_random_string(rng, arm) if rng.random() < 0.5 else StringSettings(),
     )
     simulation = Simulation(setup)
-    for k in range(rng.integers(0, 6)):
+    for _k in range(rng.integers(0, 6)):
         point = ",".join(repr(float(c)) for c in arm * rng.normal(size=3))
         axes = rng.choice(["world", "body"])
         force = body.mass * log_uniform(rng, 0.3, 30.0) * rng.normal(size=3)
@@ -69,7 +69,7 @@ def random_scene(seed: int, integrator: str, accuracy: float = 1e-9, step_s: flo
         elif kind == "impulse":
             frame += ";impulse"
             force, torque = 0.05 * force, 0.05 * torque
-        command = wrench(frame, force.tolist(), torque.tolist(), held=kind == "held", tag=bytes([k]))
+        command = wrench(frame, force.tolist(), torque.tolist(), held=kind == "held")
         simulation.submit(command, int(rng.integers(0, round(DURATION_S * SECOND))))
     return simulation
 

@@ -27,7 +27,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
 WAIT_S = 180.0
@@ -47,7 +47,16 @@ TYPES = {
             Clock,
             Imu,
         ),
-        *(String, SetBool, Trigger, DescribeParameters, GetParameters, ListParameters, SetParameters),
+        *(
+            Float64MultiArray,
+            String,
+            SetBool,
+            Trigger,
+            DescribeParameters,
+            GetParameters,
+            ListParameters,
+            SetParameters,
+        ),
         SetParametersAtomically,
     )
 }

@@ -282,7 +282,7 @@ def _submit(run: OfflineRun, topic: str, message) -> None:
         return
     frame = parse_frame(frame_id, set(simulation.setup.contacts))
     force, torque = ((v.x, v.y, v.z) for v in (message.wrench.force, message.wrench.torque))
-    simulation.submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id, b""))
+    simulation.submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id))
 
 
 def things_to_try() -> list[str]:

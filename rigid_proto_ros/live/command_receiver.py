@@ -52,20 +52,21 @@ class CommandReceiver:
         self._loop = loop
         self._frames = frames
         self._read_frames: dict[str, Frame] = {}
+        self._schedules = 0
         self._background = BackgroundThread()
 
-    def receive(self, topic: str, command: Callable[[], ScriptCommand], message: bytes | None = None) -> None:
+    def receive(self, topic: str, command: Callable[[], ScriptCommand]) -> None:
         """Count a command and submit it, to act at its ``t_ns`` read as the stamp of a message; raises CommandRefused,
         counted, for what can be checked now.
 
         The loop catches up first, so that now is the tick's own time. topic: one of TOPICS. command() gives it, or
-        raises CommandRefused. message: the bytes that it came in.
+        raises CommandRefused.
         """
         loop = self._loop
         loop.catch_up()
         try:
             sent = command()
-            own = self._own_command(sent, message)
+            own = self._own_command(sent)
             loop.simulation.submit(own, self._when(sent.t_ns))
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
@@ -76,12 +77,11 @@ class CommandReceiver:
         if sent.kind in ("wrench", "thrusters"):
             loop.request_step()
 
-    def _own_command(self, sent: ScriptCommand, message: bytes | None) -> Command:
+    def _own_command(self, sent: ScriptCommand) -> Command:
         if sent.kind in ("wrench", "poke"):
-            data = sent.message(sent.t_ns) if message is None else message
             frame = self._frame(sent.frame_id)
-            return WrenchCommand(sent.kind == "wrench", frame, sent.force, sent.torque, sent.t_ns, sent.frame_id, data)
-        own = core_command(sent, sent.t_ns, (), self._change, self._frames, self._change_inertia, message)
+            return WrenchCommand(sent.kind == "wrench", frame, sent.force, sent.torque, sent.t_ns, sent.frame_id)
+        own = core_command(sent, sent.t_ns, (), self._change, self._frames, self._change_inertia)
         if sent.kind == "inertia":
             assert isinstance(own, Change)
             check_inertia(self._loop.scenario, own.content)
@@ -97,14 +97,15 @@ class CommandReceiver:
             self._read_frames[frame_id] = frame
         return frame
 
-    def receive_schedule(self, text: Callable[[], str], message: bytes) -> ScheduleMessage:
+    def receive_schedule(self, text: Callable[[], str]) -> ScheduleMessage:
         """Take an entry or a list of entries as YAML, now or once what it needs is loaded and compiled
         (``submit_finished``); what is wrong with it is counted then. text() gives it, or raises CommandRefused.
         """
         loop = self._loop
         loop.catch_up()
         scenario = loop.scenario
-        schedule = ScheduleMessage(message)
+        self._schedules += 1
+        schedule = ScheduleMessage(self._schedules)
         quick = self._background.is_empty
         schedule.decode(text)
         if quick and len(schedule.text) <= LONG_TEXT:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..messages import cdr
 from ..motion.state import State
 from ..scene.command_codec import ScriptCommand, entry_of, frame_names
 from ..scene.offline import notify_start
@@ -125,7 +124,7 @@ class LiveSimulation:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
         refused whole. Returns once it is taken, though that loads a mesh; raises CommandRefused, counted.
         """
-        taken = self.call(lambda: self.commands.receive_schedule(lambda: text, cdr.string(text)))
+        taken = self.call(lambda: self.commands.receive_schedule(lambda: text))
         while not taken.is_submitted:
             time.sleep(LOOK_S)
         if taken.refusal is not None:

@@ -51,11 +51,11 @@ class Entry:
 
 @dataclass
 class ScheduleMessage:
-    """One message. count: its entries, as messages are counted. commands: once read. entries: once checked. refusal:
-    why none of it is taken. is_submitted: whether it is taken or refused by now.
+    """One message, counted from 1 by ``number``. count: its entries, as messages are counted. commands: once read.
+    entries: once checked. refusal: why none of it is taken. is_submitted: whether it is taken or refused by now.
     """
 
-    data: bytes
+    number: int
     text: str = ""
     count: int = 1
     is_list: bool = False
@@ -114,15 +114,9 @@ class ScheduleMessage:
                 before, scenario = scenario, scenario.with_changes(command.changes)
                 at_hand = scenario.body_mesh
                 warm_up_change(before, scenario)
-            own = core_command(
-                command,
-                command.t_ns,
-                scenario.setup.contacts,
-                partial(_with_mesh, change, at_hand),
-                message=b"" if self.is_list else self.data,
-            )
+            own = core_command(command, command.t_ns, scenario.setup.contacts, partial(_with_mesh, change, at_hand))
             checked = (check_command(own, scenario.setup), scenario.setup)
-            listed = (self.data, k) if self.is_list else None
+            listed = (self.number, k) if self.is_list else None
             self.entries.append(Entry(own, command.t_ns, command.entry, listed, checked))
 
 

@@ -86,16 +86,16 @@ class CommandSubscriber:
         return wall_ns < max(self._active_until_ns)
 
     def _stamped(self, topic: str, data: bytes) -> None:
-        self._commands.receive(topic.partition("/")[0], lambda: read_stamped(topic, data), data)
+        self._commands.receive(topic.partition("/")[0], lambda: read_stamped(topic, data))
 
     def _thrusters(self, data: bytes) -> None:
         def read() -> ScriptCommand:
             return ScriptCommand(0, "thrusters", forces=tuple(read_message(data, Float64MultiArray).data))
 
-        self._commands.receive("thrusters", read, bytes(data))
+        self._commands.receive("thrusters", read)
 
     def _schedule(self, data: bytes) -> None:
-        self._commands.receive_schedule(lambda: read_message(data, String).data, bytes(data))
+        self._commands.receive_schedule(lambda: read_message(data, String).data)
 
 
 # Messages read from their bytes, without message objects; anything unusual goes through rclpy's own reader

@@ -195,23 +195,20 @@ def core_command(
     change: Changing | None,
     frames: tuple[str, str] = _WORDS,
     inertia: Changing | None = None,
-    message: bytes | None = None,
 ) -> Command:
     """The simulation's command; raises CommandRefused.
 
     change(changes) gives the Setup with parameters changed when a ``set`` acts, inertia(content) that of an inertia
-    message; None where such a command can't come. frames: ``frame_names``. message: the bytes that it came in, where
-    these aren't its own.
+    message; None where such a command can't come. frames: ``frame_names``.
     """
     kind, frame_id = command.kind, command.frame_id
     if kind == "string_target":
-        return string_target(stamp_ns, frame_id, command.point, frames[0], message)
+        return string_target(stamp_ns, frame_id, command.point, frames[0])
     if kind == "string_attach":
-        return string_attach(stamp_ns, frame_id, command.point, *frames, message)
+        return string_attach(stamp_ns, frame_id, command.point, *frames)
     if kind in ("wrench", "poke"):
         frame = parse_frame(frame_id, contacts, *frames)
-        data = command.message(stamp_ns) if message is None else message
-        return WrenchCommand(kind == "wrench", frame, command.force, command.torque, stamp_ns, frame_id, data)
+        return WrenchCommand(kind == "wrench", frame, command.force, command.torque, stamp_ns, frame_id)
     if kind == "inertia":
         mass, *com_and_tensor = command.inertia
         content = {
@@ -222,16 +219,15 @@ def core_command(
             "com": com_and_tensor[:3],
             "tensor": com_and_tensor[3:],
         }
-        data = command.message(stamp_ns) if message is None else message
-        return Change(content, _applying(inertia, content), data, kind, Rank.INERTIA)
+        return Change(content, _applying(inertia, content), kind, Rank.INERTIA)
     if kind == "set":
         changes = dict(command.changes)
-        return Change(changes, _applying(change, changes), message or b"")
+        return Change(changes, _applying(change, changes))
     if kind == "thrusters":
-        return ThrusterCommand(command.forces, command.message(stamp_ns) if message is None else message)
+        return ThrusterCommand(command.forces)
     if kind == "state":
-        return SetState(command.state, command.message(stamp_ns) if message is None else message)
-    return ClearWrench(message or b"") if kind == "clear_wrench" else ReleaseString(message or b"")
+        return SetState(command.state)
+    return ClearWrench() if kind == "clear_wrench" else ReleaseString()
 
 
 def _applying(change: Changing | None, content: dict) -> Callable[[], Setup]:
@@ -240,23 +236,17 @@ def _applying(change: Changing | None, content: dict) -> Callable[[], Setup]:
     return functools.partial(change, content)
 
 
-def string_target(
-    stamp_ns: int, frame_id: str, point: Vector, world: str = "world", message: bytes | None = None
-) -> MoveString:
+def string_target(stamp_ns: int, frame_id: str, point: Vector, world: str = "world") -> MoveString:
     """The simulation's command for a message of the string's target topic; raises CommandRefused."""
     if frame_id not in ("", "world", world):
         raise CommandRefused("frame", "frame_id", frame_id[:80], f"{world}: the target is a point of the world")
-    data = cdr.stamped_doubles(stamp_ns, frame_id, point) if message is None else message
-    return MoveString(point, stamp_ns, frame_id, data)
+    return MoveString(point, stamp_ns, frame_id)
 
 
-def string_attach(
-    stamp_ns: int, frame_id: str, point: Vector, world: str = "world", body: str = "body", message: bytes | None = None
-) -> TieString:
+def string_attach(stamp_ns: int, frame_id: str, point: Vector, world: str = "world", body: str = "body") -> TieString:
     """The simulation's command for a message of the string's attach topic; raises CommandRefused."""
     axes = _knot_axes(frame_id, (world, body))
-    data = cdr.stamped_doubles(stamp_ns, frame_id, point) if message is None else message
-    return TieString(axes, point, stamp_ns, frame_id, data)
+    return TieString(axes, point, stamp_ns, frame_id)
 
 
 def _knot_axes(frame_id: str, frames: tuple[str, str]) -> str:
@@ -296,7 +286,7 @@ def command_of_event(
     stamp_ns = content.get("stamp_ns", 0)
     if type(stamp_ns) is not int:
         raise InputError("stamp_ns", stamp_ns, "nanoseconds")
-    return core_command(command, stamp_ns, contacts, change, frames, inertia, message=b"")
+    return core_command(command, stamp_ns, contacts, change, frames, inertia)
 
 
 def in_words(command: ScriptCommand, contacts: Collection[str], frames: tuple[str, str]) -> ScriptCommand:

@@ -92,7 +92,7 @@ class OfflineRun(ScenarioRun):
                 if command.kind == "set":
                     planned = planned.with_changes(command.changes)
                 checked = (check_command(core, planned.setup), planned.setup)
-                self.simulation.submit(core, command.t_ns, (b"", number), checked)
+                self.simulation.submit(core, command.t_ns, (0, number), checked)
             except CommandRefused as refusal:
                 raise InputError(
                     f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted

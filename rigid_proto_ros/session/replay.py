@@ -128,7 +128,7 @@ class Resimulation(ScenarioRun):
             # What acts under a change of its own instant can't be checked before that acts.
             checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
             # What acted at one instant acts in the order of the log, whatever rule made it.
-            self.simulation.submit(command, time_ns, (b"", number), checked)
+            self.simulation.submit(command, time_ns, (0, number), checked)
 
     def _command(self, kind: str, content: dict, number: int) -> Command | None:
         frames = frame_names(self.scenario.parameters, self.node_name)

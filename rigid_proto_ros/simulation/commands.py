@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands as the simulation takes them, and the order in which equal times act.
-
-Commands that act at the same nanosecond act in the order of ``order_key``, never by arrival: four publishers in any
-order give one trajectory.
-"""
+"""Commands as the simulation takes them, and the order in which equal times act (``order_of``)."""
 
 from __future__ import annotations
 
@@ -27,17 +23,18 @@ class Rank(IntEnum):
 
     CHANGE = 0  # parameter changes and services
     INERTIA = 1
-    STRING = 2
-    WRENCH = 3
-    POKE = 4
+    STRING_ATTACH = 2
+    STRING_TARGET = 3
+    WRENCH = 4
+    THRUSTERS = 5
+    POKE = 6
 
 
 @dataclass(frozen=True)
 class WrenchCommand:
     """One message of the wrench topic (``held``) or the poke topic.
 
-    force [N], torque [N m] as sent (N s and N m s for an impulse), frame already read; stamp_ns and frame_id as sent;
-    message: its serialized bytes, which decide the order among equal times.
+    force [N], torque [N m] as sent (N s and N m s for an impulse), frame already read; stamp_ns and frame_id as sent.
     """
 
     held: bool
@@ -46,7 +43,6 @@ class WrenchCommand:
     torque: tuple[float, float, float]
     stamp_ns: int
     frame_id: str
-    message: bytes
 
     @property
     def rank(self) -> Rank:
@@ -98,9 +94,8 @@ class ThrusterCommand:
     """What the thrusters push with [N], in the order of their names."""
 
     forces: tuple[float, ...]
-    message: bytes = b""
     kind = "thrusters"
-    rank = Rank.WRENCH
+    rank = Rank.THRUSTERS
 
     @property
     def content(self) -> dict:
@@ -117,7 +112,6 @@ class SetState:
     """Put the body elsewhere at once: any of STATE_VALUES [m, m/s, rad/s, world axes]; the others stay."""
 
     values: Mapping[str, tuple[float, ...]]
-    message: bytes = b""
     kind = "state"
     rank = Rank.CHANGE
 
@@ -140,7 +134,6 @@ class SetState:
 class ClearWrench:
     """End the held wrench and the running pulses; scheduled commands stay."""
 
-    message: bytes = b""
     kind = "clear_wrench"
     rank = Rank.CHANGE
 
@@ -159,7 +152,6 @@ class Change:
 
     content: dict
     apply: Callable
-    message: bytes = b""
     kind: str = "set"
     rank: Rank = Rank.CHANGE
 
@@ -169,16 +161,15 @@ class TieString:
     """Where on the body the string is, or will be, tied.
 
     axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto
-    the surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent; message: serialized bytes.
+    the surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent.
     """
 
     axes: str
     point: tuple[float, float, float]
     stamp_ns: int = 0
     frame_id: str = ""
-    message: bytes = b""
     kind = "string_attach"
-    rank = Rank.STRING
+    rank = Rank.STRING_ATTACH
 
     def __post_init__(self) -> None:
         if self.axes not in ("mesh", "body", "world"):
@@ -198,9 +189,8 @@ class MoveString:
     target: tuple[float, float, float]
     stamp_ns: int = 0
     frame_id: str = ""
-    message: bytes = b""
     kind = "string_target"
-    rank = Rank.STRING
+    rank = Rank.STRING_TARGET
 
     def __post_init__(self) -> None:
         _check_point("string target", self.target)
@@ -215,7 +205,6 @@ class MoveString:
 class ReleaseString:
     """Let the string go."""
 
-    message: bytes = b""
     kind = "string_release"
     rank = Rank.CHANGE
 
@@ -252,27 +241,29 @@ def _check_point(field: str, point: Sequence[float]) -> None:
         raise CommandRefused("magnitude", field, list(point), f"at most {FARTHEST:g} m")
 
 
-def order_key(command: Command, listed: Listed | None) -> tuple:
-    """What decides among commands of one instant: first the entries of lists, each list's in its own order and lists by
-    their bytes; then single messages by rank and bytes.
+def order_of(command: Command, listed: Listed | None, arrival: int) -> tuple[int, int, int, int]:
+    """What decides among commands of one instant: first the entries of lists, lists as they arrived and each list's in
+    its own order; then single messages by rank, those of one rank as they arrived.
     """
-    return (0, *listed) if listed is not None else (1, command.rank, command.message)
+    return (0, *listed, arrival) if listed is not None else (1, command.rank, 0, arrival)
 
 
-Listed = tuple[bytes, int]
-"""The bytes of the list that a command is an entry of, and its number there."""
+Listed = tuple[int, int]
+"""The number of the list that a command is an entry of, in the order of arrival, and the entry's place there."""
 
 Command = WrenchCommand | ThrusterCommand | SetState | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
 @dataclass(slots=True)
 class Pending:
-    """A command waiting for its time: its place in a list, if it is an entry of one; kind, duration_ns, slot and row as
-    the flight's tables hold them, the row empty until its load is resolved, and the setup under which that was.
+    """A command waiting for its time: its place among those of the same time (``order_of``) and in a list, if it is an
+    entry of one; kind, duration_ns, slot and row as the flight's tables hold them, the row empty until its load is
+    resolved, and the setup under which that was.
     """
 
     time_ns: int
     command: Command
+    order: tuple[int, int, int, int] = (0, 0, 0, 0)
     listed: Listed | None = None
     resolved_for: Setup | None = None
     kind: int = CLEAR

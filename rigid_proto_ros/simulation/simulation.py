@@ -35,7 +35,7 @@ from .commands import (
     ThrusterCommand,
     TieString,
     WrenchCommand,
-    order_key,
+    order_of,
     slot_name,
 )
 from .event_log import EventLog, OtherEvent
@@ -129,7 +129,8 @@ class Simulation(Readings):
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
         row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
-        pending = Pending(when_ns, command, listed)
+        self._arrivals += 1
+        pending = Pending(when_ns, command, order_of(command, listed, self._arrivals), listed)
         if row and isinstance(command, WrenchCommand):
             pending.set_load(command, row, setup)
         self._push(pending)
@@ -138,10 +139,7 @@ class Simulation(Readings):
         return when_ns
 
     def _push(self, pending: Pending) -> None:
-        self._arrivals += 1
-        key = order_key(pending.command, pending.listed)
-        # Arrival decides only between messages that are equal to the byte.
-        heappush(self._pending, (pending.time_ns, key, self._arrivals, pending))
+        heappush(self._pending, (pending.time_ns, pending.order, pending))
 
     def refuse(self, error: CommandRefused, count: int = 1) -> None:
         """Count a refusal, of so many commands at once, and tell the observer."""

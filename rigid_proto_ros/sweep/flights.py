@@ -71,7 +71,7 @@ class Flight:
         commands = expand_script([{"t": 0.0, **entry}], "command", scene.parameters.wrench_timeout)
         for command in with_contacts(commands, scene.setup.contacts):
             time_ns = start_ns + command.t_ns
-            core = core_command(command, time_ns, scene.setup.contacts, self._run.change, message=b"")
+            core = core_command(command, time_ns, scene.setup.contacts, self._run.change)
             simulation.submit(core, time_ns, (b"", self._commands))
             self._commands += 1
 

@@ -161,7 +161,7 @@ class LoadResolver:
             raise NotBatchable
         frame, resolved = self.frame(command.frame_id)
         own = WrenchCommand(
-            command.kind == "wrench", frame, command.force, command.torque, command.t_ns, command.frame_id, b""
+            command.kind == "wrench", frame, command.force, command.torque, command.t_ns, command.frame_id
         )
         load = Load(resolved.axes, resolved.mesh_point, command.force, command.torque, resolved.mesh_normal)
         integers = [command.t_ns, own.duration_ns, own.flight_kind, own.slot]

@@ -13,7 +13,6 @@ from rigid_proto_ros.live import warm_up
 from rigid_proto_ros.live.endpoints import Endpoints
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.pacing import WorkBudget
-from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.scene import scenario
 from rigid_proto_ros.scene.command_codec import ScriptCommand
 from rigid_proto_ros.scene.offline import read_scene
@@ -41,7 +40,7 @@ class Rig(Endpoints):
         return True
 
     def schedule(self, text: str) -> None:
-        self.commands.receive_schedule(lambda: text, cdr.string(text))
+        self.commands.receive_schedule(lambda: text)
 
     def tick_until(self, condition) -> None:
         for _ in range(1_000_000):

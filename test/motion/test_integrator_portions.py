@@ -39,17 +39,17 @@ def flown(name, seed, portions):
         string=StringSettings(stiffness=80.0, rest_length=0.5),
     )
     rng, refused = random.Random(seed), 0
-    for i in range(30):
+    for _i in range(30):
         time_ns, force = rng.randrange(END), tuple(rng.gauss(0.0, 3.0) for _ in range(3))
         torque, held = tuple(rng.gauss(0.0, 1.0) for _ in range(3)), rng.random() < 0.5
         kind = rng.choice((*FRAMES, "string", "string", "release"))
         if kind == "string":
-            command = MoveString(force, message=bytes([i]))
+            command = MoveString(force)
         elif kind == "release":
-            command = ReleaseString(bytes([i]))
+            command = ReleaseString()
         else:
             torque = (0.0, 0.0, 0.0) if kind == "world@com" else torque
-            command = wrench(kind, force, torque, held=held and "impulse" not in kind, tag=bytes([i]))
+            command = wrench(kind, force, torque, held=held and "impulse" not in kind)
         try:
             simulation.submit(command, time_ns)
         except CommandRefused as refusal:

@@ -123,7 +123,7 @@ def energy_balance(integrator: str, damping_ratio: float, rest_length: float, bi
     simulation.submit(TieString("mesh", KNOT))
     every_ns = 37_000_000
     for k in range(4 * SECOND // every_ns):
-        simulation.submit(MoveString(tuple(hand_position(k * every_ns * 1e-9)), message=bytes([k % 256])), k * every_ns)
+        simulation.submit(MoveString(tuple(hand_position(k * every_ns * 1e-9))), k * every_ns)
     # Tying at a distance stores energy at once, which no hand has worked: the balance begins a nanosecond after it.
     simulation.advance(1)
     start = simulation.kinetic_energy + simulation.potential_energy

@@ -74,9 +74,7 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
             continue
         force, torque = values
         read = parse_frame(frame, scenario.setup.contacts)
-        offline.simulation.submit(
-            WrenchCommand(topic == "wrench", read, tuple(force), tuple(torque), ns, frame, b""), ns
-        )
+        offline.simulation.submit(WrenchCommand(topic == "wrench", read, tuple(force), tuple(torque), ns, frame), ns)
     check_states(found, offline, 100)
     assert not offline.simulation.refused
     assert abs(offline.simulation.state.linear_velocity).max() > 1e-3

@@ -34,7 +34,7 @@ class Reader(Observer):
 def commanded(count: int):
     simulation = flight(BODY)
     for number in range(count):
-        simulation.submit(wrench("body", (0.1, 0.2 * number, 0.0), tag=bytes([number % 256])), number * SECOND // 1000)
+        simulation.submit(wrench("body", (0.1, 0.2 * number, 0.0)), number * SECOND // 1000)
     return simulation
 
 

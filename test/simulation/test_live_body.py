@@ -145,7 +145,7 @@ def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
         flight.scenario = check_inertia(flight.scenario, content)
         return flight.scenario.setup
 
-    flight.simulation.submit(Change(content, apply, b"", "inertia", Rank.INERTIA))
+    flight.simulation.submit(Change(content, apply, "inertia", Rank.INERTIA))
     flight.simulation.advance(WHEN + 1)
     assert not flight.simulation.refused
     new = flight.simulation.setup.body

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Commands of one instant act in one order, whoever sent them and whenever they came."""
+"""Commands of one instant act by kind, and those of one topic as they arrived."""
 
-import itertools
 import random
 
 import numpy as np
 import pytest
 from command_rig import COMMANDS, RosClient, inertia_message, point_message, wrench_message
-from flights import SECOND
+from flights import SECOND, wrench
 
-from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -18,12 +16,14 @@ from rigid_proto_ros.simulation.commands import (
     ClearWrench,
     MoveString,
     Rank,
+    ThrusterCommand,
     TieString,
     WrenchCommand,
 )
 from rigid_proto_ros.simulation.simulation import Simulation
 
 WHEN = SECOND // 2
+ZERO = (0.0, 0.0, 0.0)
 END = 3 * SECOND // 2
 SCENE = {
     "mesh": "t_handle",
@@ -82,17 +82,20 @@ def clients(commanded):
         client.close()
 
 
+CLIENT_OF = {"wrench": 0, "poke": 1, "string/target": 2, "string/attach": 3, "inertia/set": 0, "schedule": 1}
+"""Which process publishes a topic."""
+
+
 def flown_by_four(rig, clients, seed: int) -> tuple[bytes, list[str], str]:
-    """The state after the same hundred commands dealt to four processes and shuffled by seed, and the kinds as applied."""
-    commands = hundred_commands()
-    random.Random(seed).shuffle(commands)
+    """The state after the same hundred commands, each topic's in its order and the topics mixed by seed, and the kinds
+    as applied.
+    """
+    commands = mixed(hundred_commands(), lambda command: command[0], seed)
     rig.restore()
     rig.start_over(paused=True)
     before = rig.sent
     # All four at once: arrival is interleaved by the machine.
-    jobs = [
-        (client, topic, message) for (topic, message), client in zip(commands, itertools.cycle(clients), strict=False)
-    ]
+    jobs = [(clients[CLIENT_OF[topic]], topic, message) for topic, message in commands]
     for client, topic, message in jobs:
         client.send("publish", topic=client.name(topic), messages=[message])
     for client, _, _ in jobs:
@@ -108,15 +111,23 @@ def flown_by_four(rig, clients, seed: int) -> tuple[bytes, list[str], str]:
     return State(END, row).sha256(), [event["kind"] for event in applied], applied[-1]["sha256"]
 
 
+def mixed(commands: list, topic_of, seed: int) -> list:
+    """The commands in a random order in which those of one topic keep theirs."""
+    topics = [topic_of(command) for command in commands]
+    random.Random(seed).shuffle(topics)
+    queues = {topic: iter([c for c in commands if topic_of(c) == topic]) for topic in topics}
+    return [next(queues[topic]) for topic in topics]
+
+
 @pytest.mark.slow
-def test_a_hundred_equal_stamped_commands_from_four_processes_in_any_order_give_one_state(rig, clients):
-    """Two shuffles: one state hash (of pose and twist as published), one chain of events."""
+def test_a_hundred_equal_stamped_commands_from_four_processes_give_one_state_however_topics_mix(rig, clients):
+    """Two mixtures: one state hash (of pose and twist as published), one chain of events."""
     rig.set(wrench_timeout=0.0)
     first, kinds, chain = flown_by_four(rig, clients, 1)
     order = {
         kind: rank
         for rank, kinds_ in enumerate(
-            (("set", "clear_wrench"), ("inertia",), ("string_attach", "string_target"), ("wrench",), ("poke",))
+            (("set", "clear_wrench"), ("inertia",), ("string_attach",), ("string_target",), ("wrench",), ("poke",))
         )
         for kind in kinds_
     }
@@ -133,35 +144,32 @@ def core_commands() -> list:
     scenario = make_scenario(SCENE)
     numbers = random.Random(8)
     commands = [
-        ClearWrench(b"clear"),
-        Change({"g": 1}, lambda: scenario.with_changes({"gravity": [0, 0, -2.0]}).setup, b"set"),
+        ClearWrench(),
+        Change({"g": 1}, lambda: scenario.with_changes({"gravity": [0, 0, -2.0]}).setup),
     ]
     commands.append(
         Change(
             {"i": 1},
             lambda: scenario.with_inertia(0.02, (0, 0, 0), (1e-5, 0, 0, 2e-5, 0, 2.5e-5), False).setup,
-            b"i",
             "inertia",
             Rank.INERTIA,
         )
     )
     for _ in range(10):
         point = [numbers.uniform(-0.3, 0.3) for _ in range(3)]
-        commands.append(MoveString(tuple(point), message=cdr.stamped_doubles(0, "world", point)))
-        commands.append(TieString("mesh", tuple(point), message=cdr.stamped_doubles(0, "body/mesh", point)))
+        commands.append(MoveString(tuple(point)))
+        commands.append(TieString("mesh", tuple(point)))
         for held, frame in ((True, "world@vertex/3"), (False, "body@vertex/7"), (False, "world;impulse")):
             force = tuple(numbers.uniform(-0.01, 0.01) for _ in range(3))
-            message = cdr.wrench_stamped(0, frame, force, (0, 0, 0))
-            commands.append(WrenchCommand(held, parse_frame(frame), force, (0.0, 0.0, 0.0), 0, frame, message))
+            commands.append(WrenchCommand(held, parse_frame(frame), force, (0.0, 0.0, 0.0), 0, frame))
     return commands
 
 
 @pytest.mark.parametrize("at_ns", [0, WHEN], ids=["now", "scheduled"])
-def test_fifty_orders_of_arrival_give_one_state_hash_and_one_chain_of_events(at_ns):
+def test_fifty_mixtures_of_topics_give_one_state_hash_and_one_chain_of_events(at_ns):
     hashes, chains = set(), set()
     for seed in range(50):
-        commands = core_commands()
-        random.Random(seed).shuffle(commands)
+        commands = mixed(core_commands(), lambda command: command.rank, seed)
         simulation = Simulation(make_scenario(SCENE).setup)
         for command in commands:
             simulation.submit(command, at_ns)
@@ -172,6 +180,27 @@ def test_fifty_orders_of_arrival_give_one_state_hash_and_one_chain_of_events(at_
     assert Simulation(make_scenario(SCENE).setup).advance(END).sha256() not in hashes
 
 
+@pytest.mark.parametrize("at_ns", [0, WHEN], ids=["now", "scheduled"])
+@pytest.mark.parametrize(
+    "forces", [((1.0, 0.0, 0.0), ZERO), ((1.0, 0.0, 0.0), (0.3, 0.0, 0.0)), (ZERO, (0.3, 0.0, 0.0))]
+)
+def test_the_last_wrench_that_arrives_is_the_one_that_holds(forces, at_ns):
+    simulation = Simulation(make_scenario({**SCENE, "wrench_timeout": 0.0}).setup)
+    for force in forces:
+        simulation.submit(wrench("world", force), at_ns)
+    simulation.advance(END)
+    acting = [load.load.force for load in simulation.acting]
+    assert acting == ([] if forces[-1] == ZERO else [forces[-1]])
+
+
+def test_the_last_forces_of_thrusters_that_arrive_are_those_that_hold():
+    scene = {**SCENE, "wrench_timeout": 0.0, "thrusters.a": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]}
+    simulation = Simulation(make_scenario(scene).setup)
+    simulation.submit(ThrusterCommand((1.0,)))
+    simulation.submit(ThrusterCommand((0.0,)))
+    assert np.abs(simulation.advance(END).linear_velocity).max() == 0.0
+
+
 def test_the_total_wrench_does_not_depend_on_who_ended_before():
     """Pulses summed afresh: after some have ended, the sum is that of the rest alone, to the bit."""
     setup = make_scenario({**SCENE, "initial.angular_velocity": [0.0, 0.0, 0.0]}).setup
@@ -179,7 +208,7 @@ def test_the_total_wrench_does_not_depend_on_who_ended_before():
 
     def poke(force, duration):
         frame = f"body;duration={duration}"
-        return WrenchCommand(False, parse_frame(frame), force, (0.0, 0.0, 0.0), 0, frame, frame.encode())
+        return WrenchCommand(False, parse_frame(frame), force, (0.0, 0.0, 0.0), 0, frame)
 
     for force, duration in (((1e9, 0.1, -3e7), 1e-3), ((0.1, 0.2, 0.3), 2.0), ((-1e9, 7.7, 1e8), 1e-3)):
         with_others.submit(poke(force, duration))

@@ -81,7 +81,7 @@ def test_it_lets_go_the_timeout_after_the_last_target_and_not_before():
     """To the nanosecond: 0.4 s after the last of three."""
     simulation, _ = simulated()
     for start in (0, 100, 350):
-        simulation.submit(MoveString((0.0, 0.0, 1.0), message=bytes([start % 256])), start * MS)
+        simulation.submit(MoveString((0.0, 0.0, 1.0)), start * MS)
     simulation.advance(750 * MS)
     assert simulation.string is not None
     before = simulation.angular_momentum

@@ -80,8 +80,7 @@ def test_every_integrator_has_its_own_bits_in_a_batch(integrator: str) -> None:
     assert differing_rows(own, chunk) == []
 
 
-def test_loads_that_start_together_act_in_the_order_of_their_messages() -> None:
-    # Two pokes at one point and time: the order of their bytes decides in which they are summed, so it hangs on the force.
+def test_loads_that_start_together_act_in_the_order_of_the_script() -> None:
     script = [{"t": 0.1, "at": "tip", "force": [1.0, 0.3, 0.0]}, {"t": 0.1, "at": "tip", "force": [0.1, 0.7, 0.3]}]
     script += [{"t": 0.1, "at": "tip", "force": [1e-3, 1e3, 0.1]}]
     vary = {"script.1.force.x": {"uniform": [-1.0, 1.0]}, "mass": {"uniform": [0.1, 1.0]}}
