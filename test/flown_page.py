@@ -87,7 +87,7 @@ class FlownLink:
             return
         entries = read_schedule(read_string(data, topic))
         self._lists += 1
-        for number, command in enumerate(expand_schedule(entries, 1.5)):
+        for number, command in enumerate(expand_schedule(entries)):
             self.command(command, (self._lists, number) if isinstance(entries, list) else None)
 
     def command(self, command, listed=None) -> None:

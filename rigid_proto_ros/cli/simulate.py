@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     scenario = read_scene(args.scene, dict(parse_setting(s) for s in args.set), _warn)
     for warning in scenario.warnings:
         _warn(warning)
-    script = read_script(args.script, scenario.parameters.wrench_timeout) if args.script else []
+    script = read_script(args.script) if args.script else []
     recordings = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
     if args.bag and not is_mcap(args.bag):
         raise InputError("--bag", args.bag, "a file that ends in .mcap")

@@ -101,7 +101,7 @@ class ScheduleMessage:
         listed = read_schedule(self.text)
         self.is_list = isinstance(listed, list)
         self.count = len(listed) if self.is_list else 1
-        commands = expand_schedule(listed, scenario.parameters.wrench_timeout)
+        commands = expand_schedule(listed)
         self.commands = with_contacts(commands, scenario.setup.contacts)
 
     def _check(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:

@@ -39,7 +39,7 @@ INTERFACES = (
         "~/wrench",
         "geometry_msgs/WrenchStamped",
         "held wrench: each message replaces the one before of the same `;slot=<name>`, or without one; it ends "
-        "`wrench_timeout` after the last",
+        "`wrench_timeout` after the last, or after its own `;duration=<s>`",
     ),
     _topic(
         SUBSCRIBED,

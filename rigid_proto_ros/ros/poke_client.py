@@ -17,10 +17,7 @@ import sys
 from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError
 from ..scene.command_codec import ScriptCommand
-from ..scene.parameters import PARAMETERS
 from ..scene.script import MAX_TIME_S, parse_script, read_script
-
-DEFAULT_WRENCH_TIMEOUT_S = float(str(PARAMETERS["wrench_timeout"].default))
 
 _ONE_LINE_COMMANDS = ("poke", "wrench")
 
@@ -35,7 +32,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         args = _arguments(own)
         # Read before a node is looked for: a mistake in it is told at once.
-        script = _script(args, DEFAULT_WRENCH_TIMEOUT_S if args.wrench_timeout is None else args.wrench_timeout)
+        script = _script(args)
         if args.dry_run:
             _print_plan(script)
             return 0
@@ -73,12 +70,6 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")
     parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
     parser.add_argument(
-        "--wrench-timeout",
-        type=float,
-        metavar="S",
-        help="wrench_timeout to assume for held wrenches (default: the node's)",
-    )
-    parser.add_argument(
         "--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node (default 10; 0: for ever)"
     )
     line = parser.add_argument_group("one command from the line")
@@ -96,17 +87,16 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     limits = (
         ("--lead", args.lead, 3600.0),
         ("--timeout", args.timeout, MAX_TIME_S),
-        ("--wrench-timeout", args.wrench_timeout, MAX_TIME_S),
     )
     for name, value, upper in limits:
-        if value is not None and not 0.0 <= value <= upper:
+        if not 0.0 <= value <= upper:
             raise InputError(name, value, f"seconds from 0 to {upper:g}")
     return args
 
 
-def _script(args: argparse.Namespace, wrench_timeout: float) -> list[ScriptCommand]:
+def _script(args: argparse.Namespace) -> list[ScriptCommand]:
     if args.what not in _ONE_LINE_COMMANDS:
-        return read_script(args.what, wrench_timeout)
+        return read_script(args.what)
     import yaml
 
     given = {
@@ -116,7 +106,7 @@ def _script(args: argparse.Namespace, wrench_timeout: float) -> list[ScriptComma
     }
     given["at"] = _point(args.at)
     entry = {"t": 0.0, **given} if args.what == "poke" else {"t": 0.0, "wrench": given}
-    return parse_script(yaml.safe_dump([entry]), args.what, wrench_timeout)
+    return parse_script(yaml.safe_dump([entry]), args.what)
 
 
 def _point(text: str) -> str | dict:
@@ -162,9 +152,6 @@ def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]
     sender = None
     try:
         sender = ScriptSender(args.node, args.timeout)
-        if args.wrench_timeout is None and any(command.kind == "wrench" for command in script):
-            # Held wrenches are repeated as often as the node needs it.
-            script = _script(args, sender.parameter("wrench_timeout"))
         report = sender.send(script, reset=args.reset, lead_s=args.lead)
     finally:
         if sender is not None:

@@ -49,17 +49,14 @@ ENTRY_KEYS: Mapping[str, set[str]] = {
 """The keys that a script may hold, by the kind of entry."""
 
 
-def read_script(path: str | Path, wrench_timeout: float = 1.5) -> list[ScriptCommand]:
-    """The commands of a script file in order of time; raises InputError naming file, entry and what is accepted.
-
-    wrench_timeout [s]: held wrenches are repeated every half of it.
-    """
-    return parse_script(read_text(Path(path), "a poke script"), str(path), wrench_timeout)
+def read_script(path: str | Path) -> list[ScriptCommand]:
+    """The commands of a script file in order of time; raises InputError naming file, entry and what is accepted."""
+    return parse_script(read_text(Path(path), "a poke script"), str(path))
 
 
-def parse_script(text: str, name: str = "script", wrench_timeout: float = 1.5) -> list[ScriptCommand]:
+def parse_script(text: str, name: str = "script") -> list[ScriptCommand]:
     """As ``read_script``, from text."""
-    return expand_script(load_plain_yaml(text, name), name, wrench_timeout)
+    return expand_script(load_plain_yaml(text, name), name)
 
 
 def read_schedule(text: str) -> dict | list:
@@ -87,19 +84,17 @@ def _no_number(text: str) -> NoReturn:
     raise ValueError(text)
 
 
-def expand_schedule(entries: dict | list, wrench_timeout: float) -> list[ScriptCommand]:
+def expand_schedule(entries: dict | list) -> list[ScriptCommand]:
     """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
     listed = entries if isinstance(entries, list) else [entries]
     if any(isinstance(entry, dict) and "script" in entry for entry in listed):
         raise InputError("schedule", "script", "entries alone, without a script around them")
-    commands = expand_script(listed, "schedule", wrench_timeout, MAX_SCHEDULED)
+    commands = expand_script(listed, "schedule", MAX_SCHEDULED)
     # As listed, which only matters among those that act at once because their time is past.
     return sorted(commands, key=lambda command: command.entry)
 
 
-def expand_script(
-    entries: Any, name: str = "script", wrench_timeout: float = 1.5, max_commands: int = MAX_ENTRIES
-) -> list[ScriptCommand]:
+def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES) -> list[ScriptCommand]:
     """As ``parse_script``, from what its YAML says: a list of entries, or a mapping that holds one as ``script``."""
     whole: dict = {}
     if isinstance(entries, dict) and "script" in entries:
@@ -117,7 +112,7 @@ def expand_script(
             for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}", max_commands):
                 jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
                 at_ns = max(0, t_ns + offset_ns + jitter_ns)
-                expanded = _expand(entry, at_ns, where, wrench_timeout, max_commands)
+                expanded = _expand(entry, at_ns, where)
                 commands += [replace(command, entry=number) for command in expanded]
             if len(commands) > max_commands:
                 raise InputError(where, f"more than {max_commands} commands")
@@ -156,12 +151,10 @@ def _jitter_ns(timing: dict, where: str, seed: str) -> int:
     return nanoseconds(random.Random(f"{int(own)}/{seed}").uniform(-jitter, jitter))
 
 
-def _expand(
-    entry: dict, t_ns: int, where: str, wrench_timeout: float, max_commands: int = MAX_ENTRIES
-) -> list[ScriptCommand]:
+def _expand(entry: dict, t_ns: int, where: str) -> list[ScriptCommand]:
     if "wrench" in entry:
         _check_keys(entry, _TIMING_KEYS | {"wrench"}, where)
-        return _expand_wrench(entry["wrench"], t_ns, f"{where}, wrench", wrench_timeout, max_commands)
+        return [_held_wrench(entry["wrench"], t_ns, f"{where}, wrench")]
     if "thrusters" in entry:
         _check_keys(entry, _TIMING_KEYS | {"thrusters"}, where)
         return [ScriptCommand(t_ns, "thrusters", forces=_forces(entry["thrusters"], f"{where}, thrusters"))]
@@ -196,33 +189,18 @@ def _poke(entry: dict, t_ns: int, where: str) -> ScriptCommand:
     lasting = "force" in entry or "push" in entry or "torque" in entry
     if impulsive and (lasting or "duration" in entry or "slot" in entry):
         raise InputError(where, sorted(entry), "impulses alone, or force, push and torque with a duration or slot")
-    option = ";impulse" if impulsive else ""
-    if "duration" in entry:
-        option = f";duration={_number(entry['duration'], f'{where}, duration', 1e-9, MAX_TIME_S)!r}"
-    option += _slot(entry, where)
     frame, force, torque = _wrench_fields(entry, where)
-    return ScriptCommand(t_ns, "poke", _checked_frame(frame + option, where), force, torque)
+    frame += ";impulse" if impulsive else _duration(entry, where)
+    return ScriptCommand(t_ns, "poke", _checked_frame(frame + _slot(entry, where), where), force, torque)
 
 
-def _expand_wrench(entry: Any, t_ns: int, where: str, wrench_timeout: float, max_commands: int) -> list[ScriptCommand]:
+def _held_wrench(entry: Any, t_ns: int, where: str) -> ScriptCommand:
     if not isinstance(entry, dict):
         raise InputError(where, entry, "{at, force or push, torque, axes, duration}")
     _check_keys(entry, _WRENCH_KEYS, where)
     frame, force, torque = _wrench_fields(entry, where)
-    slot = _slot(entry, where)
-    first = ScriptCommand(t_ns, "wrench", _checked_frame(frame + slot, where), force, torque)
-    if "duration" not in entry:
-        return [first]
-    duration_ns = nanoseconds(_number(entry["duration"], f"{where}, duration", 1e-9, MAX_TIME_S))
-    repeats = [first]
-    if wrench_timeout > 0.0:
-        every_ns = max(1, nanoseconds(wrench_timeout / 2.0))
-        if duration_ns // every_ns > max_commands:
-            raise InputError(f"{where}, duration", duration_ns * 1e-9, f"at most {max_commands} repeats")
-        times = range(t_ns + every_ns, t_ns + duration_ns, every_ns)
-        repeats += [ScriptCommand(t, "wrench", first.frame_id, force, torque) for t in times]
-    # The last message holds no axes to misread: no wrench at all.
-    return [*repeats, ScriptCommand(t_ns + duration_ns, "wrench", f"world@com{slot}")]
+    frame += _duration(entry, where) + _slot(entry, where)
+    return ScriptCommand(t_ns, "wrench", _checked_frame(frame, where), force, torque)
 
 
 def _expand_string(entry: Any, t_ns: int, where: str) -> list[ScriptCommand]:
@@ -295,6 +273,12 @@ def _at(at: object, where: str) -> str:
         if word == "ray" and isinstance(value, dict) and set(value) == {"origin", "direction"}:
             return point_text(("ray", *(_vector(value[k], f"{field}, ray, {k}") for k in ("origin", "direction"))))
     raise InputError(field, at, accepted)
+
+
+def _duration(entry: dict, where: str) -> str:
+    if "duration" not in entry:
+        return ""
+    return f";duration={_number(entry['duration'], f'{where}, duration', 1e-9, MAX_TIME_S)!r}"
 
 
 def _slot(entry: dict, where: str) -> str:

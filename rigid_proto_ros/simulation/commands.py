@@ -66,14 +66,16 @@ class WrenchCommand:
 
     @property
     def duration_ns(self) -> int:
-        """Of a poke that says how long it lasts, else −1."""
+        """Of a command that says how long it lasts, else −1."""
         seconds = self.frame.duration_s
         return -1 if seconds is None else round(seconds * 1e9)
 
     @property
     def flight_kind(self) -> int:
-        """What it is to a flight."""
-        return HELD_WRENCH if self.held else IMPULSE if self.frame.impulse else PULSE
+        """What it is to a flight: a held wrench that says how long it lasts is a pulse in its slot."""
+        if self.frame.impulse:
+            return IMPULSE
+        return HELD_WRENCH if self.held and self.frame.duration_s is None else PULSE
 
     @property
     def slot(self) -> int:
@@ -83,10 +85,8 @@ class WrenchCommand:
         return UNNAMED_SLOT if self.held else NO_SLOT
 
     def __post_init__(self) -> None:
-        if self.held and (self.frame.impulse or self.frame.duration_s is not None):
-            raise CommandRefused(
-                "frame", "frame_id", self.frame_id, "on the wrench topic no ;duration or ;impulse: those are pokes"
-            )
+        if self.held and self.frame.impulse:
+            raise CommandRefused("frame", "frame_id", self.frame_id, "on the wrench topic no ;impulse: that is a poke")
 
 
 @dataclass(frozen=True)

@@ -68,11 +68,11 @@ class Flight:
         simulation, scene = self._run.simulation, self._run.scenario
         # Counted from now, in whole nanoseconds; seconds don't hold them all.
         start_ns = 0 if "t" in entry else simulation.time_ns
-        commands = expand_script([{"t": 0.0, **entry}], "command", scene.parameters.wrench_timeout)
+        commands = expand_script([{"t": 0.0, **entry}], "command")
         for command in with_contacts(commands, scene.setup.contacts):
             time_ns = start_ns + command.t_ns
             core = core_command(command, time_ns, scene.setup.contacts, self._run.change)
-            simulation.submit(core, time_ns, (b"", self._commands))
+            simulation.submit(core, time_ns, (0, self._commands))
             self._commands += 1
 
     def step(self, seconds: float) -> State:

@@ -71,11 +71,10 @@ class Group:
         self.ballast = np.array(parameters.point_masses, dtype=float).reshape(-1, 4)
         self.resolver = LoadResolver(parameters, self.body_mesh)
         self.overlay: Overlay | None = None
-        timeout = parameters.wrench_timeout
         if fits(study):
-            self.overlay, loads = make_overlay(study, self.resolver, timeout)
+            self.overlay, loads = make_overlay(study, self.resolver)
         else:
-            _, loads = script_of(expand_script(study.script, "script", timeout), self.resolver)
+            _, loads = script_of(expand_script(study.script, "script"), self.resolver)
         self.integrator = checked_integrator(parameters, loads)
 
     def variants(self, columns: list[np.ndarray], count: int) -> tuple[Variants, np.ndarray]:
@@ -126,9 +125,7 @@ class Group:
         scripts: list[Script | None] = []
         for i in range(count):
             try:
-                commands = expand_script(
-                    self._script([c[i] for c in columns]), "script", self.parameters.wrench_timeout
-                )
+                commands = expand_script(self._script([c[i] for c in columns]), "script")
                 script, loads = script_of(commands, self.resolver)
                 checked_integrator(self.parameters, loads)
                 scripts.append(script)

@@ -88,11 +88,11 @@ def _lay(target: Target, values: np.ndarray, own: list[int], commands: np.ndarra
     return good
 
 
-def make_overlay(study: Study, resolver: LoadResolver, wrench_timeout: float) -> tuple[Overlay, list]:
+def make_overlay(study: Study, resolver: LoadResolver) -> tuple[Overlay, list]:
     """The script ready for varied numbers, and the loads that the integrator has to support; raises
     NotBatchable, InputError.
     """
-    commands = expand_script(study.script, "script", wrench_timeout)
+    commands = expand_script(study.script, "script")
     commands.sort(key=lambda command: command.entry)
     script, loads = script_of(commands, resolver)
     return Overlay(script, commands), loads

@@ -295,7 +295,7 @@ def _check_flyable(study: Study, base: Scenario) -> None:
     """The scene as it stands takes off with its script, and so does its reference: what fails later is
     the row's own.
     """
-    commands = expand_script(study.script, "script", base.parameters.wrench_timeout)
+    commands = expand_script(study.script, "script")
     OfflineRun(base, commands)
     if study.reference is not None:
         OfflineRun(base.with_changes(study.reference), commands)

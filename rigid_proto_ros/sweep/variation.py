@@ -43,7 +43,7 @@ class Variation:
     @property
     def commands(self) -> list[ScriptCommand]:
         """The script's commands; raises InputError."""
-        return expand_script(self.script, "script", self.parameters.wrench_timeout)
+        return expand_script(self.script, "script")
 
     @property
     def script_text(self) -> str:

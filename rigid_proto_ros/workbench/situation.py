@@ -50,7 +50,7 @@ def situation_of(scene: str, script: str, present: Mapping[str, object]) -> Situ
     scene as the points that they are.
     """
     wanted = Parameters().replaced(read_scene_text(scene).values)
-    listed = parse_script(script, wrench_timeout=wanted.wrench_timeout) if script.strip() else []
+    listed = parse_script(script) if script.strip() else []
     commands = [_at_its_point(command, wanted.contacts) for command in with_contacts(listed, wanted.contacts)]
     if len(commands) > MAX_COMMANDS:
         raise InputError(

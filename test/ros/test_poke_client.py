@@ -107,7 +107,7 @@ def client(rig, *arguments, timeout: float = READY_S):
 
 
 def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
-    """Held wrenches are repeated as the node's own timeout asks, 0.4 s here."""
+    """Held wrenches with a duration outlast the timeout, 0.4 s here."""
     rig.set(real_time_factor=4.0, wrench_timeout=0.4)
     before = rig.counters()
     # Nothing that was flown before may pass for the flight after the reset.
@@ -115,7 +115,7 @@ def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(r
     done = client(rig, script, "--reset")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "0 late, 0 refused" in done.stdout
-    sent = parse_script(EVERY_ENTRY, wrench_timeout=0.4)
+    sent = parse_script(EVERY_ENTRY)
     rig.sent += len(sent)
     rig.state_at(4 * SECOND)
     flown = make_scenario({**rig.scene, "wrench_timeout": 0.4})

@@ -109,7 +109,7 @@ def test_a_command_comes_back_from_its_line_in_the_log(command: ScriptCommand) -
 def test_a_command_comes_back_from_the_message_on_its_topic(command: ScriptCommand) -> None:
     data = command.message(command.t_ns)
     if command.topic == "schedule":
-        assert expand_schedule(read_schedule(read_string(data, "schedule")), 1.5) == [command]
+        assert expand_schedule(read_schedule(read_string(data, "schedule"))) == [command]
     else:
         assert of_message(command.topic, data) == command
 
@@ -129,7 +129,7 @@ def test_a_script_is_sent_as_it_is_listed_and_each_instant_in_one_message_as_far
     assert [command for message in sent for command in message.commands] == script
     for message in sent:
         if len(message.commands) > 1:
-            again = expand_schedule(read_schedule(read_string(message.data, "schedule")), 1.5)
+            again = expand_schedule(read_schedule(read_string(message.data, "schedule")))
             assert again == list(message.commands)
 
 

@@ -49,7 +49,8 @@ POKES = """
 - {t: 0.1, at: tip, force: [0.0, 0.01, 0.0], duration: 0.3}
 - {t: 0.2, at: {vertex: 3}, impulse: [0.0, 0.0, 0.002]}
 - {t: 0.25, at: left, push: 0.01, duration: 0.02}
-- {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-4, 0.0], axes: body, duration: 0.4}}
+- {t: 0.3, wrench: {at: com, torque: [0.0, 1.0e-4, 0.0], axes: body}}
+- {t: 0.7, wrench: {force: [0.0, 0.0, 0.0]}}
 - {t: 0.5, set: {density: 9000.0, gravity: [0.0, 0.0, -0.5], scale: 1.1}}
 """
 STRING = """
@@ -59,7 +60,8 @@ STRING = """
 """
 BODY_WRENCH = """
 - {t: 0.2, at: com, impulse: [0.0, 0.0, 0.002], angular_impulse: [1.0e-5, 0.0, 2.0e-5]}
-- {t: 0.3, wrench: {at: com, force: [0.0, 0.01, 0.0], torque: [0.0, 1.0e-4, 0.0], axes: body, duration: 0.4}}
+- {t: 0.3, wrench: {at: com, force: [0.0, 0.01, 0.0], torque: [0.0, 1.0e-4, 0.0], axes: body}}
+- {t: 0.7, wrench: {force: [0.0, 0.0, 0.0]}}
 """
 IMPULSES = "- {t: 0.2, at: tip, impulse: [0.0, 0.0, 0.002]}\n- {t: 0.5, set: {density: 9000.0}}\n"
 JITTER = "- {t: 0.2, at: com, angular_impulse: [1.0e-5, 0.0, 0.0], repeat: 4, every: 0.1, jitter: 0.02, seed: 7}\n"

@@ -101,3 +101,30 @@ def test_an_entry_keeps_its_slot_and_a_wrong_one_is_named() -> None:
 def test_a_wrench_that_ends_by_its_duration_ends_its_own_slot() -> None:
     run, _ = flown("- {t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}\n- {t: 0, wrench: {force: [0, 1, 0]}}\n")
     assert run.simulation.state.linear_velocity == pytest.approx([2.0, 1.5, 0.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("timeout", [0.0, 0.4, 1.5])
+def test_a_wrench_with_a_duration_holds_that_long_unless_replaced_whatever_the_timeout(timeout: float) -> None:
+    one = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.mass": 1.0, "wrench_timeout": timeout}
+    both = (
+        "- {t: 0, wrench: {force: [0.1, 0, 0], duration: 3}}\n- {t: 0.5, wrench: {force: [0, 0.1, 0], duration: 2}}\n"
+    )
+    run, told = flown(both, mass=0.0, **one)
+    # x until y replaces it, which ends it for good.
+    assert run.simulation.state.linear_velocity == pytest.approx([0.05, 0.2, 0.0], rel=1e-12)
+    assert [json.loads(line)["kind"] for line in told.lines] == ["wrench", "wrench"]
+    apart, _ = flown(both.replace("duration: 3", "duration: 3, slot: x"), mass=0.0, **one)
+    assert apart.simulation.state.linear_velocity == pytest.approx([0.3, 0.2, 0.0], rel=1e-12)
+
+
+def test_a_poke_that_replaces_a_wrench_with_a_duration_lasts_to_its_own_end() -> None:
+    script = (
+        "- {t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}\n- {t: 1, force: [0, 1, 0], duration: 2, slot: a}\n"
+    )
+    run, _ = flown(script)
+    assert run.simulation.state.linear_velocity == pytest.approx([1.0, 2.0, 0.0], rel=1e-12)
+
+
+def test_a_change_of_the_timeout_leaves_a_wrench_with_a_duration_as_it_is() -> None:
+    run, _ = flown("- {t: 0, wrench: {force: [1, 0, 0], duration: 2}}\n- {t: 1, set: {wrench_timeout: 0.25}}\n")
+    assert run.simulation.state.linear_velocity == pytest.approx([2.0, 0.0, 0.0], rel=1e-12)

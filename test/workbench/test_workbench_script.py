@@ -95,7 +95,7 @@ def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_ord
     script = parse_script(assert_flies_again(hand).script)
     (message,) = outgoing(script)
     assert message.topic == "schedule"
-    assert expand_schedule(read_schedule(read_string(message.data, "schedule")), 1.5) == script
+    assert expand_schedule(read_schedule(read_string(message.data, "schedule"))) == script
     assert [c.changes["ballast.tip"][0] for c in script[:200]] == [0.0001 * k for k in range(200)]
 
 
