@@ -29,7 +29,7 @@ from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.mcap_observer import McapObserver
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import Event, Observer, Published
 
 REPEATS = 5
 SECOND = 10**9
@@ -38,6 +38,8 @@ COLUMNS = ("recorder", "states", "us_per_state", "ratio", "file_mb", "memory_mb_
 
 class Nobody(Observer):
     """Takes every state and keeps none."""
+
+    takes = frozenset({Published})
 
     def close(self) -> None:
         """Nothing to finish."""
@@ -50,8 +52,13 @@ class OneByOne(Observer):
         self._recording = rr.RecordingStream("one_by_one")
         self._recording.save(path)
 
-    def state(self, time_ns: int, row: np.ndarray) -> None:
+    takes = frozenset({Published})
+
+    def on(self, event: Event) -> None:
         """Log one state."""
+        if not isinstance(event, Published):
+            return
+        time_ns, row = event
         to = self._recording
         to.set_time("sim_time", duration=1e-9 * time_ns)
         to.log("body", rr.Transform3D(translation=row[0:3], quaternion=row[3:7]))

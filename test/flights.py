@@ -11,7 +11,7 @@ from rigid_proto_ros.motion.body import Body, make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import integrator_named
 from rigid_proto_ros.simulation.commands import WrenchCommand
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import Logged, Observer
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -29,8 +29,11 @@ class EventLines(Observer):
     def lines(self) -> list[str]:
         return [line for _, line in self.timed]
 
-    def event(self, time_ns: int, line: str) -> None:
-        self.timed.append((time_ns, line))
+    takes = frozenset({Logged})
+
+    def on(self, event) -> None:
+        if isinstance(event, Logged):
+            self.timed.append((event.time_ns, event.line))
 
 
 def bundled_body(name: str) -> Body:

@@ -7,7 +7,18 @@ import time
 
 import numpy as np
 
-from rigid_proto_ros.simulation.observer import BodySnapshot, Observer, ShownLoad
+from rigid_proto_ros.simulation.observer import (
+    BodyChanged,
+    BodySnapshot,
+    LoadBegan,
+    LoadEnded,
+    Logged,
+    Observer,
+    Published,
+    Refused,
+    ShownLoad,
+    Started,
+)
 
 VERTICES = np.array(
     [[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.2) for z in (0.0, 0.1)],
@@ -45,21 +56,21 @@ def rows(count: int, seed: int = 7) -> np.ndarray:
 
 def fly(observer: Observer, states: np.ndarray, body: BodySnapshot = BODY) -> None:
     """A run of ``states``: a poke from 200 to 400 ms, a wrench from 305 ms to the end, a refusal at 500 ms."""
-    observer.started(SCENE, VERTICES, TRIANGLES, SHA256)
-    observer.body_changed(0, body)
+    observer.on(Started(SCENE, VERTICES, TRIANGLES, SHA256))
+    observer.on(BodyChanged(0, body))
     for k, row in enumerate(states):
         time_ns = k * PERIOD_NS
-        observer.state(time_ns, row)
+        observer.on(Published(time_ns, row))
         if time_ns == 200_000_000:
-            observer.event(time_ns, event_line(time_ns, "poke"))
-            observer.load_began(time_ns, 1, POKE)
+            observer.on(Logged(time_ns, event_line(time_ns, "poke")))
+            observer.on(LoadBegan(time_ns, 1, POKE))
         if time_ns == 300_000_000:
-            observer.event(305_000_000, event_line(305_000_000, "wrench"))
-            observer.load_began(305_000_000, 2, WRENCH)
+            observer.on(Logged(305_000_000, event_line(305_000_000, "wrench")))
+            observer.on(LoadBegan(305_000_000, 2, WRENCH))
         if time_ns == 400_000_000:
-            observer.load_ended(time_ns, 1)
+            observer.on(LoadEnded(time_ns, 1))
         if time_ns == 500_000_000:
-            observer.refused(time_ns, "frame", "frame_id: got 'mars'; accepted: world, body")
+            observer.on(Refused(time_ns, "frame", "frame_id: got 'mars'; accepted: world, body"))
 
 
 def event_line(time_ns: int, kind: str) -> str:

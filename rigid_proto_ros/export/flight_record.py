@@ -10,7 +10,20 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..picture.surface import shaded_surface
-from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
+from ..simulation.observer import (
+    BodyChanged,
+    BodySnapshot,
+    Event,
+    GhostChanged,
+    LoadBegan,
+    LoadEnded,
+    MeshChanged,
+    Observer,
+    Published,
+    ShownString,
+    Started,
+    StringChanged,
+)
 
 
 @dataclass(frozen=True)
@@ -49,6 +62,8 @@ class FlightRecord(Observer):
     at which a load begins or ends, where velocities may jump.
     """
 
+    takes = frozenset({Started, MeshChanged, BodyChanged, GhostChanged, Published, LoadBegan, LoadEnded, StringChanged})
+
     def __init__(self) -> None:
         self.bodies: list[DrawnBody] = []
         self.ghosts: list[DrawnBody] = []
@@ -71,54 +86,26 @@ class FlightRecord(Observer):
         """The states (n, 13) in STATE_FIELDS order."""
         return np.array(self._rows).reshape(-1, 13)
 
-    def started(
-        self,
-        scene: str,  # noqa: ARG002 (an observer gets it)
-        vertices: np.ndarray | None,
-        triangles: np.ndarray | None,
-        mesh_sha256: str,  # noqa: ARG002 (an observer gets it)
-    ) -> None:
-        """A run begins."""
-        self._take_mesh(vertices, triangles)
-
-    def mesh_changed(
-        self,
-        time_ns: int,  # noqa: ARG002 (an observer gets it)
-        vertices: np.ndarray | None,
-        triangles: np.ndarray | None,
-        mesh_sha256: str,  # noqa: ARG002 (an observer gets it)
-    ) -> None:
-        """The body is drawn as this mesh from now on."""
-        self._take_mesh(vertices, triangles)
+    def on(self, event: Event) -> None:
+        """Keep it. Of two states at one time, as a bag may hold them, the first is kept."""
+        match event:
+            case Published(time_ns, row):
+                if not self._times or time_ns > self._times[-1]:
+                    self._times.append(time_ns)
+                    self._rows.append(np.array(row, dtype=float))
+            case Started(vertices=vertices, triangles=triangles) | MeshChanged(vertices=vertices, triangles=triangles):
+                self._take_mesh(vertices, triangles)
+            case BodyChanged(time_ns, body):
+                self.bodies.append(DrawnBody(time_ns, self._mesh, body))
+            case GhostChanged(time_ns, body):
+                self.ghosts.append(DrawnBody(time_ns, self._mesh, body))
+            case LoadBegan(time_ns=time_ns) | LoadEnded(time_ns=time_ns):
+                self.breaks.append(time_ns)
+            case StringChanged(time_ns, string):
+                self.strings.append((time_ns, string))
 
     def _take_mesh(self, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
         self._mesh = -1
         if vertices is not None and triangles is not None and len(triangles):
             self._mesh = len(self.meshes)
             self.meshes.append(DrawnMesh(np.array(vertices, dtype=float), np.array(triangles)))
-
-    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
-        """The body is this one from ``time_ns`` on."""
-        self.bodies.append(DrawnBody(time_ns, self._mesh, body))
-
-    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
-        """The ghost is this one from ``time_ns`` on."""
-        self.ghosts.append(DrawnBody(time_ns, self._mesh, ghost))
-
-    def state(self, time_ns: int, row: np.ndarray) -> None:
-        """A published state. Of two at one time, as a bag may hold them, the first is kept."""
-        if not self._times or time_ns > self._times[-1]:
-            self._times.append(time_ns)
-            self._rows.append(np.array(row, dtype=float))
-
-    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:  # noqa: ARG002 (an observer gets it)
-        """A load begins to act."""
-        self.breaks.append(time_ns)
-
-    def load_ended(self, time_ns: int, load_id: int) -> None:  # noqa: ARG002 (an observer gets it)
-        """A load acts no longer."""
-        self.breaks.append(time_ns)
-
-    def string_changed(self, time_ns: int, string: ShownString | None) -> None:
-        """The string is tied like this from ``time_ns`` on, or not at all."""
-        self.strings.append((time_ns, string))

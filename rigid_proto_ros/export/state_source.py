@@ -13,25 +13,25 @@ from ..scene.scenario import Scenario
 from ..scene.script import ScriptCommand
 from ..session.recorded_session import RecordedSession
 from ..session.replay import Resimulation, resimulation
-from ..simulation.observer import BodySnapshot, Observer
+from ..simulation.observer import Event, GhostPublished, Observer
 
 POSE = 7
 """Numbers of a state row that are its pose: position and attitude xyzw."""
 
 
 class StateSource(Observer):
-    """A flight that can be made anew and looked at; keeps what its ghost is told to be."""
+    """A flight that can be made anew and looked at; keeps where its ghost is."""
+
+    takes = frozenset({GhostPublished})
 
     def __init__(self, make: Callable[[Observer], OfflineRun | Resimulation]) -> None:
         self._make = make
         self._ghost = np.full(POSE, np.nan)
 
-    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:  # noqa: ARG002 (an observer gets it)
+    def on(self, event: Event) -> None:
         """One state of the ghost."""
-        self._ghost = row[:POSE].copy()
-
-    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
-        """Listening to the ghost is what makes there be one."""
+        if isinstance(event, GhostPublished):
+            self._ghost = event.row[:POSE].copy()
 
     def at(self, times_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """State rows (n, 13) of the body and poses (n, 7) of its ghost; NaN from where the motion stopped."""

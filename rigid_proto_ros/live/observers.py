@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from ..scene.offline import notify_start
 from ..scene.scenario import Scenario
-from ..simulation.observer import Observer, Observers, listens
+from ..simulation.observer import Observer, Observers, Published, SceneChanged
 from .simulation_loop import SimulationLoop
 
 
@@ -70,7 +70,7 @@ class LiveObservers:
     @property
     def want_states(self) -> bool:
         """Whether one of them takes the states."""
-        return listens(self.observer, "state")
+        return Published in self.observer.takes
 
     @property
     def has_failed_recording(self) -> bool:
@@ -84,5 +84,5 @@ class LiveObservers:
 
 def _introduce(loop: SimulationLoop, observer: Observer) -> None:
     notify_start(observer, loop.scenario)
-    observer.scene_changed(loop.simulation.time_ns, loop.scenario.text)
+    observer.on(SceneChanged(loop.simulation.time_ns, loop.scenario.text))
     loop.simulation.introduce(observer)

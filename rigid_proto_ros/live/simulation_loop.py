@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from ..base.errors import InputError
 from ..scene.scenario import Scenario, nanoseconds
 from ..scene.scenario_run import ScenarioRun
-from ..simulation.observer import Observer, listens
+from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
 from .endpoints import Endpoints
@@ -269,7 +269,7 @@ class SimulationLoop(ScenarioRun):
 
     @property
     def _is_observed(self) -> bool:
-        return listens(self.observer, "state")
+        return Published in self.observer.takes
 
     def _check_listeners(self) -> None:
         self._has_subscribers = self.endpoints.has_subscribers()
@@ -311,7 +311,7 @@ class SimulationLoop(ScenarioRun):
             return False
         state = self.simulation.state
         self._publications.made()
-        self.observer.state(state.time_ns, state.row)
+        self.observer.on(Published(state.time_ns, state.row))
         self.simulation.notify_status()
         if self.ghost is not None:
             self.ghost.advance(state.time_ns)

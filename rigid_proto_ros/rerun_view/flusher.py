@@ -10,10 +10,12 @@ from __future__ import annotations
 import threading
 import uuid
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from ..base.errors import InputError
-from ..simulation.mailbox import Block, Mailbox, Mark
+from ..simulation.mailbox import Block, Mailbox, Note
+from ..simulation.observer import Reset
 from .rerun_internals import forget_closed_recordings
 from .streams import (
     FileStream,
@@ -30,8 +32,23 @@ TIMEOUT_S = 10.0
 """A disk that doesn't take what waits in this time is given up."""
 
 
+@dataclass(frozen=True)
+class _Record:
+    """Asks to record to this file from here on, or to none, and to say when the one before is whole."""
+
+    file: FileStream | None
+    finished: threading.Event
+
+
+@dataclass(frozen=True)
+class _Show:
+    """Asks to show what follows on this stream."""
+
+    stream: LiveStream
+
+
 class Flusher:
-    """Owns the writer and its streams. ``mailbox`` and ``ghosts`` take rows and marks from the stepping thread.
+    """Owns the writer and its streams. ``mailbox`` and ``ghosts`` take rows and events from the stepping thread.
 
     file is what is being recorded to; error says why a recording stopped, and on_error is called with the same.
     """
@@ -66,7 +83,7 @@ class Flusher:
         file = FileStream(path, self.run_id, self.run_name, self._open_ended)
         self.error = ""
         self.file = file
-        self.mailbox.mark(-1, "record", file, threading.Event())
+        self.mailbox.note(_Record(file, threading.Event()))
         self.mailbox.hurry()
 
     def close_file(self) -> None:
@@ -74,7 +91,7 @@ class Flusher:
         if self.file is not None:
             self.file = None
             finished = threading.Event()
-            self.mailbox.mark(-1, "record", None, finished)
+            self.mailbox.note(_Record(None, finished))
             self.mailbox.wake()
             finished.wait(TIMEOUT_S)
 
@@ -83,7 +100,7 @@ class Flusher:
         server = LiveServer(port, memory_limit)
         stream = server.open_run(self.run_id, self.run_name)
         self.server = server
-        self.mailbox.mark(-1, "live", stream)
+        self.mailbox.note(_Show(stream))
         return server.address
 
     def close(self) -> None:
@@ -126,7 +143,7 @@ class Flusher:
             if block is None:
                 break
             more = block.handed_over
-            self._writer.write(block, self._on_mark, skip_live=waiting > 1)
+            self._writer.write(block, self._on_note, skip_live=waiting > 1)
             self.mailbox.give_back(block)
         self._flush_ghost()
         for stream in list(self._writer.streams):
@@ -146,7 +163,7 @@ class Flusher:
             block = self._ghost_block
             if block is None:
                 return
-            reset = block.marks[0] if block.marks else None
+            reset = block.notes[0] if block.notes else None
             end = reset.after_rows if reset else block.count
             self._writer.write_ghost(block, self._ghost_sent, end)
             self._ghost_sent = end
@@ -154,25 +171,25 @@ class Flusher:
                 if not upto_reset:
                     # The body's own reset hasn't come yet: what follows belongs to the next run.
                     return
-                block.marks.pop(0)
+                block.notes.pop(0)
                 return
             self._ghost_block = None
             self.ghosts.give_back(block)
 
-    def _on_mark(self, mark: Mark) -> None:
-        if mark.kind == "reset":
+    def _on_note(self, note: Note) -> None:
+        asked = note.event
+        if isinstance(asked, Reset):
             self._flush_ghost(upto_reset=True)
             self._next_run()
             self._forget_closed_recordings()
-        elif mark.kind == "record":
-            file, finished = mark.content
+        elif isinstance(asked, _Record):
             self._finish_file()
-            if file is not None:
-                self._writer.attach(file)
-            finished.set()
+            if asked.file is not None:
+                self._writer.attach(asked.file)
+            asked.finished.set()
             self._forget_closed_recordings()
-        elif mark.kind == "live":
-            self._writer.attach(*mark.content)
+        elif isinstance(asked, _Show):
+            self._writer.attach(asked.stream)
 
     def _next_run(self) -> None:
         writer = self._writer

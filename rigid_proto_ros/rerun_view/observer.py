@@ -15,12 +15,30 @@ import importlib.util
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import InputError, is_missing
-from ..simulation.observer import BodySnapshot, Observer, ShownLoad, ShownString
+from ..simulation.observer import (
+    BodyChanged,
+    Effort,
+    Event,
+    GhostChanged,
+    GhostPublished,
+    LoadBegan,
+    LoadEnded,
+    Logged,
+    MeshChanged,
+    Observer,
+    Published,
+    Refused,
+    Reset,
+    SceneChanged,
+    Started,
+    StatusChanged,
+    StringChanged,
+)
 from .ports import serve_on_port
 
 if TYPE_CHECKING:
@@ -38,7 +56,7 @@ LIVE_MEMORY_LIMIT = "32MiB"
 twice that of this process's memory.
 """
 
-_REMEMBERED = ("started", "mesh_changed", "body_changed", "scene_changed", "string_changed", "ghost_began")
+_REMEMBERED = (Started, MeshChanged, BodyChanged, SceneChanged, StringChanged, GhostChanged)
 """What a recording that is switched on later must know."""
 
 _logger = logging.getLogger(__name__)
@@ -56,6 +74,13 @@ class RerunObserver(Observer):
 
     Raises InputError for a file that can't be written, a port that is taken, an unknown viewer, and without rerun-sdk.
     """
+
+    takes = frozenset(
+        {
+            *(*_REMEMBERED, Published, GhostPublished, Reset),
+            *(LoadBegan, LoadEnded, Logged, Refused, StatusChanged, Effort),
+        }
+    )
 
     def __init__(  # noqa: PLR0913 (each has a default, and callers name them)
         self,
@@ -85,7 +110,7 @@ class RerunObserver(Observer):
         self._on_error = on_error or _logger.error
         self._flusher: Flusher | None = None
         self._processes: list[ViewerProcess] = []
-        self._remembered: list[tuple[Any, ...]] = []
+        self._remembered: dict[type, Event] = {}
         self._closed = False
         try:
             if viewer != "none":
@@ -97,78 +122,24 @@ class RerunObserver(Observer):
             self.close()
             raise
 
-    # The Observer's interface: called from the stepping thread
-
-    def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
-        """Take copies of the scene and the mesh; they are logged once a run."""
-        copies = [None if a is None else np.array(a) for a in (vertices, triangles)]
-        self._mark(-1, "started", scene, *copies, mesh_sha256)
-        if self._flusher is not None:
-            self._flusher.mailbox.hurry()
-
-    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
-        """Note the body from ``time_ns`` on."""
-        self._mark(time_ns, "body_changed", body)
-
-    def mesh_changed(
-        self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str
-    ) -> None:
-        """Take copies of another mesh; it is logged once too."""
-        copies = [None if a is None else np.array(a) for a in (vertices, triangles)]
-        self._mark(time_ns, "mesh_changed", *copies, mesh_sha256)
-
-    def state(self, time_ns: int, row: np.ndarray) -> None:
-        """Copy one state row (13,)."""
-        if self._flusher is not None:
-            self._flusher.mailbox.put(time_ns, row)
-
-    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
-        """Note a load that begins to act."""
-        self._mark(time_ns, "load_began", load_id, load)
-
-    def load_ended(self, time_ns: int, load_id: int) -> None:
-        """Note a load that acts no longer."""
-        self._mark(time_ns, "load_ended", load_id)
-
-    def scene_changed(self, time_ns: int, scene: str) -> None:
-        """Note the parameters in force from ``time_ns`` on; the next run starts from them."""
-        self._mark(time_ns, "scene_changed", scene)
-
-    def string_changed(self, time_ns: int, string: ShownString | None) -> None:
-        """Note how the string is tied from ``time_ns`` on."""
-        self._mark(time_ns, "string_changed", string)
-
-    def event(self, time_ns: int, line: str) -> None:
-        """Note a line of the event log."""
-        self._mark(time_ns, "event", line)
-
-    def refused(self, time_ns: int, reason: str, message: str) -> None:
-        """Note a refusal."""
-        self._mark(time_ns, "refused", reason, message)
-
-    def status(self, time_ns: int, track: str, value: str) -> None:
-        """Note that a track of the state timeline changes."""
-        self._mark(time_ns, "status", track, value)
-
-    def effort(self, time_ns: int, steps: int, force_evaluations: int) -> None:
-        """Note what the motion has cost."""
-        self._mark(time_ns, "effort", steps, force_evaluations)
-
-    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
-        """Note the ghost from ``time_ns`` on."""
-        self._mark(time_ns, "ghost_began", ghost)
-
-    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:
-        """Copy one state row (13,) of the ghost."""
-        if self._flusher is not None:
-            self._flusher.ghosts.put(time_ns, row)
-
-    def reset(self) -> None:
-        """Begin a new run."""
-        if self._flusher is not None:
-            self._flusher.ghosts.mark(-1, "reset")
-            self._flusher.mailbox.mark(-1, "reset")
-            self._flusher.mailbox.hurry()
+    def on(self, event: Event) -> None:
+        """Take an event from the stepping thread; states and meshes are copied."""
+        flusher = self._flusher
+        if flusher is None:
+            if isinstance(event, _REMEMBERED):
+                # What came last comes last.
+                self._remembered.pop(type(event), None)
+                self._remembered[type(event)] = _with_copies(event)
+        elif isinstance(event, Published):
+            flusher.mailbox.put(event.time_ns, event.row)
+        elif isinstance(event, GhostPublished):
+            flusher.ghosts.put(event.time_ns, event.row)
+        elif type(event) in self.takes:
+            if isinstance(event, Reset):
+                flusher.ghosts.note(event)
+            flusher.mailbox.note(_with_copies(event))
+            if isinstance(event, (Started, Reset)):
+                flusher.mailbox.hurry()
 
     def close(self) -> None:
         """Send what is buffered, finish the file, end the viewers that were started here."""
@@ -203,21 +174,14 @@ class RerunObserver(Observer):
 
     # Inside
 
-    def _mark(self, time_ns: int, kind: str, *content: Any) -> None:
-        if self._flusher is not None:
-            self._flusher.mailbox.mark(time_ns, kind, *content)
-        elif kind in _REMEMBERED:
-            self._remembered = [kept for kept in self._remembered if kept[1] != kind]
-            self._remembered.append((time_ns, kind, *content))
-
     def _begin(self) -> Flusher:
         """The flusher, started once there is something to flush to."""
         if self._flusher is None:
             from .flusher import Flusher
 
             self._flusher = Flusher(self._name, self._initial_view, self._on_error, self._open_ended)
-            for remembered in self._remembered:
-                self._flusher.mailbox.mark(*remembered)
+            for event in self._remembered.values():
+                self._flusher.mailbox.note(event)
             self._remembered.clear()
         return self._flusher
 
@@ -249,3 +213,11 @@ class RerunObserver(Observer):
         except OSError as error:
             self.web_address = ""
             self._report(f"no viewer: {error}")
+
+
+def _with_copies(event: Event) -> Event:
+    """The event; one that brings a mesh, with copies of its arrays."""
+    if not isinstance(event, (Started, MeshChanged)):
+        return event
+    vertices, triangles = (None if a is None else np.array(a) for a in (event.vertices, event.triangles))
+    return event._replace(vertices=vertices, triangles=triangles)

@@ -14,7 +14,7 @@ from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
 from ..session.playback import play, play_beside
 from ..session.recorded_session import RecordedSession
-from ..simulation.observer import Observer
+from ..simulation.observer import Observer, Reset
 
 
 def is_mcap(path: str) -> bool:
@@ -135,7 +135,7 @@ def record(
     try:
         for number, session in enumerate(runs):
             if number:
-                recorder.reset()
+                recorder.on(Reset())
             play(session, recorder, given, _after(before, total, progress))
             before += len(session.times)
     finally:

@@ -13,8 +13,22 @@ import rerun as rr
 from ..picture import style
 from ..picture.picture import Picture, skewed
 from ..picture.plot_range import plot_range, with_two_ticks
-from ..simulation.mailbox import Block, Mark
-from ..simulation.observer import BodySnapshot
+from ..simulation.mailbox import Block, Note
+from ..simulation.observer import (
+    BodyChanged,
+    BodySnapshot,
+    Effort,
+    GhostChanged,
+    LoadBegan,
+    LoadEnded,
+    Logged,
+    MeshChanged,
+    Refused,
+    SceneChanged,
+    Started,
+    StatusChanged,
+    StringChanged,
+)
 from . import entities as e
 from .backend import RerunBackend, scalar_columns
 from .layout import Finished, Subject
@@ -52,22 +66,6 @@ class SceneWriter:
         self._mesh: tuple[np.ndarray | None, np.ndarray | None, str] = None, None, ""
         self._view_size = 0.0
         self._rows_since_repeat = 0
-        self._along_with_rows: dict[str, Callable[[Mark], None]] = {
-            "load_began": self._load_began,
-            "load_ended": self._load_ended,
-            "string_changed": lambda mark: self._picture.set_string(mark.time_ns, *mark.content),
-            "scene_changed": self._scene_changed,
-            "status": lambda mark: self._track_changed(mark, *mark.content),
-            "effort": self._effort,
-            "event": lambda mark: self._text_log.event(mark.time_ns, mark.wall_ns, *mark.content),
-            "refused": lambda mark: self._text_log.refusal(mark.time_ns, mark.wall_ns, *mark.content),
-        }
-        self._between_rows: dict[str, Callable[[Mark], None]] = {
-            "started": self._started,
-            "mesh_changed": self._mesh_changed,
-            "body_changed": self._body_changed,
-            "ghost_began": self._ghost_began,
-        }
         self.restart()
 
     # What holds for a whole run
@@ -81,7 +79,7 @@ class SceneWriter:
         self._backend.plotted = {}
         self._text_log = TextLog()
         self._state_timeline = StateTimeline()
-        self._effort_before: tuple[int, int, int] | None = None
+        self._effort_before: Effort | None = None
         self._efforts: list[tuple[int, int, float, float]] = []
 
     def attach(self, stream: Stream) -> None:
@@ -116,24 +114,24 @@ class SceneWriter:
 
     # What happens in it
 
-    def write(self, block: Block, on_mark: Callable[[Mark], None], skip_live: bool = False) -> None:
-        """Send a block; marks that aren't about the scene (a reset, a stream that comes or goes) go to ``on_mark``.
+    def write(self, block: Block, on_note: Callable[[Note], None], skip_live: bool = False) -> None:
+        """Send a block; notes that aren't about the scene (a reset, a stream that comes or goes) go to ``on_note``.
 
         With ``skip_live`` the states go to files alone: viewers miss some where the machine doesn't keep up.
         """
         self._skip_live = skip_live
         sent = 0
-        for mark in block.marks:
-            self._note_time(mark.time_ns)
-            handler = self._along_with_rows.get(mark.kind)
-            if handler is not None:
-                handler(mark)
+        for note in block.notes:
+            time_ns = getattr(note.event, "time_ns", 0)
+            self._note_time(time_ns)
+            if self._show_along_with_rows(note):
                 continue
-            self._write_upto(block, sent, mark.after_rows)
-            sent = mark.after_rows
+            self._write_upto(block, sent, note.after_rows)
+            sent = note.after_rows
             self._backend.streams = self._listening()
-            self._at(mark.time_ns, mark.wall_ns)
-            self._between_rows.get(mark.kind, on_mark)(mark)
+            self._at(time_ns, note.wall_ns)
+            if not self._show_between_rows(note):
+                on_note(note)
         self._write_upto(block, sent, block.count)
         self._rows_since_repeat += block.count
         if self._rows_since_repeat >= REPEATED_ROWS:
@@ -194,48 +192,69 @@ class SceneWriter:
         for stream in self._listening():
             stream.send(entity, times, columns)
 
-    # Marks that don't concern the rows before them
+    def _show_along_with_rows(self, note: Note) -> bool:
+        """What doesn't concern the rows before it; whether this is such an event."""
+        wall_ns = note.wall_ns
+        match note.event:
+            case LoadBegan(time_ns, load_id, load):
+                self._picture.load_began(time_ns, load_id, load)
+                self._loads_changed(time_ns, wall_ns)
+            case LoadEnded(time_ns, load_id):
+                self._picture.load_ended(time_ns, load_id)
+                self._loads_changed(time_ns, wall_ns)
+            case StringChanged(time_ns, string):
+                self._picture.set_string(time_ns, string)
+            case SceneChanged(time_ns, scene):
+                self._change_scene(time_ns, wall_ns, scene)
+            case StatusChanged(time_ns, track, value):
+                self._state_timeline.change(time_ns, wall_ns, track, value)
+            case Effort():
+                self._add_effort(note.event, wall_ns)
+            case Logged(time_ns, line):
+                self._text_log.event(time_ns, wall_ns, line)
+            case Refused(time_ns, reason, message):
+                self._text_log.refusal(time_ns, wall_ns, reason, message)
+            case _:
+                return False
+        return True
 
-    def _load_began(self, mark: Mark) -> None:
-        self._picture.load_began(mark.time_ns, *mark.content)
-        self._track_changed(mark, "loads", " + ".join(self._picture.loads.kinds) or "none")
+    def _loads_changed(self, time_ns: int, wall_ns: int) -> None:
+        self._state_timeline.change(time_ns, wall_ns, "loads", " + ".join(self._picture.loads.kinds) or "none")
 
-    def _load_ended(self, mark: Mark) -> None:
-        self._picture.load_ended(mark.time_ns, *mark.content)
-        self._track_changed(mark, "loads", " + ".join(self._picture.loads.kinds) or "none")
-
-    def _scene_changed(self, mark: Mark) -> None:
-        (self._scene_in_force,) = mark.content
-        if self._scene_in_force != self._scene:
+    def _change_scene(self, time_ns: int, wall_ns: int, scene: str) -> None:
+        self._scene_in_force = scene
+        if scene != self._scene:
             self._backend.streams = self._listening()
-            self._at(mark.time_ns, mark.wall_ns)
-            document = rr.TextDocument.columns(text=[self._scene_in_force], media_type=["text/plain"])
+            self._at(time_ns, wall_ns)
+            document = rr.TextDocument.columns(text=[scene], media_type=["text/plain"])
             self._backend.send(e.SCENE_IN_FORCE, document)
 
-    def _effort(self, mark: Mark) -> None:
+    def _add_effort(self, effort: Effort, wall_ns: int) -> None:
         """What the motion has cost up to now; plotted as rates since it was told before."""
-        steps, evaluations = mark.content
-        if self._effort_before is not None and mark.time_ns > self._effort_before[0]:
-            before_ns, steps_before, evaluations_before = self._effort_before
-            seconds = 1e-9 * (mark.time_ns - before_ns)
-            rates = (steps - steps_before) / seconds, (evaluations - evaluations_before) / seconds
-            self._efforts.append((mark.time_ns, mark.wall_ns, *rates))
-        self._effort_before = (mark.time_ns, steps, evaluations)
+        before, self._effort_before = self._effort_before, effort
+        if before is not None and effort.time_ns > before.time_ns:
+            seconds = 1e-9 * (effort.time_ns - before.time_ns)
+            steps, evaluations = effort.steps - before.steps, effort.force_evaluations - before.force_evaluations
+            self._efforts.append((effort.time_ns, wall_ns, steps / seconds, evaluations / seconds))
 
-    def _track_changed(self, mark: Mark, track: str, value: str) -> None:
-        self._state_timeline.change(mark.time_ns, mark.wall_ns, track, value)
-
-    # Marks that change what rows mean
-
-    def _started(self, mark: Mark) -> None:
-        self._scene, *mesh = mark.content
-        self._mesh = (*mesh,)
-        self._picture.set_mesh(mark.time_ns, *self._mesh[:2])
-        self._send_scene(self._listening())
-
-    def _mesh_changed(self, mark: Mark) -> None:
-        self._mesh = mark.content
-        self._picture.set_mesh(mark.time_ns, *self._mesh[:2])
+    def _show_between_rows(self, note: Note) -> bool:
+        """What changes the meaning of rows; whether this is such an event."""
+        match note.event:
+            case Started(scene, vertices, triangles, mesh_sha256):
+                self._scene = scene
+                self._mesh = vertices, triangles, mesh_sha256
+                self._picture.set_mesh(0, vertices, triangles)
+                self._send_scene(self._listening())
+            case MeshChanged(time_ns, vertices, triangles, mesh_sha256):
+                self._mesh = vertices, triangles, mesh_sha256
+                self._picture.set_mesh(time_ns, vertices, triangles)
+            case BodyChanged(time_ns, body):
+                self._change_body(time_ns, note.wall_ns, body)
+            case GhostChanged(time_ns, body):
+                self._change_ghost(time_ns, body)
+            case _:
+                return False
+        return True
 
     def _send_scene(self, streams: list[Stream]) -> None:
         """What holds for a run: the scene as text, the mesh's exact numbers."""
@@ -257,20 +276,23 @@ class SceneWriter:
             )
             stream.log_static(e.SESSION_MESH, numbers)
 
-    def _body_changed(self, mark: Mark) -> None:
+    def _change_body(self, time_ns: int, wall_ns: int, body: BodySnapshot) -> None:
         first = self._picture.body is None
-        (body,) = mark.content
-        self._picture.set_body(mark.time_ns, body)
+        self._picture.set_body(time_ns, body)
         self._fit_view()
         self._backend.send(e.SESSION_BODY, _numbers(body))
+        tracks = {
+            "inertia_model": body.inertia_model,
+            "integrator": body.integrator + ("" if body.gyroscopic else ", not gyroscopic"),
+        }
         if first:
-            self._track_changed(mark, "loads", "none")
-        self._track_changed(mark, "inertia_model", body.inertia_model)
-        self._track_changed(mark, "integrator", body.integrator + ("" if body.gyroscopic else ", not gyroscopic"))
+            tracks["loads"] = "none"
+        for track, value in tracks.items():
+            self._state_timeline.change(time_ns, wall_ns, track, value)
 
-    def _ghost_began(self, mark: Mark) -> None:
+    def _change_ghost(self, time_ns: int, body: BodySnapshot) -> None:
         first = self._picture.ghost is None
-        self._picture.set_ghost(mark.time_ns, *mark.content)
+        self._picture.set_ghost(time_ns, body)
         if first:
             self._view_size = 0.0
             self._fit_view()

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable, Mapping
 
-import numpy as np
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -18,10 +17,7 @@ from ..base.rotation import Vector
 from ..live.pacing import Stamps
 from ..messages import cdr
 from ..messages.session_messages import applied_bytes
-from ..motion.body import Body
-from ..motion.loads import Load
-from ..simulation.commands import WrenchCommand
-from ..simulation.observer import BodySnapshot, Observer
+from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
 from .frames_on_body import FramesOnBody
 from .robot_description import RobotDescription
@@ -31,7 +27,9 @@ WARNING_S = 1.0
 
 
 class EventPublisher(Observer):
-    """An observer that publishes; its methods run on the physics thread, and are rare. stamps: set before the first."""
+    """An observer that publishes on the physics thread what happens, which is rare. stamps: set before the first."""
+
+    takes = frozenset({SceneChanged, BodyChanged, Applied, Refused, Logged})
 
     def __init__(
         self,
@@ -57,12 +55,29 @@ class EventPublisher(Observer):
         self._events = publisher(String, "events", qos.EVENT)
         self._warned: dict[str, float] = {}
 
-    def scene_changed(self, time_ns: int, scene: str) -> None:  # noqa: ARG002 (an observer gets it)
-        """All parameters, and the mesh's hash in a comment, as a parameter file."""
-        self._scene.publish(cdr.string(scene))
+    def wants(self, kind: type) -> bool:
+        """Lines of the event log only while somebody listens to their topic."""
+        return self._events.get_subscription_count() > 0 if kind is Logged else kind in self.takes
 
-    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
-        """The latched inertia: COM in scaled mesh coordinates, tensor about it in mesh axes."""
+    def on(self, event: Event) -> None:
+        """Publish it, or warn of it."""
+        match event:
+            case Logged(_, line):
+                if self.wants(Logged):
+                    self._events.publish(cdr.string(line))
+            case SceneChanged(_, scene):
+                # All parameters, and the mesh's hash in a comment, as a parameter file.
+                self._scene.publish(cdr.string(scene))
+            case BodyChanged():
+                self._publish_inertia(event)
+            case Applied():
+                self._publish_applied(event)
+            case Refused(_, reason, message):
+                self._warn(reason, message)
+
+    def _publish_inertia(self, event: BodyChanged) -> None:
+        """Latched: COM in scaled mesh coordinates, tensor about it in mesh axes."""
+        time_ns, body = event
         message = InertiaStamped()
         message.header.stamp.sec, message.header.stamp.nanosec = self.stamps.of(time_ns)
         message.header.frame_id = self._mesh_frame
@@ -75,17 +90,16 @@ class EventPublisher(Observer):
         self._description.body_changed(body)
         self._frames_on_body.publish(self.stamps.of(time_ns), body)
 
-    def applied(self, time_ns: int, _command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
+    def _publish_applied(self, event: Applied) -> None:
         """A wrench or poke as it took effect: about the COM in the body's frame, which TF knows. What its sender said
         of point, axes, slot and duration stands in its event.
         """
         if self._applied.get_subscription_count():
-            self._applied.publish(
-                applied_bytes(time_ns + self.stamps.offset_ns, self._body_frame, load, body, attitude)
-            )
+            stamp_ns = event.time_ns + self.stamps.offset_ns
+            self._applied.publish(applied_bytes(stamp_ns, self._body_frame, event.load, event.body, event.attitude))
 
-    def refused(self, time_ns: int, reason: str, message: str) -> None:  # noqa: ARG002 (an observer gets it)
-        """A warning, for what is refused when it comes and for what turns out impossible when it is to act.
+    def _warn(self, reason: str, message: str) -> None:
+        """For what is refused when it comes and for what turns out impossible when it is to act.
 
         At most one a second for each reason: a flood of one kind doesn't hide what else goes wrong.
         """
@@ -93,12 +107,3 @@ class EventPublisher(Observer):
         if now >= self._warned.get(reason, -math.inf) + WARNING_S:
             self._warned[reason] = now
             self._logger.warning(f"refused: {message}")
-
-    def event(self, time_ns: int, line: str) -> None:  # noqa: ARG002 (an observer gets it)
-        """A line of the event log."""
-        if self.wants_events():
-            self._events.publish(cdr.string(line))
-
-    def wants_events(self) -> bool:
-        """Somebody listens to the topic."""
-        return self._events.get_subscription_count() > 0

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from ..base.errors import InputError
 from ..simulation.commands import Change, Command, Listed
-from ..simulation.observer import Observer
+from ..simulation.observer import Event, GhostChanged, GhostPublished, Observer, Refused
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .scenario import Scenario
@@ -26,9 +26,12 @@ class Refusals(Observer):
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
         self._on_refusal = on_refusal
 
-    def refused(self, _time_ns: int, _reason: str, message: str) -> None:
+    takes = frozenset({Refused})
+
+    def on(self, event: Event) -> None:
         """A command was refused."""
-        self._on_refusal(message)
+        if isinstance(event, Refused):
+            self._on_refusal(event.message)
 
 
 class GhostRefusals(Observer):
@@ -37,10 +40,12 @@ class GhostRefusals(Observer):
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
 
-    def refused(self, time_ns: int, reason: str, message: str) -> None:
+    takes = frozenset({Refused})
+
+    def on(self, event: Event) -> None:
         """A command was refused, by the ghost alone where the reason says so."""
-        if reason == GHOST:
-            self._say(f"at {time_ns / 1e9:.9g} s {message}")
+        if isinstance(event, Refused) and event.reason == GHOST:
+            self._say(f"at {event.time_ns / 1e9:.9g} s {event.message}")
 
 
 class Ghost:
@@ -56,7 +61,7 @@ class Ghost:
 
     def announce(self) -> None:
         """Tell the observer what the ghost is."""
-        self._observer.ghost_began(self.simulation.time_ns, self.simulation.snapshot())
+        self._observer.on(GhostChanged(self.simulation.time_ns, self.simulation.snapshot()))
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -79,7 +84,8 @@ class Ghost:
     def _goes_without(self, reason: str) -> None:
         if self._shown and not self._refused:
             self._refused = True
-            self._observer.refused(self.simulation.time_ns, GHOST, f"the ghost continues without a command: {reason}")
+            text = f"the ghost continues without a command: {reason}"
+            self._observer.on(Refused(self.simulation.time_ns, GHOST, text))
 
     def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
         """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one
@@ -89,7 +95,7 @@ class Ghost:
         self._shown = setup is not None
         if setup is not None:
             self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
-            self._observer.ghost_began(time_ns, self.simulation.snapshot(setup))
+            self._observer.on(GhostChanged(time_ns, self.simulation.snapshot(setup)))
 
     def reset(self, scenario: Scenario) -> None:
         """Time 0 and the initial state."""
@@ -101,7 +107,7 @@ class Ghost:
         """Advance the ghost and tell the observer where it is."""
         state = self.simulation.advance(until_ns)
         if self._shown and not self.simulation.failure:
-            self._observer.ghost_state(until_ns, state.row)
+            self._observer.on(GhostPublished(until_ns, state.row))
 
 
 def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | None) -> Ghost | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..base.errors import CommandRefused, InputError
 from ..base.progress import Progress
 from ..simulation.checks import check_command
-from ..simulation.observer import Observer
+from ..simulation.observer import Observer, Published, Started
 from .command_codec import ScriptCommand, core_command
 from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
@@ -65,9 +65,9 @@ def notify_start(observer: Observer, scenario: Scenario) -> None:
     """Tell an observer what flies."""
     mesh = scenario.body_mesh
     if mesh is None:
-        observer.started(scenario.text, None, None, "")
+        observer.on(Started(scenario.text, None, None, ""))
     else:
-        observer.started(scenario.text, mesh.surface.vertices, mesh.surface.triangles, mesh.mesh.sha256)
+        observer.on(Started(scenario.text, mesh.surface.vertices, mesh.surface.triangles, mesh.mesh.sha256))
 
 
 class OfflineRun(ScenarioRun):
@@ -106,7 +106,7 @@ class OfflineRun(ScenarioRun):
                 state = self.simulation.advance(next_ns)
                 if self.simulation.failure:
                     return False
-                self.observer.state(next_ns, state.row)
+                self.observer.on(Published(next_ns, state.row))
                 self.simulation.notify_status()
                 if self.ghost is not None:
                     self.ghost.advance(next_ns)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..mesh.reading import Mesh
-from ..simulation.observer import Observer
+from ..simulation.observer import Observer, SceneChanged
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .ghost import Ghost, ghost_of
@@ -52,4 +52,4 @@ class ScenarioRun:
 
     def notify_scene(self) -> None:
         """Tell the observer the parameters in force."""
-        self.observer.scene_changed(self.simulation.time_ns, self.scenario.text)
+        self.observer.on(SceneChanged(self.simulation.time_ns, self.scenario.text))

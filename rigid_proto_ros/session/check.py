@@ -14,7 +14,7 @@ from ..base.errors import CommandRefused, InputError
 from ..base.provenance import cpu, versions
 from ..messages.session_messages import FIELDS, PROJECTIONS
 from ..simulation.event_log import EventLog
-from ..simulation.observer import Observer
+from ..simulation.observer import Event, Logged, Observer
 from .recorded_session import RecordedSession
 from .replay import Resimulation, as_published, mesh_finder, resimulation, session_scenario
 from .runs import decode_event
@@ -41,11 +41,14 @@ class Difference:
 
 
 class _Lines(Observer):
+    takes = frozenset({Logged})
+
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def event(self, _time_ns: int, line: str) -> None:
-        self.lines.append(line)
+    def on(self, event: Event) -> None:
+        if isinstance(event, Logged):
+            self.lines.append(event.line)
 
 
 def verify(session: RecordedSession, progress: Callable[[float], None] = lambda _: None) -> Difference | None:

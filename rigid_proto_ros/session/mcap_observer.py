@@ -21,14 +21,11 @@ from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from ..mesh.locate import resolve_mesh
 from ..messages import cdr, session_messages
-from ..motion.body import Body
-from ..motion.loads import Load
 from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
-from ..simulation.commands import WrenchCommand
-from ..simulation.mailbox import Block, Mailbox, Mark
-from ..simulation.observer import BodySnapshot, Observer
+from ..simulation.mailbox import Block, Mailbox, Note
+from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Published, Reset, SceneChanged, Started
 from .recorded_session import file_sha256, scene_sha256
 from .runs import MADE_WITH
 
@@ -54,6 +51,8 @@ class McapObserver(Observer):
     behind the one before. on_error gets one line when recording has stopped because the file can't be written, from
     another thread; ``error`` keeps it. Raises InputError where the file can't be opened.
     """
+
+    takes = frozenset({Published, Logged, Applied, BodyChanged, SceneChanged, Started, Reset})
 
     def __init__(
         self,
@@ -104,47 +103,14 @@ class McapObserver(Observer):
         file = self._file
         return str(file.path) if file is not None and not self._closed else ""
 
-    # The Observer's interface: called from the stepping thread
-
-    def started(
-        self, scene: str, _vertices: np.ndarray | None, _triangles: np.ndarray | None, _mesh_sha256: str
-    ) -> None:
-        """Write the scene, and the mesh's file once."""
-        self._mailbox.mark(0, "scene", scene)
-        self._mailbox.hurry()
-
-    def scene_changed(self, time_ns: int, scene: str) -> None:
-        """Write the scene unless it is the one written last."""
-        self._mailbox.mark(time_ns, "scene", scene)
-
-    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
-        """Write the inertia."""
-        I = body.inertia
-        tensor = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
-        frame = f"{self._body_frame}/mesh"
-        self._message(
-            time_ns,
-            "inertia",
-            session_messages.inertia_bytes(time_ns, frame, body.mass, body.center_of_mass.tolist(), tensor),
-        )
-
-    def state(self, time_ns: int, row: np.ndarray) -> None:
-        """Copy one state row (13,)."""
-        self._mailbox.put(time_ns, row)
-
-    def applied(self, time_ns: int, _command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
-        """Write a wrench or poke as it took effect, as the node publishes it."""
-        data = session_messages.applied_bytes(time_ns, self._body_frame, load, body, attitude)
-        self._message(time_ns, "applied", data)
-
-    def event(self, time_ns: int, line: str) -> None:
-        """Write a line of the event log."""
-        self._message(time_ns, "events", cdr.string(line))
-
-    def reset(self) -> None:
-        """The next run begins; its first event says so."""
-        self._mailbox.mark(0, "reset")
-        self._mailbox.hurry()
+    def on(self, event: Event) -> None:
+        """Take an event from the stepping thread: a state is copied, others wait to be written."""
+        if isinstance(event, Published):
+            self._mailbox.put(event.time_ns, event.row)
+        elif type(event) in self.takes:
+            self._mailbox.note(event)
+            if isinstance(event, (Started, Reset)):
+                self._mailbox.hurry()
 
     def close(self) -> None:
         """Write what is buffered and finish the file."""
@@ -157,9 +123,6 @@ class McapObserver(Observer):
             self._stopped("the last states could not be written")
 
     # The writing thread
-
-    def _message(self, time_ns: int, name: str, data: bytes) -> None:
-        self._mailbox.mark(time_ns, "message", name, data)
 
     def _write_until_closed(self) -> None:
         mailbox = self._mailbox
@@ -193,10 +156,10 @@ class McapObserver(Observer):
 
     def _write(self, file: McapFile, block: Block) -> None:
         sent = 0
-        for mark in block.marks:
-            self._write_rows(file, block, sent, mark.after_rows)
-            sent = mark.after_rows
-            self._write_mark(file, mark)
+        for note in block.notes:
+            self._write_rows(file, block, sent, note.after_rows)
+            sent = note.after_rows
+            self._write_note(file, note)
         self._write_rows(file, block, sent, block.count)
 
     def _log_time(self, simulated_ns: int, wall_ns: int) -> int:
@@ -204,16 +167,29 @@ class McapObserver(Observer):
         self._latest_log_ns = max(self._latest_log_ns, log_time)
         return log_time
 
-    def _write_mark(self, file: McapFile, mark: Mark) -> None:
-        if mark.kind == "reset":
+    def _write_note(self, file: McapFile, note: Note) -> None:
+        event = note.event
+        if isinstance(event, Reset):
             self._run_begins_ns = self._latest_log_ns + 1
             return
-        log_time = self._log_time(mark.time_ns, mark.wall_ns)
-        if mark.kind == "message":
-            name, data = mark.content
-            file.add_message(self._channels[name], log_time, data)
-            return
-        (scene,) = mark.content
+        log_time = self._log_time(event.time_ns, note.wall_ns)
+        match event:
+            case Logged(_, line):
+                file.add_message(self._channels["events"], log_time, cdr.string(line))
+            case Applied(time_ns, _, load, body, attitude):
+                data = session_messages.applied_bytes(time_ns, self._body_frame, load, body, attitude)
+                file.add_message(self._channels["applied"], log_time, data)
+            case BodyChanged(time_ns, body):
+                I = body.inertia
+                tensor = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
+                frame, com = f"{self._body_frame}/mesh", body.center_of_mass.tolist()
+                data = session_messages.inertia_bytes(time_ns, frame, body.mass, com, tensor)
+                file.add_message(self._channels["inertia"], log_time, data)
+            case Started(scene=scene) | SceneChanged(scene=scene):
+                self._write_scene(file, log_time, scene)
+
+    def _write_scene(self, file: McapFile, log_time: int, scene: str) -> None:
+        """Unless it is the one written last; with the mesh's file, once."""
         if scene != self._scene:
             self._scene = scene
             self._attach_mesh(file, scene, log_time)

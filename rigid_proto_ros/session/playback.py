@@ -11,8 +11,8 @@ from ..base.errors import InputError
 from ..messages.session_messages import PROJECTIONS
 from ..scene.offline import notify_start
 from ..scene.scenario import Scenario
-from ..simulation.observer import BodySnapshot, Observer
-from ..simulation.simulation import Simulation
+from ..simulation.notifier import snapshot
+from ..simulation.observer import BodyChanged, GhostChanged, GhostPublished, Observer, Published
 from .recorded_session import RecordedSession
 from .replay import resimulation
 
@@ -43,7 +43,7 @@ def play(
         except InputError:
             # A command that is refused here: from now on only the recorded states are shown.
             computed = row
-        observer.state(time_ns, computed if _published_alike(session, computed, row) else row)
+        observer.on(Published(time_ns, computed if _published_alike(session, computed, row) else row))
         again.simulation.notify_status()
         if again.ghost is not None:
             again.ghost.advance(time_ns)
@@ -70,9 +70,9 @@ def play_beside(
             break  # a command that is refused here
         if again.simulation.setup is not shown:
             shown = again.simulation.setup
-            observer.ghost_began(time_ns, again.simulation.snapshot())
-        observer.state(time_ns, row)
-        observer.ghost_state(time_ns, computed)
+            observer.on(GhostChanged(time_ns, again.simulation.snapshot()))
+        observer.on(Published(time_ns, row))
+        observer.on(GhostPublished(time_ns, computed))
 
 
 def sorted_states(session: RecordedSession) -> Iterator[tuple[int, np.ndarray]]:
@@ -95,17 +95,6 @@ def _play_states(session: RecordedSession, observer: Observer, given: Scenario |
     if given is None:
         raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
     notify_start(observer, given)
-    observer.body_changed(0, _snapshot(given))
+    observer.on(BodyChanged(0, snapshot(given.setup)))
     for time_ns, row in sorted_states(session):
-        observer.state(time_ns, row)
-
-
-def _snapshot(scenario: Scenario) -> BodySnapshot:
-    told: list[BodySnapshot] = []
-
-    class _BodyMessages(Observer):
-        def body_changed(self, _time_ns: int, body: BodySnapshot) -> None:
-            told.append(body)
-
-    Simulation(scenario.setup, _BodyMessages()).announce()
-    return told[0]
+        observer.on(Published(time_ns, row))

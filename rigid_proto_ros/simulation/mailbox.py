@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the stepping thread leaves states and marks, and the flushing thread fetches them in order."""
+"""Where the stepping thread leaves states and other events, and the flushing thread fetches them in order."""
 
 from __future__ import annotations
 
@@ -24,14 +24,12 @@ PATIENCE_S = 10.0
 
 
 @dataclass
-class Mark:
-    """Something that happened after the block's first ``after_rows`` rows."""
+class Note:
+    """Something that happened after the block's first ``after_rows`` rows: an Event, or what the consumer is asked."""
 
     after_rows: int
-    time_ns: int
     wall_ns: int
-    kind: str
-    content: tuple[Any, ...]
+    event: Any
 
 
 @dataclass
@@ -46,7 +44,7 @@ class Block:
     times: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.int64))
     walls: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.int64))
     rows: np.ndarray = field(default_factory=lambda: np.empty((BLOCK_ROWS, 13)))
-    marks: list[Mark] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
 
 
 class Mailbox:
@@ -82,10 +80,10 @@ class Mailbox:
             if self._hurried or i + 1 == BLOCK_ROWS:
                 self._hand_over()
 
-    def mark(self, time_ns: int, kind: str, *content: Any) -> None:
-        """Note what happened after the rows put so far; ``time_ns`` −1 means no time of its own."""
+    def note(self, event: Any) -> None:
+        """Note what happened after the rows put so far."""
         with self._changed:
-            self._filling.marks.append(Mark(self._filling.count, time_ns, _wall_ns(), kind, content))
+            self._filling.notes.append(Note(self._filling.count, _wall_ns(), event))
 
     def hurry(self) -> None:
         """Hand the next row over at once, with all that comes before it: how a run begins should be on
@@ -115,7 +113,7 @@ class Mailbox:
             if self._waiting:
                 block = self._waiting.popleft()
                 self._changed.notify_all()
-            elif not self._given_up and (self._filling.count or self._filling.marks):
+            elif not self._given_up and (self._filling.count or self._filling.notes):
                 block = self._filling
                 self._filling = self._spare.pop() if self._spare else Block()
             else:
@@ -126,7 +124,7 @@ class Mailbox:
         """Return a block whose rows were sent."""
         block.count = 0
         block.handed_over = False
-        block.marks.clear()
+        block.notes.clear()
         with self._changed:
             if len(self._spare) < 2:
                 self._spare.append(block)

@@ -7,7 +7,20 @@ import numpy as np
 
 from ..motion.loads import Load
 from ..motion.string import Tied
-from .observer import BodySnapshot, Observer, ShownLoad, ShownString, ignores_events, methods_used_by
+from .observer import (
+    Applied,
+    BodyChanged,
+    BodySnapshot,
+    Effort,
+    LoadBegan,
+    LoadEnded,
+    Logged,
+    Observer,
+    ShownLoad,
+    ShownString,
+    StatusChanged,
+    StringChanged,
+)
 from .readings import Readings
 from .setup import Setup
 
@@ -26,12 +39,12 @@ class EventNotifier:
         """Tell this observer from now on, and no other."""
         self.observer = observer
         self._told: dict[str, str] = {}
-        used = methods_used_by(observer)
-        self.shows_loads = "load_began" in used
-        self.wants_loads = not used.isdisjoint(("applied", "load_began", "load_ended"))
-        self.ignores_commands = not self.wants_loads and ignores_events(observer)
-        self._shows_status = "status" in used
-        self._shows_string = "string_changed" in used
+        takes = observer.takes
+        self.shows_loads = LoadBegan in takes
+        self.wants_loads = not takes.isdisjoint((Applied, LoadBegan, LoadEnded))
+        self.ignores_commands = not self.wants_loads and Logged not in takes
+        self._shows_status = StatusChanged in takes
+        self._shows_string = StringChanged in takes
 
     def start_over(self) -> None:
         """Simulated time starts again at 0: nothing has been told of it."""
@@ -53,7 +66,7 @@ class EventNotifier:
 
     def body(self, readings: Readings) -> None:
         """The body as it is now."""
-        self.observer.body_changed(readings.time_ns, snapshot(readings.setup))
+        self.observer.on(BodyChanged(readings.time_ns, snapshot(readings.setup)))
 
     def status(self, readings: Readings, paused: bool) -> None:
         """What the body is doing, where that changed since it was last told."""
@@ -70,16 +83,16 @@ class EventNotifier:
         for track, value in tracks.items():
             if self._told.get(track) != value:
                 self._told[track] = value
-                self.observer.status(readings.time_ns, track, value)
+                self.observer.on(StatusChanged(readings.time_ns, track, value))
         if readings.time_ns >= self._next_effort_ns:
             self._next_effort_ns = readings.time_ns + EFFORT_PERIOD_NS
-            self.observer.effort(readings.time_ns, readings.steps, readings.force_evaluations)
+            self.observer.on(Effort(readings.time_ns, readings.steps, readings.force_evaluations))
 
     def load_began(self, readings: Readings, load_id: int, kind: str, load: Load) -> None:
         """A load begins to act; ``kind`` is wrench, poke, impulse or thruster."""
         if self.shows_loads:
             shown = _shown_load(kind, load, readings.setup)
-            self.observer.load_began(readings.time_ns, load_id, shown)
+            self.observer.on(LoadBegan(readings.time_ns, load_id, shown))
 
     def string(self, readings: Readings) -> None:
         """The string, where it changed since it was last told."""
@@ -89,7 +102,8 @@ class EventNotifier:
         self._told_string = tied
         if not self._shows_string:
             return
-        self.observer.string_changed(readings.time_ns, None if tied is None else _shown_string(tied, readings.setup))
+        shown = None if tied is None else _shown_string(tied, readings.setup)
+        self.observer.on(StringChanged(readings.time_ns, shown))
 
 
 def snapshot(setup: Setup) -> BodySnapshot:

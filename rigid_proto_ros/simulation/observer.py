@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""What a running simulation tells to whoever watches it: a viewer, a recorder, a test.
+"""What a running simulation tells to whoever watches it: a viewer, a recorder, a topic, a test.
 
-The producer calls these methods from the thread that steps the body; an implementation buffers and returns at once.
-``Observer`` itself is the null object: a run that nobody watches calls nothing else.
+Events come from the thread that steps the body; an observer buffers them and returns at once. ``Observer`` itself is
+the null object.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -86,116 +84,185 @@ class ShownString:
         return self.origin + done[:, np.newaxis] * (np.asarray(self.target, dtype=float) - self.origin)
 
 
+class Started(NamedTuple):
+    """A run begins: the scene as parameter-file text; vertices (n, 3) [mesh coordinates], triangles (m, 3)."""
+
+    scene: str
+    vertices: np.ndarray | None
+    triangles: np.ndarray | None
+    mesh_sha256: str
+    time_ns: int = 0
+
+
+class Reset(NamedTuple):
+    """Simulated time starts again at 0."""
+
+    time_ns: int = 0
+
+
+class Published(NamedTuple):
+    """A state at the time of a publication; ``row`` (13,) float64 in STATE_FIELDS order is reused: copy it."""
+
+    time_ns: int
+    row: np.ndarray
+
+
+class SceneChanged(NamedTuple):
+    """The parameters in force from ``time_ns`` on, as parameter-file text."""
+
+    time_ns: int
+    scene: str
+
+
+class BodyChanged(NamedTuple):
+    """The body is this one from ``time_ns`` on; comes once at the start and again at every change."""
+
+    time_ns: int
+    body: BodySnapshot
+
+
+class MeshChanged(NamedTuple):
+    """The body is drawn as this mesh from ``time_ns`` on; comes before the BodyChanged of the same change."""
+
+    time_ns: int
+    vertices: np.ndarray | None
+    triangles: np.ndarray | None
+    mesh_sha256: str
+
+
+class LoadBegan(NamedTuple):
+    """A wrench or poke begins to act; an impulse acts at this instant and has no end."""
+
+    time_ns: int
+    load_id: int
+    load: ShownLoad
+
+
+class LoadEnded(NamedTuple):
+    """The load with this id acts no longer."""
+
+    time_ns: int
+    load_id: int
+
+
+class Applied(NamedTuple):
+    """A wrench or poke took effect: the command, the load that it came to, the body it acts on, and how that lay then
+    (4,) xyzw.
+    """
+
+    time_ns: int
+    command: WrenchCommand
+    load: Load
+    body: Body
+    attitude: np.ndarray
+
+
+class StringChanged(NamedTuple):
+    """The string is tied like this from ``time_ns`` on, or not at all; comes again at every target."""
+
+    time_ns: int
+    string: ShownString | None
+
+
+class Logged(NamedTuple):
+    """One JSON line of the event log (command, parameter change, service), as applied."""
+
+    time_ns: int
+    line: str
+
+
+class Refused(NamedTuple):
+    """A command was refused."""
+
+    time_ns: int
+    reason: str
+    message: str
+
+
+class StatusChanged(NamedTuple):
+    """From ``time_ns`` on ``track`` is ``value``, such as motion: flying, sleeping, paused; string: taut, slack."""
+
+    time_ns: int
+    track: str
+    value: str
+
+
+class Effort(NamedTuple):
+    """What the motion has cost since start or reset; comes some times a simulated second."""
+
+    time_ns: int
+    steps: int
+    force_evaluations: int
+
+
+class GhostChanged(NamedTuple):
+    """A second body that gets the same commands is this one from ``time_ns`` on."""
+
+    time_ns: int
+    body: BodySnapshot
+
+
+class GhostPublished(NamedTuple):
+    """One state of the ghost, after the body's own of the same time; ``row`` as in Published."""
+
+    time_ns: int
+    row: np.ndarray
+
+
+Event = (
+    Started
+    | Reset
+    | Published
+    | SceneChanged
+    | BodyChanged
+    | MeshChanged
+    | LoadBegan
+    | LoadEnded
+    | Applied
+    | StringChanged
+    | Logged
+    | Refused
+    | StatusChanged
+    | Effort
+    | GhostChanged
+    | GhostPublished
+)
+
+
 class Observer:
-    """Null object, and the interface: override what is of interest."""
+    """Null object, and the interface. takes: the kinds of events that it does anything with; others it ignores."""
 
-    def started(self, scene: str, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str) -> None:
-        """A run begins: the scene as parameter-file text; vertices (n, 3) [mesh coordinates], triangles (m, 3)."""
+    takes: frozenset[type] = frozenset()
 
-    def scene_changed(self, time_ns: int, scene: str) -> None:
-        """The parameters in force from ``time_ns`` on, as parameter-file text; also right after ``started``."""
+    def wants(self, kind: type) -> bool:
+        """Whether it would do anything with an event of this kind now; without anybody who does, none is made."""
+        return kind in self.takes
 
-    def body_changed(self, time_ns: int, body: BodySnapshot) -> None:
-        """The body is this one from ``time_ns`` on; called once at the start and again at every change."""
-
-    def mesh_changed(
-        self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None, mesh_sha256: str
-    ) -> None:
-        """The body is drawn as this mesh from ``time_ns`` on; before the ``body_changed`` of the same change."""
-
-    def state(self, time_ns: int, row: np.ndarray) -> None:
-        """One published state; ``row`` (13,) float64 in STATE_FIELDS order is reused by the caller: copy it."""
-
-    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
-        """A wrench or poke begins to act; an impulse acts at this instant and has no end."""
-
-    def load_ended(self, time_ns: int, load_id: int) -> None:
-        """The load with this id acts no longer."""
-
-    def applied(self, time_ns: int, command: WrenchCommand, load: Load, body: Body, attitude: np.ndarray) -> None:
-        """A wrench or poke took effect: the WrenchCommand, the Load that it came to, the Body it acts on, and how
-        that lay then (4,) xyzw.
-        """
-
-    def string_changed(self, time_ns: int, string: ShownString | None) -> None:
-        """The string is tied like this from ``time_ns`` on, or not at all; again at every target."""
-
-    def event(self, time_ns: int, line: str) -> None:
-        """One JSON line of the event log (command, parameter change, service), as applied."""
-
-    def wants_events(self) -> bool:
-        """Whether it would do anything with the line of an event now; without anybody who does, none is written."""
-        return listens(self, "event")
-
-    def refused(self, time_ns: int, reason: str, message: str) -> None:
-        """A command was refused."""
-
-    def status(self, time_ns: int, track: str, value: str) -> None:
-        """From ``time_ns`` on ``track`` is ``value``, such as motion: flying, sleeping, paused; string: taut, slack."""
-
-    def effort(self, time_ns: int, steps: int, force_evaluations: int) -> None:
-        """What the motion has cost since start or reset, some times a simulated second."""
-
-    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
-        """A second body that gets the same commands is this one from ``time_ns`` on."""
-
-    def ghost_state(self, time_ns: int, row: np.ndarray) -> None:
-        """One state of the ghost, after the body's own of the same time; ``row`` as for ``state``."""
-
-    def reset(self) -> None:
-        """Simulated time starts again at 0."""
+    def on(self, event: Event) -> None:
+        """An event has happened."""
 
     def close(self) -> None:
-        """No more calls follow; whatever is buffered goes out."""
+        """No more events follow; whatever is buffered goes out."""
 
 
 class Observers(Observer):
-    """Several observers as one; a method that only one of them implements is that one's own."""
+    """Several observers as one."""
 
     def __init__(self, *observers: Observer) -> None:
         self._observers = observers
-        for name in _METHODS:
-            methods = [getattr(observer, name) for observer in observers if listens(observer, name)]
-            if len(methods) == 1:
-                setattr(self, name, methods[0])
-            elif methods:
-                setattr(self, name, _in_turn(methods))
+        self.takes = frozenset().union(*(observer.takes for observer in observers))
+        self._taking = {kind: [o for o in observers if kind in o.takes] for kind in self.takes}
 
-    def wants_events(self) -> bool:
+    def wants(self, kind: type) -> bool:
         """Whether one of them does."""
-        return any(observer.wants_events() for observer in self._observers)
+        return any(observer.wants(kind) for observer in self._taking.get(kind, ()))
 
+    def on(self, event: Event) -> None:
+        """To each that takes such events, in their order."""
+        for observer in self._taking.get(type(event), ()):
+            observer.on(event)
 
-def listens(observer: Observer, method: str) -> bool:
-    """Whether the observer does anything with a method of the interface."""
-    return method in methods_used_by(observer)
-
-
-def methods_used_by(observer: Observer) -> frozenset[str]:
-    """The methods of the interface that the observer does anything with, among other names."""
-    of_its_kind = _methods_of(type(observer))  # type: ignore[arg-type]  # a protocol's class has a hash as every class has
-    own = vars(observer)
-    return of_its_kind.union(own) if own else of_its_kind
-
-
-def ignores_events(observer: Observer) -> bool:
-    """Whether the observer never wants the line of an event."""
-    asked = type(observer).wants_events is not Observer.wants_events
-    return not asked and "event" not in methods_used_by(observer)
-
-
-@functools.cache
-def _methods_of(kind: type[Observer]) -> frozenset[str]:
-    """The methods of the interface that a kind of observer has of its own."""
-    return frozenset(name for name in _METHODS if getattr(kind, name) is not getattr(Observer, name))
-
-
-def _in_turn(methods: Sequence[Callable[..., None]]) -> Callable[..., None]:
-    def call(*arguments: Any) -> None:
-        for method in methods:
-            method(*arguments)
-
-    return call
-
-
-_METHODS = [name for name in vars(Observer) if not name.startswith("_") and name != "wants_events"]
+    def close(self) -> None:
+        """Each closes."""
+        for observer in self._observers:
+            observer.close()

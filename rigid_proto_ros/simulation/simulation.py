@@ -42,7 +42,7 @@ from .event_log import EventLog, OtherEvent
 from .flight_arrays import ActingLoad, FlightArrays
 from .in_flight import GoingLoad, InFlight, initial_row_of
 from .notifier import EventNotifier, snapshot
-from .observer import BodySnapshot, Observer
+from .observer import Applied, BodySnapshot, LoadEnded, Logged, MeshChanged, Observer, Refused, Reset
 from .readings import Readings
 from .setup import Setup
 from .string_control import StringControl
@@ -107,8 +107,8 @@ class Simulation(Readings):
 
     def log(self, kind: str, content: dict) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
-        if self.observer.wants_events():
-            self.observer.event(self.time_ns, self.events.append(self.time_ns, kind, content))
+        if self.observer.wants(Logged):
+            self.observer.on(Logged(self.time_ns, self.events.append(self.time_ns, kind, content)))
         else:
             self.events.note(self.time_ns, OtherEvent(kind, content))
 
@@ -144,7 +144,7 @@ class Simulation(Readings):
     def refuse(self, error: CommandRefused, count: int = 1) -> None:
         """Count a refusal, of so many commands at once, and tell the observer."""
         self.refused[error.reason] += count
-        self.observer.refused(self.time_ns, error.reason, str(error))
+        self.observer.on(Refused(self.time_ns, error.reason, str(error)))
 
     def check_change(self, new: Setup) -> None:
         """Raises CommandRefused (``integrator``) when the new setup's integrator doesn't support what acts, or will."""
@@ -160,7 +160,7 @@ class Simulation(Readings):
         """
         self._arrays.end_all()
         self._notify([])
-        self.observer.reset()
+        self.observer.on(Reset())
         self.events.reset()
         replaced = setup is not None and setup is not self.setup
         self.setup = setup or self.setup
@@ -239,7 +239,7 @@ class Simulation(Readings):
     def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier, arrays = self.observer, self._notifier, self._arrays
-        ignored = notifier.ignores_commands or not (notifier.wants_loads or observer.wants_events())
+        ignored = notifier.ignores_commands or not (notifier.wants_loads or observer.wants(Logged))
         if ignored and not arrays.integers[_TIMEOUTS]:
             self.events.note_all(due)
             return
@@ -247,7 +247,7 @@ class Simulation(Readings):
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
             self.time_ns = now_ns
             if what in (fl.ENDED, fl.TIMED_OUT):
-                observer.load_ended(now_ns, load_id)
+                observer.on(LoadEnded(now_ns, load_id))
                 if what == fl.TIMED_OUT and self.logs_timeouts:
                     self.log("timeout", {"slot": slot_name(row)})
                 continue
@@ -260,14 +260,14 @@ class Simulation(Readings):
             if load is None or not isinstance(command, WrenchCommand):
                 continue
             if what == fl.APPLIED:
-                observer.applied(now_ns, command, load, self.setup.body, arrays.attitude_at(number))
+                observer.on(Applied(now_ns, command, load, self.setup.body, arrays.attitude_at(number)))
             else:
                 kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
                 notifier.load_began(self, load_id, kind, load)
 
     def _log_command(self, command: Command) -> None:
         # A change that waited in a queue would keep its whole setup, mesh included.
-        if self.observer.wants_events() or isinstance(command, Change):
+        if self.observer.wants(Logged) or isinstance(command, Change):
             self.log(command.kind, command.content)
         else:
             self.events.note(self.time_ns, command)
@@ -346,7 +346,7 @@ class Simulation(Readings):
             return
         for now_ns, what, load_id, row_number in arrays.last_events():
             if what == fl.ENDED:
-                self.observer.load_ended(now_ns, load_id)
+                self.observer.on(LoadEnded(now_ns, load_id))
             elif what == fl.BEGAN:
                 self._notifier.load_began(self, load_id, "thruster", loads[row_number - arrays.first_due][1])
 
@@ -384,7 +384,9 @@ class Simulation(Readings):
         self._string.change(old, new, self.state)
         self.thrusters.change(new.wrench_timeout_ns, self.time_ns)
         if new.surface is not old.surface and new.surface is not None:
-            self.observer.mesh_changed(self.time_ns, new.surface.vertices, new.surface.triangles, str(new.geometry[0]))
+            surface = new.surface
+            mesh = MeshChanged(self.time_ns, surface.vertices, surface.triangles, str(new.geometry[0]))
+            self.observer.on(mesh)
         self.announce()
 
     # The beginning and a bad end

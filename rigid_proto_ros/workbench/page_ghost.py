@@ -18,7 +18,7 @@ from ..motion.state import State
 from ..scene.ghost import GHOST
 from ..scene.scenario import Scenario
 from ..session.replay import Resimulation
-from ..simulation.observer import BodySnapshot, Observer
+from ..simulation.observer import Event, GhostPublished, Observer, Refused
 from ..simulation.setup import Setup
 
 PORTION_NS = 1_000_000_000
@@ -28,21 +28,18 @@ PORTION_NS = 1_000_000_000
 class _GhostObserver(Observer):
     """Receives the ghost of a run that is computed anew; on_refusal(reason) hears of refused commands."""
 
+    takes = frozenset({GhostPublished, Refused})
+
     def __init__(self, on_refusal: Callable[[str], None]) -> None:
         self._on_refusal = on_refusal
         self.row: np.ndarray | None = None
 
-    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
-        """Listening to the ghost is what makes there be one."""
-
-    def ghost_state(self, _time_ns: int, row: np.ndarray) -> None:
-        """Where it is; not told while the scene asks for none."""
-        self.row = row.copy()
-
-    def refused(self, _time_ns: int, reason: str, message: str) -> None:
-        """A command was refused."""
-        if reason == GHOST:
-            self._on_refusal(message)
+    def on(self, event: Event) -> None:
+        """Where it is, which isn't told while the scene asks for none; or a command was refused."""
+        if isinstance(event, GhostPublished):
+            self.row = event.row.copy()
+        elif isinstance(event, Refused) and event.reason == GHOST:
+            self._on_refusal(event.message)
 
 
 class PageGhost:

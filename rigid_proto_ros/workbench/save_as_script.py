@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ..base.errors import InputError
 from ..motion.body import Body
 from ..motion.frames import Frame
@@ -31,7 +29,7 @@ from ..session.recorded_session import RecordedSession
 from ..session.replay import Resimulation, mesh_finder, session_scenario
 from ..session.runs import decode_event
 from ..simulation.commands import TieString, WrenchCommand
-from ..simulation.observer import Observer
+from ..simulation.observer import Applied, Event, Logged, Observer
 from ..simulation.string_control import mesh_point
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
@@ -92,6 +90,8 @@ class _Writer(Observer):
     lines: the log's lines as they come out again. entries: of a script, in the order of acting.
     """
 
+    takes = frozenset({Applied, Logged})
+
     def __init__(self, scenario: Scenario) -> None:
         self.lines: list[str] = []
         self.entries: list[dict] = []
@@ -103,12 +103,14 @@ class _Writer(Observer):
         """The simulation that this writes of: to be called before anything acts in it."""
         self._again = again
 
-    def applied(self, _time_ns: int, command: WrenchCommand, load: Load, body: Body, _attitude: np.ndarray) -> None:
-        """A wrench or poke takes effect; its line follows."""
-        self._applied = command, load, body
+    def on(self, event: Event) -> None:
+        """A wrench or poke takes effect, and its line follows; or anything else has acted."""
+        if isinstance(event, Applied):
+            self._applied = event.command, event.load, event.body
+        elif isinstance(event, Logged):
+            self._write(event.time_ns, event.line)
 
-    def event(self, time_ns: int, line: str) -> None:
-        """An event has acted."""
+    def _write(self, time_ns: int, line: str) -> None:
         self.lines.append(line)
         _, kind, content = decode_event(line, len(self.lines))
         if kind in MARKS:

@@ -16,7 +16,7 @@ from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.scene.command_codec import ScriptCommand
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import Logged, Observer, Published
 
 PERIOD_NS = 10_000_000
 
@@ -28,11 +28,13 @@ class Watcher(Observer):
         self.times: list[int] = []
         self.lines: list[str] = []
 
-    def state(self, time_ns: int, row: np.ndarray) -> None:
-        self.times.append(time_ns)
+    takes = frozenset({Published, Logged})
 
-    def event(self, time_ns: int, line: str) -> None:
-        self.lines.append(line)
+    def on(self, event) -> None:
+        if isinstance(event, Published):
+            self.times.append(event.time_ns)
+        elif isinstance(event, Logged):
+            self.lines.append(event.line)
 
 
 @pytest.fixture

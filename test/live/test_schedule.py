@@ -18,7 +18,7 @@ from rigid_proto_ros.scene.command_codec import ScriptCommand
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation import flight_arrays
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import BodyChanged, Observer
 
 MS = 1_000_000
 
@@ -111,8 +111,11 @@ def test_what_a_list_has_to_load_while_time_stands_is_loaded_before_time_goes_on
     changed_ns: list[int] = []
 
     class Changes(Observer):
-        def body_changed(self, time_ns, body) -> None:
-            changed_ns.append(time_ns)
+        takes = frozenset({BodyChanged})
+
+        def on(self, event) -> None:
+            if isinstance(event, BodyChanged):
+                changed_ns.append(event.time_ns)
 
     monkeypatch.setattr(scenario, "mesh_body", slow)
     rig.loop.watch(Changes())

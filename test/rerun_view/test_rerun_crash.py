@@ -97,13 +97,14 @@ def test_what_is_no_recording_is_refused_in_one_line(recording, tmp_path):
 RECORDER = """
 import os, sys, time
 import rerun_flight as flight
+from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
 from rigid_proto_ros.rerun_view import RerunObserver
 observer = RerunObserver(record=sys.argv[1])
 states = flight.rows(100_000)
-observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-observer.body_changed(0, flight.BODY)
+observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+observer.on(BodyChanged(0, flight.BODY))
 for k, row in enumerate(states):
-    observer.state(k * flight.PERIOD_NS, row)
+    observer.on(Published(k * flight.PERIOD_NS, row))
     print(k + 1, flush=True)
     time.sleep(0.01)
     # The first flush loads what Rerun needs.

@@ -20,6 +20,15 @@ from rigid_proto_ros.rerun_view import RerunObserver, ports, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, headless_viewer, show
+from rigid_proto_ros.simulation.observer import (
+    BodyChanged,
+    GhostChanged,
+    GhostPublished,
+    MeshChanged,
+    Published,
+    Reset,
+    Started,
+)
 
 MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wgpu", "winit")
 """Parts of the viewer whose warnings are about the machine, such as drawing without a graphics card."""
@@ -212,16 +221,16 @@ def test_a_viewer_that_comes_late_sees_the_run_and_the_next_one_without_errors(v
         return [t.end for r in recordings for t in r.timelines if t.name == e.SIM_TIME]
 
     wait_for(lambda: 79 * flight.PERIOD_NS in shown())
-    observer.reset()
+    observer.on(Reset())
     for k, row in enumerate(flight.rows(40)):
-        observer.state(k * flight.PERIOD_NS, row)
+        observer.on(Published(k * flight.PERIOD_NS, row))
     wait_for(lambda: 39 * flight.PERIOD_NS in shown())
     viewer.take_screenshot()
     assert complaints(viewer) == []
     # A body ten times as large comes into the same views, whose cameras stay where they are.
     eyes = cameras(viewer)
-    observer.body_changed(40 * flight.PERIOD_NS, replace(flight.BODY, scale=10.0 * flight.SCALE))
-    observer.state(40 * flight.PERIOD_NS, row)
+    observer.on(BodyChanged(40 * flight.PERIOD_NS, replace(flight.BODY, scale=10.0 * flight.SCALE)))
+    observer.on(Published(40 * flight.PERIOD_NS, row))
     wait_for(lambda: 40 * flight.PERIOD_NS in shown())
     assert eyes and cameras(viewer) == eyes
     assert complaints(viewer) == []
@@ -240,14 +249,14 @@ def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, m
     path = tmp_path / "session.rrd"
     states = flight.rows(600)
     observer = RerunObserver(record=str(path), viewer="serve")
-    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-    observer.body_changed(0, flight.BODY)
+    observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+    observer.on(BodyChanged(0, flight.BODY))
     for part in range(3):
         try:
             with headless_viewer(400, 300) as client:
                 client.open(observer.live_address)
                 for k in range(200 * part, 200 * part + 200):
-                    observer.state(k * flight.PERIOD_NS, states[k])
+                    observer.on(Published(k * flight.PERIOD_NS, states[k]))
                     time.sleep(0.001)
         except InputError as error:
             if DRIVERS in str(error):
@@ -263,10 +272,10 @@ def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, i
     path = tmp_path / "session.rrd"
     observer = RerunObserver(record=str(path), initial_view=initial_view)
     flight.fly(observer, flight.rows(80))
-    observer.mesh_changed(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32)
-    observer.body_changed(780_000_000, flight.BODY)
-    observer.ghost_began(790_000_000, flight.BODY)
-    observer.ghost_state(790_000_000, flight.rows(80)[79])
+    observer.on(MeshChanged(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
+    observer.on(BodyChanged(780_000_000, flight.BODY))
+    observer.on(GhostChanged(790_000_000, flight.BODY))
+    observer.on(GhostPublished(790_000_000, flight.rows(80)[79]))
     observer.close()
     show(viewer, path)
     for at_s in (0.0, 0.25, 0.35, 0.79):

@@ -12,7 +12,20 @@ from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 from rigid_proto_ros.rerun_view.run_log import readable
-from rigid_proto_ros.simulation.observer import BodySnapshot
+from rigid_proto_ros.simulation.observer import (
+    BodyChanged,
+    BodySnapshot,
+    Effort,
+    GhostChanged,
+    GhostPublished,
+    LoadBegan,
+    LoadEnded,
+    Published,
+    Reset,
+    SceneChanged,
+    Started,
+    StatusChanged,
+)
 from rigid_proto_ros.simulation.quantities import attitude_angle
 
 
@@ -29,15 +42,17 @@ def test_the_ghost_is_compared_with_the_body_at_equal_times_and_per_run(tmp_path
     path = tmp_path / "ghost.rrd"
     body, ghost = flight.rows(60, seed=1), flight.rows(60, seed=2)
     observer = RerunObserver(record=str(path))
-    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-    observer.body_changed(0, flight.BODY)
-    observer.ghost_began(0, BodySnapshot(12.0, flight.COM, np.eye(3), flight.SCALE, flight.GRAVITY, "explicit", "rk4"))
+    observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+    observer.on(BodyChanged(0, flight.BODY))
+    observer.on(
+        GhostChanged(0, BodySnapshot(12.0, flight.COM, np.eye(3), flight.SCALE, flight.GRAVITY, "explicit", "rk4"))
+    )
     for run in range(2):
         for k in range(30):
-            observer.state(k * flight.PERIOD_NS, body[30 * run + k])
-            observer.ghost_state(k * flight.PERIOD_NS, ghost[30 * run + k])
+            observer.on(Published(k * flight.PERIOD_NS, body[30 * run + k]))
+            observer.on(GhostPublished(k * flight.PERIOD_NS, ghost[30 * run + k]))
         if run == 0:
-            observer.reset()
+            observer.on(Reset())
     observer.close()
     assert observer.error == ""
     for run, file in enumerate([tmp_path / "ghost.run1.rrd", path]):
@@ -54,10 +69,10 @@ def test_the_state_line_shows_what_acts_and_who_integrates(tmp_path):
     path = tmp_path / "lanes.rrd"
     observer = RerunObserver(record=str(path))
     flight.fly(observer, flight.rows(60))
-    observer.status(590_000_000, "motion", "paused")
+    observer.on(StatusChanged(590_000_000, "motion", "paused"))
     # A held wrench replaced at the same instant was never off.
-    observer.load_ended(590_000_000, 2)
-    observer.load_began(590_000_000, 3, flight.WRENCH)
+    observer.on(LoadEnded(590_000_000, 2))
+    observer.on(LoadBegan(590_000_000, 3, flight.WRENCH))
     observer.close()
     times, values = cells(path, f"{e.STATUS}/loads", "StateChange:state")
     assert list(zip(times, np.ravel(values).tolist(), strict=True)) == [
@@ -75,10 +90,10 @@ def test_effort_is_plotted_as_a_rate_since_it_was_told_before(tmp_path):
     observer = RerunObserver(record=str(path))
     flight.fly(observer, flight.rows(10))
     for time_ns, steps in ((0, 0), (50_000_000, 50), (100_000_000, 50), (100_000_000, 51)):
-        observer.effort(time_ns, steps, 4 * steps)
-    observer.reset()
-    observer.effort(0, 0, 0)
-    observer.effort(50_000_000, 5, 20)
+        observer.on(Effort(time_ns, steps, 4 * steps))
+    observer.on(Reset())
+    observer.on(Effort(0, 0, 0))
+    observer.on(Effort(50_000_000, 5, 20))
     observer.close()
     assert cells(tmp_path / "effort.run1.rrd", style.EFFORT, "Scalars:scalars") == (
         [50_000_000, 100_000_000],
@@ -93,9 +108,9 @@ def test_the_next_run_starts_from_the_parameters_then_in_force(tmp_path):
     observer = RerunObserver(record=str(path))
     flight.fly(observer, rows)
     changed = flight.SCENE + "    mass: 2.0\n"
-    observer.scene_changed(190_000_000, changed)
-    observer.reset()
-    observer.state(0, rows[0])
+    observer.on(SceneChanged(190_000_000, changed))
+    observer.on(Reset())
+    observer.on(Published(0, rows[0]))
     observer.close()
     before = tmp_path / "scene.run1.rrd"
     assert read_session(before).scene == flight.SCENE

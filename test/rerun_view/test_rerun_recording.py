@@ -18,7 +18,7 @@ from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
-from rigid_proto_ros.simulation.observer import BodySnapshot
+from rigid_proto_ros.simulation.observer import BodyChanged, BodySnapshot, MeshChanged, Published, Reset, Started
 
 COUNT = 101
 
@@ -137,12 +137,12 @@ def test_a_load_is_shown_from_the_first_state_at_which_it_acts(recording):
 def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states):
     path = tmp_path / "change.rrd"
     observer = RerunObserver(record=str(path))
-    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-    observer.body_changed(0, flight.BODY)
-    observer.state(0, states[0])
+    observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+    observer.on(BodyChanged(0, flight.BODY))
+    observer.on(Published(0, states[0]))
     heavier = BodySnapshot(24.0, flight.COM + 0.01, 2.0 * flight.INERTIA, flight.SCALE, flight.GRAVITY, "solid", "rk4")
-    observer.body_changed(5_000_000, heavier)
-    observer.state(flight.PERIOD_NS, states[1])
+    observer.on(BodyChanged(5_000_000, heavier))
+    observer.on(Published(flight.PERIOD_NS, states[1]))
     observer.close()
     times, translations = column(path, style.BODY_MESH, "Transform3D:translation")
     assert times.tolist() == [0, 5_000_000]
@@ -156,11 +156,11 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     path = tmp_path / "meshes.rrd"
     observer = RerunObserver(record=str(path))
     flight.fly(observer, states[:20])
-    observer.mesh_changed(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32)
-    observer.body_changed(200_000_000, flight.BODY)
-    observer.state(200_000_000, states[20])
-    observer.reset()
-    observer.state(0, states[21])
+    observer.on(MeshChanged(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
+    observer.on(BodyChanged(200_000_000, flight.BODY))
+    observer.on(Published(200_000_000, states[20]))
+    observer.on(Reset())
+    observer.on(Published(0, states[21]))
     observer.close()
     before, after = read_session(tmp_path / "meshes.run1.rrd"), read_session(path)
     assert (before.mesh_chunks, after.mesh_chunks) == (2, 1)
@@ -177,9 +177,9 @@ def test_a_reset_keeps_the_run_before_beside_the_new_one(tmp_path, states):
     path = tmp_path / "session.rrd"
     observer = RerunObserver(record=str(path))
     flight.fly(observer, states[:50])
-    observer.reset()
+    observer.on(Reset())
     for k, row in enumerate(states[50:60]):
-        observer.state(k * flight.PERIOD_NS, row)
+        observer.on(Published(k * flight.PERIOD_NS, row))
     observer.close()
     newest, before = read_session(path), read_session(tmp_path / "session.run1.rrd")
     assert newest.rows.tobytes() == states[50:60].tobytes()
@@ -192,11 +192,11 @@ def test_a_reset_keeps_the_run_before_beside_the_new_one(tmp_path, states):
 def test_a_run_that_never_left_time_zero_is_not_kept_at_a_reset(tmp_path, states):
     path = tmp_path / "session.rrd"
     observer = RerunObserver(record=str(path))
-    observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-    observer.body_changed(0, flight.BODY)
-    observer.state(0, states[0])
-    observer.reset()
-    observer.state(0, states[1])
+    observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+    observer.on(BodyChanged(0, flight.BODY))
+    observer.on(Published(0, states[0]))
+    observer.on(Reset())
+    observer.on(Published(0, states[1]))
     observer.close()
     assert [p.name for p in tmp_path.iterdir()] == ["session.rrd"]
     assert read_session(path).rows.tobytes() == states[1:2].tobytes()
@@ -219,12 +219,12 @@ def test_recording_can_begin_and_go_on_in_another_file_in_flight(tmp_path, state
     first, second = tmp_path / "first.rrd", tmp_path / "second.rrd"
     observer.start_recording(str(first))
     for k in range(30, 40):
-        observer.state(k * flight.PERIOD_NS, states[k])
+        observer.on(Published(k * flight.PERIOD_NS, states[k]))
     assert observer.recording == str(first)
     observer.start_recording(str(second))
     assert observer.recording == str(second)
     for k in range(40, 60):
-        observer.state(k * flight.PERIOD_NS, states[k])
+        observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.close()
     assert read_session(first).rows.tobytes() == states[30:40].tobytes()
     assert read_session(second).rows.tobytes() == states[40:60].tobytes()
@@ -252,9 +252,9 @@ def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_ru
     observer = RerunObserver(record=str(path), on_error=errors.append)
     flight.fly(observer, states[:20])
     flight.flush(observer)
-    observer.body_changed(200_000_000, None)
+    observer.on(BodyChanged(200_000_000, None))
     for k in range(20, 40):
-        observer.state(k * flight.PERIOD_NS, states[k])
+        observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.close()
     assert len(errors) == 1 and observer.recording == ""
     session = read_session(path)
@@ -302,11 +302,11 @@ def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
     path.unlink()
     folder.rmdir()
     for k in range(20, 40):
-        observer.state(k * flight.PERIOD_NS, states[k])
+        observer.on(Published(k * flight.PERIOD_NS, states[k]))
     flight.flush(observer)
     assert observer.recording == "" and str(path) in observer.error
     for k in range(40, 60):
-        observer.state(k * flight.PERIOD_NS, states[k])
+        observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.close()
     assert len(errors) == 1
 

@@ -19,25 +19,27 @@ from rerun.chunk import RrdReader
 from rigid_proto_ros.rerun_view import RerunObserver, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
 
 WAIT_S = 180.0
 
 RUN_WITH_A_STOPPED_VIEWER = """
 import sys, time
 import rerun_flight as flight
+from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
 from rigid_proto_ros.rerun_view import RerunObserver
 path, states = sys.argv[1], flight.rows(200)
 observer = RerunObserver(record=path, viewer="serve")
-observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-observer.body_changed(0, flight.BODY)
-observer.state(0, states[0])
+observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+observer.on(BodyChanged(0, flight.BODY))
+observer.on(Published(0, states[0]))
 print(observer.live_address, flush=True)
 sys.stdin.readline()
 streams = observer._flusher._writer.streams
 k, deadline = 1, time.monotonic() + 150.0
 while k < 200 and time.monotonic() < deadline:
-    observer.state(k * flight.PERIOD_NS, states[k])
-    observer.body_changed(k * flight.PERIOD_NS, flight.BODY)
+    observer.on(Published(k * flight.PERIOD_NS, states[k]))
+    observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
     if k == 150:
         # Thousands of messages are more than the server keeps back for a viewer.
         while not any(stream.behind for stream in streams):
@@ -80,16 +82,16 @@ def test_a_viewer_that_no_longer_reads_holds_up_neither_the_run_nor_its_end(tmp_
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts threads as Linux shows them")
 def test_resets_and_bodies_of_every_size_leave_no_threads_behind(tmp_path):
     def one_more_run() -> None:
-        observer.reset()
+        observer.on(Reset())
         for k, row in enumerate(flight.rows(4)):
-            observer.body_changed(k, replace(flight.BODY, scale=flight.SCALE * 10.0 ** (k % 2)))
-            observer.state(k * flight.PERIOD_NS, row)
+            observer.on(BodyChanged(k, replace(flight.BODY, scale=flight.SCALE * 10.0 ** (k % 2))))
+            observer.on(Published(k * flight.PERIOD_NS, row))
         flight.flush(observer)
 
     observer = RerunObserver(record=str(tmp_path / "session.rrd"), viewer="serve")
     try:
-        observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-        observer.body_changed(0, flight.BODY)
+        observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+        observer.on(BodyChanged(0, flight.BODY))
         for _ in range(3):
             one_more_run()
         before = _threads_of_this_process()
@@ -111,12 +113,12 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
     saved = tmp_path / "seen.rrd"
     watcher = None
     try:
-        observer.started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256)
-        observer.body_changed(0, flight.BODY)
-        observer.status(0, "motion", "flying")
+        observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+        observer.on(BodyChanged(0, flight.BODY))
+        observer.on(StatusChanged(0, "motion", "flying"))
         states = flight.rows(1000)
         for k in range(40_000):
-            observer.state(k * 1_000_000, states[k % 1000])
+            observer.on(Published(k * 1_000_000, states[k % 1000]))
             if k % 2000 == 1999:
                 # Or viewers would be spared most of it, and nothing would have to be dropped.
                 flight.flush(observer)

@@ -11,7 +11,7 @@ from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.ghost import ghost_of
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import WrenchCommand
-from rigid_proto_ros.simulation.observer import BodySnapshot, Observer
+from rigid_proto_ros.simulation.observer import GhostChanged, GhostPublished, Observer, Published, Refused
 from rigid_proto_ros.simulation.simulation import Simulation
 
 MOVING = {
@@ -30,17 +30,18 @@ class Watcher(Observer):
         self.ghost: dict[int, list[float]] = {}
         self.refusals: list[tuple[str, str]] = []
 
-    def refused(self, time_ns: int, reason: str, message: str) -> None:
-        self.refusals.append((reason, message))
+    takes = frozenset({Refused, GhostChanged, Published, GhostPublished})
 
-    def ghost_began(self, time_ns: int, ghost: BodySnapshot) -> None:
-        self.began.append(time_ns)
-
-    def state(self, time_ns: int, row) -> None:
-        self.body[time_ns] = row.tolist()
-
-    def ghost_state(self, time_ns: int, row) -> None:
-        self.ghost[time_ns] = row.tolist()
+    def on(self, event) -> None:
+        match event:
+            case Refused(_, reason, message):
+                self.refusals.append((reason, message))
+            case GhostChanged(time_ns, _):
+                self.began.append(time_ns)
+            case Published(time_ns, row):
+                self.body[time_ns] = row.tolist()
+            case GhostPublished(time_ns, row):
+                self.ghost[time_ns] = row.tolist()
 
 
 def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():

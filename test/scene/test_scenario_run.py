@@ -8,7 +8,7 @@ from flights import SECOND
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import Observer, Refused, SceneChanged
 
 SCRIPT = """
 - {t: 0.0, at: com, torque: [0.1, 0.0, 0.0], duration: 1.0}
@@ -24,11 +24,13 @@ class Scenes(Observer):
         self.scenes: list[str] = []
         self.refusals: list[str] = []
 
-    def scene_changed(self, _time_ns: int, scene: str) -> None:
-        self.scenes.append(scene)
+    takes = frozenset({SceneChanged, Refused})
 
-    def refused(self, _time_ns: int, reason: str, _message: str) -> None:
-        self.refusals.append(reason)
+    def on(self, event) -> None:
+        if isinstance(event, SceneChanged):
+            self.scenes.append(event.scene)
+        elif isinstance(event, Refused):
+            self.refusals.append(event.reason)
 
 
 def test_a_change_refused_when_it_acts_leaves_the_scene_as_it_is_for_those_after_it() -> None:

@@ -24,7 +24,7 @@ from rigid_proto_ros.session.branch import branch_at
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.session.replay import Resimulation, resimulation
 from rigid_proto_ros.simulation.commands import ClearWrench, ReleaseString
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import Logged, Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
@@ -129,8 +129,11 @@ class Lines(Observer):
     def __init__(self) -> None:
         self.events: list[tuple[int, str]] = []
 
-    def event(self, time_ns: int, line: str) -> None:
-        self.events.append((time_ns, line))
+    takes = frozenset({Logged})
+
+    def on(self, event) -> None:
+        if isinstance(event, Logged):
+            self.events.append((event.time_ns, event.line))
 
 
 def flown(changes: dict, until_ns: int) -> RecordedSession:

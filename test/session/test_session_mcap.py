@@ -30,7 +30,7 @@ from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
-from rigid_proto_ros.simulation.observer import Observer, Observers
+from rigid_proto_ros.simulation.observer import Logged, Observer, Observers, Published
 
 SECOND = 10**9
 
@@ -42,11 +42,13 @@ class Kept(Observer):
         self.states: dict[int, list[float]] = {}
         self.lines: list[str] = []
 
-    def state(self, time_ns, row) -> None:
-        self.states[time_ns] = row.tolist()
+    takes = frozenset({Published, Logged})
 
-    def event(self, time_ns, line) -> None:
-        self.lines.append(line)
+    def on(self, event) -> None:
+        if isinstance(event, Published):
+            self.states[event.time_ns] = event.row.tolist()
+        elif isinstance(event, Logged):
+            self.lines.append(event.line)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +57,7 @@ def flown(tmp_path_factory):
     path = tmp_path_factory.mktemp("flown") / "session.mcap"
     kept, recorder = Kept(), McapObserver(path, simulated_log=True)
     scenario = read_scene("t_handle")
-    run = OfflineRun(scenario, read_script(example_path("heavier_in_flight"), 1.5), Observers(recorder, kept))
+    run = OfflineRun(scenario, read_script(example_path("heavier_in_flight")), Observers(recorder, kept))
     assert run.advance(6 * SECOND)
     recorder.close()
     return path, kept

@@ -12,7 +12,7 @@ from flights import SECOND, flight, wrench
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation import event_log
 from rigid_proto_ros.simulation.event_log import EventLog
-from rigid_proto_ros.simulation.observer import Observer, Observers
+from rigid_proto_ros.simulation.observer import Logged, Observer, Observers
 
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
 
@@ -24,11 +24,14 @@ class Reader(Observer):
         self.lines: list[str] = []
         self.listening = True
 
-    def event(self, time_ns: int, line: str) -> None:
-        self.lines.append(line)
+    takes = frozenset({Logged})
 
-    def wants_events(self) -> bool:
-        return self.listening
+    def on(self, event) -> None:
+        if isinstance(event, Logged):
+            self.lines.append(event.line)
+
+    def wants(self, kind: type) -> bool:
+        return kind is Logged and self.listening
 
 
 def commanded(count: int):

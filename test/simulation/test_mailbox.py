@@ -9,16 +9,16 @@ from rigid_proto_ros.simulation import mailbox
 from rigid_proto_ros.simulation.mailbox import BLOCK_ROWS, BLOCKS_WAITING_MAX, Mailbox
 
 
-def test_rows_and_marks_come_out_in_the_order_in_which_they_went_in():
+def test_rows_and_notes_come_out_in_the_order_in_which_they_went_in():
     box = Mailbox()
     for k in range(BLOCK_ROWS + 3):
         box.put(k, np.full(13, float(k)))
         if k in (1, BLOCK_ROWS):
-            box.mark(k, "said", k)
+            box.note(k)
     first, waiting = box.take()
     second, _ = box.take()
     assert (first.count, second.count, waiting) == (BLOCK_ROWS, 3, 0)
-    assert [(m.after_rows, m.content) for m in first.marks + second.marks] == [(2, (1,)), (1, (BLOCK_ROWS,))]
+    assert [(n.after_rows, n.event) for n in first.notes + second.notes] == [(2, 1), (1, BLOCK_ROWS)]
     times = np.concatenate([first.times, second.times[:3]])
     rows = np.concatenate([first.rows, second.rows[:3]])
     assert (times == np.arange(BLOCK_ROWS + 3)).all() and (rows[:, 12] == times).all()
@@ -27,12 +27,12 @@ def test_rows_and_marks_come_out_in_the_order_in_which_they_went_in():
 
 def test_the_next_row_is_handed_over_at_once_where_that_was_asked_for():
     box = Mailbox()
-    box.mark(-1, "began")
+    box.note("began")
     box.hurry()
     box.put(0, np.zeros(13))
     box.put(1, np.zeros(13))
     first, waiting = box.take()
-    assert ([m.kind for m in first.marks], first.count, waiting) == (["began"], 1, 0)
+    assert ([n.event for n in first.notes], first.count, waiting) == (["began"], 1, 0)
     assert box.take()[0].count == 1
 
 

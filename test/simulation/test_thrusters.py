@@ -13,7 +13,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.session.replay import Resimulation
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import LoadBegan, LoadEnded, Logged, Observer
 
 BODY = {
     "mesh": "",
@@ -30,15 +30,17 @@ class Told(Observer):
         self.acting: dict[int, object] = {}
         self.kinds: set[str] = set()
 
-    def event(self, _time_ns, line) -> None:
-        self.lines.append(line)
+    takes = frozenset({Logged, LoadBegan, LoadEnded})
 
-    def load_began(self, _time_ns, load_id, load) -> None:
-        self.acting[load_id] = load
-        self.kinds.add(load.kind)
-
-    def load_ended(self, _time_ns, load_id) -> None:
-        del self.acting[load_id]
+    def on(self, event) -> None:
+        match event:
+            case Logged(_, line):
+                self.lines.append(line)
+            case LoadBegan(_, load_id, load):
+                self.acting[load_id] = load
+                self.kinds.add(load.kind)
+            case LoadEnded(_, load_id):
+                del self.acting[load_id]
 
 
 def flown(script: str, until_s: float, **scene) -> tuple[OfflineRun, Told]:

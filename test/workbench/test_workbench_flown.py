@@ -14,7 +14,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 from flown_page import FlownLink, FlownPage
 
 from rigid_proto_ros.session.replay import resimulation
-from rigid_proto_ros.simulation.observer import Observer
+from rigid_proto_ros.simulation.observer import GhostPublished, Observer
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
 
@@ -99,11 +99,11 @@ def test_the_ghost_of_a_lesson_is_there_from_its_start_and_gone_in_the_next_one(
 
 
 class GhostWatcher(Observer):
-    def ghost_began(self, time_ns: int, ghost) -> None:
-        pass
+    takes = frozenset({GhostPublished})
 
-    def ghost_state(self, time_ns: int, row) -> None:
-        self.row = row.copy()
+    def on(self, event) -> None:
+        if isinstance(event, GhostPublished):
+            self.row = event.row.copy()
 
 
 def test_the_pages_ghost_is_to_the_bit_the_one_that_replay_computes(flown: FlownPage) -> None:
