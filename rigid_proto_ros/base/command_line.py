@@ -41,12 +41,13 @@ def completes(action: argparse.Action, names: Callable[[str], Iterable[str]]) ->
 
 class Parser(argparse.ArgumentParser):
     """Usage errors are one line on stderr and exit status 2. examples: (command, what it does), shown
-    below --help's options.
+    below --help's options. instead_of(option) says what does the work of an option that there isn't, or "".
     """
 
     def __init__(self, *, examples: Iterable[tuple[str, str]] = (), **kwargs: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
         self._negative_number_matcher = NEGATIVE_NUMBER
+        self.instead_of: Callable[[str], str] = lambda _: ""
         self.show_examples(examples)
 
     def show_examples(self, examples: Iterable[tuple[str, str]]) -> None:
@@ -73,7 +74,8 @@ class Parser(argparse.ArgumentParser):
         if not options:
             return f"{words[0]!r} is one argument too many"
         name = options[0].partition("=")[0]
-        hint = did_you_mean(name, (option for option in self._option_string_actions if option.startswith("--")))
+        known = (option for option in self._option_string_actions if option.startswith("--"))
+        hint = self.instead_of(name) or did_you_mean(name, known)
         return f"no option {name}" + (f"; {hint}" if hint else "")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:

@@ -44,9 +44,10 @@ def is_missing(package: str, extra: str) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``did you mean X?`` for the known name nearest to ``name``; empty where none is near."""
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    return f"did you mean {near[0]}?" if near else ""
+    """``did you mean X?`` for the known name nearest to ``name``, in capitals or not; empty where none is near."""
+    small = {word.lower(): word for word in known}
+    near = difflib.get_close_matches(name.lower(), small, n=1, cutoff=0.5)
+    return f"did you mean {small[near[0]]}?" if near else ""
 
 
 def one_of(name: str, known: Iterable[str]) -> str:

@@ -49,12 +49,16 @@ def _file_nearest_to(path: Path) -> str:
 
 
 def output_file(option: str, file: str | Path) -> Path:
-    """The path of a file that is to be written, its folder made. Raises InputError, which names ``option``."""
+    """The path of a file that is to be written. Its own folder is made, but none above: a path with several unknown
+    ones is likelier a slip. Raises InputError, which names ``option``.
+    """
     path = Path(file)
     if path.is_dir():
         raise InputError(option, str(file), "the name of a file; this is a folder")
     try:
-        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        path.absolute().parent.mkdir(exist_ok=True)
+    except FileNotFoundError:
+        raise InputError(option, str(file), f"a folder that exists: {path.absolute().parent.parent} doesn't") from None
     except OSError as error:
         raise InputError(option, str(file), f"a file in a folder that can be made ({error.strerror})") from None
     return path

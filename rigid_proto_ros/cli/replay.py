@@ -129,7 +129,7 @@ def _print_how_to_view(args: argparse.Namespace) -> None:
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
-    from ..session.check import BeganLaterError, verify
+    from ..session.check import NotVerifiableError, verify
 
     verified = 0
     for number, session in enumerate(runs, 1):
@@ -137,11 +137,11 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
         try:
             with Progress("verifying") as progress:
                 difference = verify(session, progress.fraction)
-        except BeganLaterError:
+        except NotVerifiableError as error:
             # What lies before the first reset can't be checked; what follows it can.
             if number == len(runs) and not verified:
                 raise
-            print(f"  {which}began before the recording did; not checked")
+            print(f"  {which}not checked: {error.received}")
             continue
         if difference is not None:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)

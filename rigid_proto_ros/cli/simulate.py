@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.command_line import completes
+from ..base.command_line import Parser, completes
 from ..base.errors import InputError
 from ..base.files import output_file
 from .exports import add_exports, asked, check_exports, write_exports
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
     from ..scene.parameters import Parameters
     from ..simulation.observer import Observer, Observers
+
+DURATION_NS = 10_000_000_000
+AFTER_SCRIPT_NS = 1_000_000_000
+"""Without --duration the flight is so long, and goes on so long after a script's last command [ns]."""
 
 EXAMPLES = (
     ("rigid_proto simulate t_handle", "the bundled T-handle, 10 s"),
@@ -35,11 +39,16 @@ EXAMPLES = (
 )
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Declare the command's arguments."""
     add_scene(parser, "a ROS parameter file, or the name of a bundled scene")
     parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
-    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="simulated seconds (default 10)")
+    parser.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="simulated seconds (default 10, or 1 past the script's last command where that is later)",
+    )
     setting = parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter; may be repeated"
     )
@@ -48,6 +57,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
     add_json(parser)
     add_exports(parser)
+    parser.instead_of = _instead_of
+
+
+def _instead_of(option: str) -> str:
+    """A parameter isn't an option."""
+    from ..scene.parameters import PARAMETERS
+
+    name = option.removeprefix("--").replace("-", "_")
+    return f"a parameter is set by --set {name}=VALUE" if name in PARAMETERS else ""
 
 
 def _settings(begun: str) -> list[str]:
@@ -78,12 +96,16 @@ def run(args: argparse.Namespace) -> int:
     from ..scene.scenario import nanoseconds
     from ..scene.script import read_script
 
-    if not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
+    if args.duration is not None and not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
         raise InputError("--duration", args.duration, "seconds from 0 to 1e9")
     scenario = read_scene(args.scene, dict(parse_setting(s) for s in args.set), _warn)
     for warning in scenario.warnings:
         _warn(warning)
     script = read_script(args.script) if args.script else []
+    last_ns = script[-1].t_ns if script else 0
+    duration_ns = max(DURATION_NS, last_ns + AFTER_SCRIPT_NS) if args.duration is None else nanoseconds(args.duration)
+    if beyond := sum(command.t_ns >= duration_ns for command in script):
+        _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
     recordings = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
     if args.bag and not is_mcap(args.bag):
         raise InputError("--bag", args.bag, "a file that ends in .mcap")
@@ -96,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
     observer = _observer(recordings, scenario.parameters, record)
     try:
         flight = OfflineRun(scenario, script, observer)
-        wall_time = run_with_progress(flight, nanoseconds(args.duration), _warn)
+        wall_time = run_with_progress(flight, duration_ns, _warn)
         result = summary(flight, wall_time)
     finally:
         if observer is not None:

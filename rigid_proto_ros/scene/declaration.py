@@ -108,6 +108,8 @@ def _to_doubles(value: object) -> list[float] | None:
         text = value.strip()
         if text.startswith("[") and text.endswith("]"):
             value = [item.strip(" '\"") for item in text[1:-1].split(",")]
+        elif len(items := text.replace(",", " ").split()) > 1:
+            value = items
     alone = _to_double(value)
     if alone is not None:
         return [alone]

@@ -20,8 +20,8 @@ from .replay import Resimulation, as_published, mesh_finder, resimulation, sessi
 from .runs import decode_event
 
 
-class BeganLaterError(InputError):
-    """The recording holds no start and no reset: there is nothing to compute it from."""
+class NotVerifiableError(InputError):
+    """The recording holds no start and no reset to compute it from, or no states to compare."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,10 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
     lines = _Lines()
     again = resimulation(session, lines)
     states = list(_states_in_order(session))
+    if not states:
+        raise NotVerifiableError(
+            "--verify", "a recording without states", "one with states: there is nothing to verify"
+        )
     compared = 0
     for count, (time_ns, name, row) in enumerate(states):
         try:
@@ -201,8 +205,8 @@ def _begins_at_its_start(session: RecordedSession, events: list) -> bool:
     return _row_difference(time_ns, 1, name, row, told) is None
 
 
-def _began_later(session: RecordedSession) -> BeganLaterError:
+def _began_later(session: RecordedSession) -> NotVerifiableError:
     first = min((state[0] for state in _states_in_order(session)), default=0)
-    return BeganLaterError(
+    return NotVerifiableError(
         "--verify", f"a recording that begins at {first / 1e9:.9g} s", "one that begins at a start or a reset"
     )

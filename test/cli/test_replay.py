@@ -7,6 +7,9 @@ import pytest
 
 from rigid_proto_ros.cli import replay
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.scene.offline import notify_start
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.recorded_session import RecordedSession
 
 
@@ -37,3 +40,14 @@ def test_however_many_commands_were_refused_few_are_listed(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert sum("refused at" in line for line in lines) == replay.REFUSALS_SHOWN
     assert f"{5000 - replay.REFUSALS_SHOWN} more were refused, the last at 4.999 s" in lines[-1]
+
+
+def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
+    pytest.importorskip("mcap")
+    scenario = make_scenario({})
+    recorder = McapObserver(tmp_path / "empty.mcap")
+    notify_start(recorder, scenario)
+    recorder.close()
+    assert main(["replay", str(tmp_path / "empty.mcap"), "--verify"]) == 2
+    out, err = capsys.readouterr()
+    assert "nothing to verify" in err and err.count("\n") == 1 and "verified" not in out

@@ -119,3 +119,40 @@ def test_what_a_ghost_goes_without_is_said(tmp_path, capsys):
     assert main(["simulate", *words, "--bag", str(tmp_path / "x.mcap")]) == 0
     lines = [line for line in capsys.readouterr().err.splitlines() if "ghost" in line]
     assert len(lines) == 1 and "the ghost continues without a command" in lines[0] and "free_body" in lines[0]
+
+
+@pytest.mark.parametrize("gravity", ["0 0 -9.81", "0, 0, -9.81", "[0, 0, -9.81]", "0\t0  -9.81"])
+def test_several_numbers_may_stand_with_blanks_between_them(gravity, capsys):
+    said = simulated(capsys, "t_handle", "--duration", "1", "--set", f"gravity={gravity}")
+    assert said["linear_velocity"] == pytest.approx([0.0, 0.0, -9.81], rel=1e-14)
+
+
+def test_without_a_duration_a_flight_lasts_ten_seconds_or_one_more_than_its_script(tmp_path, capsys):
+    script = tmp_path / "pokes.yaml"
+    script.write_text("- {t: 0.5, impulse: [0, 0, 0.001]}\n")
+    assert simulated(capsys, "book", "--script", str(script))["time_ns"] == 10_000_000_000
+    script.write_text("- {t: 12.25, impulse: [0, 0, 0.001]}\n- {t: 0.5, impulse: [0, 0, 0.001]}\n")
+    assert simulated(capsys, "book", "--script", str(script))["time_ns"] == 13_250_000_000
+    assert main(["simulate", "book", "--script", str(script), "--duration", "2"]) == 0
+    assert "1 of the script's 2 commands act at or after the end, 2 s" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--set", "integrator=RK4"], "did you mean rk4?"),
+        (["--mesh", "book"], "a parameter is set by --set mesh=VALUE"),
+        (["--publish-rate", "50"], "a parameter is set by --set publish_rate=VALUE"),
+        (["--recrod", "x.rrd"], "did you mean --record?"),
+        (["--bag", "{tmp}/not/there/x.mcap"], "a folder that exists"),
+    ],
+)
+def test_a_slip_is_answered_with_what_was_meant(arguments, said, tmp_path, capsys):
+    arguments = [word.replace("{tmp}", str(tmp_path)) for word in arguments]
+    try:
+        status = main(["simulate", "t_handle", "--duration", "0.1", *arguments])
+    except SystemExit as end:
+        status = end.code
+    err = capsys.readouterr().err
+    assert status == 2 and said in err and err.count("\n") == 1
+    assert not (tmp_path / "not").exists()
