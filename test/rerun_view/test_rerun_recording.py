@@ -313,7 +313,8 @@ def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
 
 def test_rerun_is_not_imported_when_nobody_watches():
     code = (
-        "import sys; from rigid_proto_ros.rerun_view import RerunObserver; o = RerunObserver(); o.reset(); o.close(); "
+        "import sys; from rigid_proto_ros.rerun_view import RerunObserver; from rigid_proto_ros.simulation.observer import Reset; "
+        "o = RerunObserver(); o.on(Reset()); o.close(); "
         "sys.exit('rerun' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], env=os.environ, check=False).returncode == 0
