@@ -32,14 +32,15 @@ TERMINAL = ["rich>=13", "argcomplete>=3"]
 IDENTIFY = ["scipy>=1.11", "rosbags>=0.10", *MCAP]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
-# COLLADA and 3MF files through trimesh, the hull, and the union of overlapping parts.
-MESHES = ["pycollada>=0.8", "networkx>=3", "lxml>=5", "scipy>=1.11", "manifold3d>=3.1,<4"]
+# COLLADA files, the hull, and the union of overlapping parts.
+MESHES = ["pycollada>=0.8", "scipy>=1.11", "manifold3d>=3.1,<4"]
 TEST = [
     "pytest>=8",
     "hypothesis>=6.100",
     "mpmath>=1.3",
     "scipy>=1.11",
     "psutil>=5.9",
+    "trimesh>=4.4",
     *MESHES,
     *MCAP,
     "mcap-ros2-support>=0.5",
@@ -79,7 +80,7 @@ setup(
         *((f"{SHARE}/{folder}", found) for folder in ("launch",) if (found := sorted(glob(f"{folder}/*.py")))),
     ],
     python_requires=">=3.11",
-    install_requires=["numpy>=1.26", "numba>=0.62", "trimesh>=4.4", "PyYAML>=6.0", "msgspec>=0.19"],
+    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", "msgspec>=0.19"],
     extras_require={
         "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
         "ros": ROS,

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Meshes from files, their cache, and the topology of their surfaces. The one place that imports trimesh."""
+"""Meshes from files, their cache, and the topology of their surfaces."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes from files, by our own readers, and by trimesh for other formats: the only module that may import it."""
+"""Meshes from files: which reader takes a file, what its unit is, and what of it is cached."""
 
 from __future__ import annotations
 
@@ -13,26 +13,29 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.errors import MeshError, is_missing
+from ..base.errors import InputError, MeshError
 from ..base.files import read_bounded
 from . import cache as mesh_cache
+from .assembly import Assembly
+from .collada import add_collada
+from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
 from .stl import is_ascii_stl, read_stl
+from .threemf import add_threemf
 
 OWN_FORMATS = ("obj", "off", "ply", "stl")
-"""Formats read here: trimesh 5.2 takes 2.5 to 20 times as long, and misreads or refuses some files of each but .off
-(tab-separated .obj, negative indices, strips in .ply, cut .stl): benchmarks/mesh_readers.py."""
+"""Formats of one surface. trimesh 5.2 takes 2.5 to 20 times as long, and misreads some files of each in silence
+(tab-separated .obj, negative indices, strips in .ply, cut .off and .stl): benchmarks/mesh_readers.py."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae", "zae")
-"""All readable formats; those beyond OWN_FORMATS go through trimesh, which takes the extra [meshes] for
-the last three.
-"""
+"""All readable formats; those beyond OWN_FORMATS are scenes of placed parts."""
 PACKED = ("gz", "bz2")
 """Endings of compressed files; before them stands the format's own, as in part.stl.gz."""
 MAX_TRIANGLES = 20_000_000
@@ -160,7 +163,7 @@ def _read(data: bytes, path: Path, max_triangles: int) -> _Content:
     if found and found != suffix and suffix in OWN_FORMATS:
         raise MeshError(path.name, f"the content looks like .{found}, not .{suffix}; rename the file")
     if suffix not in OWN_FORMATS:
-        content = _read_with_trimesh(data, suffix, path, BYTES_PER_TRIANGLE * max_triangles)
+        content = _read_scene(data, suffix, path, max_triangles)
     elif suffix == "stl":
         content = _Content(*read_stl(data, path.name, max_triangles))
     else:
@@ -177,26 +180,6 @@ def _check_triangles(count: int, max_triangles: int, name: str) -> None:
         raise MeshError(name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
 
 
-_UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
-
-
-def _unit(text: str | None, name: str) -> float:
-    """Metres in the unit that trimesh names: one of 3MF's words, "millimeters", or "0.01 * meters" of a
-    COLLADA file.
-    """
-    if text is None:
-        return 1.0
-    number, star, word = text.rpartition("*")
-    try:
-        unit = _UNITS[word.strip().removesuffix("s").replace("inche", "inch").replace("feet", "foot")]
-        unit *= float(number) if star else 1.0
-    except (KeyError, ValueError):
-        raise MeshError(name, f"unit {text}", f"a file in one of {', '.join(_UNITS)}") from None
-    if not 1e-9 <= unit <= 1e9:
-        raise MeshError(name, f"a unit of {unit:g} m", "a unit of 1e-9 m to 1e9 m")
-    return unit
-
-
 def _check_archive(data: bytes, name: str, max_bytes: int) -> None:
     """Refuse an archive whose files, unpacked, are larger than a mesh of the limit can be."""
     try:
@@ -208,49 +191,36 @@ def _check_archive(data: bytes, name: str, max_bytes: int) -> None:
         raise MeshError(name, f"{size} bytes unpacked are more than {max_bytes}; --max-triangles raises the limit")
 
 
-def _read_with_trimesh(data: bytes, suffix: str, path: Path, max_bytes: int) -> _Content:
-    """The scene in a file that trimesh reads, its nodes' transforms applied, in metres where it says its unit."""
-    try:
-        import trimesh
-    except ImportError:
-        raise MeshError("mesh", path.name, "trimesh installed for this format: pip install trimesh") from None
-    if suffix in ("3mf", "zae"):
-        _check_archive(data, path.name, max_bytes)
+def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Content:
+    """What a file of placed parts shows, in metres."""
+    max_bytes = BYTES_PER_TRIANGLE * max_triangles
     files: dict[str, str] = {}
 
-    class Beside(trimesh.resolvers.FilePathResolver):
-        """Files beside the mesh's own, their content noted."""
+    def beside(name: str) -> bytes:
+        found = unquote(name)
+        content = read_bounded(path.parent / found, max_bytes, path.name, "a file that it takes its numbers from")
+        files[found] = hashlib.sha256(content).hexdigest()
+        return content
 
-        def get(self, name: str) -> bytes:
-            content: bytes = super().get(name)
-            files[str(name)] = hashlib.sha256(content).hexdigest()
-            return content
-
+    assembly, unit = Assembly(path.name, max_triangles), 1.0
+    if suffix in ("3mf", "zae"):
+        _check_archive(data, path.name, max_bytes)
     try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data),
-            file_type=suffix,
-            resolver=Beside(str(path)),
-            process=False,
-            maintain_order=True,
-            skip_materials=True,
-        )
-        mesh = scene.to_mesh()
-        vertices = np.array(mesh.vertices, dtype=np.float64)
-        triangles = np.array(mesh.faces, dtype=np.int64)
-        units = {geometry.units for geometry in scene.geometry.values()}
-    except ImportError as error:
-        raise MeshError(path.name, is_missing(str(error.name), "meshes")) from None
-    except Exception as error:
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise MeshError(path.name, f"trimesh {trimesh.__version__} can't read the file ({reason})") from None
-    unit = 1.0
-    if suffix not in ("glb", "gltf"):  # these are in metres by definition
-        if len(units) > 1:
-            raise MeshError(path.name, f"its parts have different units: {', '.join(map(str, units))}")
-        unit = _unit(next(iter(units), None), path.name)
-        vertices *= unit
-    return _Content(vertices, triangles, None, unit, tuple(sorted(files.items())))
+        if suffix in ("glb", "gltf"):
+            add_gltf(data, beside, assembly)
+        elif suffix == "3mf":
+            unit = add_threemf(data, assembly)
+        else:
+            unit = add_collada(data, suffix == "zae", assembly)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file leads to in a reader that takes it as specified
+        reason = " ".join(str(error).split())[:120]
+        raise MeshError(path.name, f"the .{suffix} file can't be read ({type(error).__name__}: {reason})") from None
+    if not 1e-9 <= unit <= 1e9:
+        raise MeshError(path.name, f"a unit of {unit:g} m", "a unit of 1e-9 m to 1e9 m")
+    vertices, triangles = assembly.surface()
+    return _Content(unit * vertices, triangles, None, unit, tuple(sorted(files.items())))
 
 
 def _with_files(sha256: str, files: tuple[tuple[str, str], ...]) -> str:

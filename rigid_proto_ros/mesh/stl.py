@@ -17,6 +17,8 @@ from .topology import first_equal_rows
 
 _HEAD = 100
 """Words, however many blanks stand between them, within which an ASCII file names its first facet."""
+_SPARE = 2
+"""Bytes that may follow the last facet: a line end, or one more attribute count."""
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -45,13 +47,15 @@ def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
             name, f"{len(data)} bytes are no STL file: neither ASCII, nor a binary header of 84 bytes and facets"
         )
     (count,) = struct.unpack_from("<I", data, 80)
-    held = (len(data) - 84) // 50
+    held, beyond = divmod(len(data) - 84, _FACET.itemsize)
+    if count == 0 and beyond <= _SPARE:  # left for later by some that write facets as they come
+        count = held
     if count > held:
         raise MeshError(
             name, f"the file has room for {held} facets, but its header announces {count}; the file may be truncated"
         )
-    if len(data) != 84 + 50 * count:
-        extra = len(data) - 84 - 50 * count
+    extra = len(data) - 84 - _FACET.itemsize * count
+    if extra > _SPARE:
         raise MeshError(
             name, f"{extra} bytes follow the {count} facets that the header announces; the file may be damaged"
         )

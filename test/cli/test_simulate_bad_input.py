@@ -165,10 +165,10 @@ def test_a_mesh_in_a_folder_that_may_not_be_read_is_refused(method, monkeypatch)
         resolve_mesh("/tmp/nowhere.obj")
 
 
-def test_a_format_that_needs_trimesh_says_so_where_it_is_not_installed(tmp_path, monkeypatch, capfd):
-    monkeypatch.setitem(sys.modules, "trimesh", None)
-    (tmp_path / "part.glb").write_bytes(b"glTF" + bytes(100))
-    assert "pip install trimesh" in one_line(capfd, rigid_proto, ["inspect", str(tmp_path / "part.glb")])
+def test_a_format_that_needs_a_package_says_so_where_it_is_not_installed(tmp_path, monkeypatch, capfd):
+    monkeypatch.setitem(sys.modules, "collada", None)
+    (tmp_path / "part.dae").write_bytes(b"<COLLADA/>")
+    assert "rigid_proto_ros[meshes]" in one_line(capfd, rigid_proto, ["inspect", str(tmp_path / "part.dae")])
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -47,7 +47,7 @@ UNREADABLE = [
     ("junk.stl", JUNK, "announces"),
     ("junk.ply", JUNK, "a .ply file"),
     ("junk.off", JUNK, "OFF"),
-    ("junk.glb", JUNK, "trimesh"),
+    ("junk.glb", JUNK, "the .glb file can't be read"),
     ("prose.obj", TEXT, "no faces"),
     ("prose.stl", TEXT, "announces"),
     ("prose.ply", TEXT, "a .ply file"),

@@ -202,6 +202,12 @@ def test_a_binary_stl_whose_header_speaks_of_solids_and_facets_is_binary(tmp_pat
     assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
 
 
+def test_a_binary_stl_of_no_announced_facets_or_two_bytes_too_many_is_its_facets(tmp_path):
+    for data in (stl(count=0), stl() + b"\r\n", stl(count=0) + b"\0\0"):
+        mesh = load(tmp_path, "a.stl", data)
+        assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
+
+
 def test_our_readers_agree_with_trimesh_on_files_it_writes(tmp_path, meshes):
     trimesh = pytest.importorskip("trimesh")
     mesh = load_mesh(str(meshes / "sword.obj"))

@@ -49,7 +49,6 @@ def write_gltf(folder, vertices: np.ndarray) -> None:
 
 @pytest.mark.parametrize("size", [1, 10**6])
 def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch, size):
-    pytest.importorskip("trimesh")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
     monkeypatch.setattr(reading, "CACHED_SIZE", size)
@@ -76,9 +75,6 @@ def dae(unit: str) -> bytes:
 
 
 def threemf(unit: str) -> bytes:
-    pytest.importorskip("trimesh")
-    pytest.importorskip("networkx")
-    pytest.importorskip("lxml")
     vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in CUBE_VERTICES)
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in CUBE_TRIANGLES)
     model = (

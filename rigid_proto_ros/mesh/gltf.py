@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""glTF 2.0 (.gltf, .glb), as the Khronos specification has it: the triangles of the default scene.
+
+Read besides the core: KHR_mesh_quantization, EXT_mesh_gpu_instancing, and KHR_draco_mesh_compression with DracoPy.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import MeshError
+from .assembly import Assembly
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_draco_mesh_compression")
+_LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_")
+"""Beginnings of the names of extensions that change no triangle."""
+
+
+def _chunks(data: bytes, name: str) -> tuple[dict, bytes]:
+    """The JSON object and the binary buffer of a file, .glb or .gltf."""
+    if data[:4] != b"glTF":
+        return json.loads(data), b""
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise MeshError(name, f"version {version} of glTF", "version 2")
+    if length > len(data):
+        raise MeshError(name, f"{len(data)} bytes, but the header announces {length}; the file may be truncated")
+    found: dict[bytes, bytes] = {}
+    position = 12
+    while position + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, position)
+        found.setdefault(kind, data[position + 8 : position + 8 + size])
+        position += 8 + size
+    return json.loads(found[b"JSON"]), found.get(b"BIN\0", b"")
+
+
+class _Document:
+    """A file's JSON object, and the numbers that its accessors stand for."""
+
+    def __init__(self, data: bytes, name: str, beside: Callable[[str], bytes], limit: int) -> None:
+        self.name = name
+        self.json, self._blob = _chunks(data, name)
+        self._beside = beside
+        self._limit = limit
+        self._buffers: dict[int, bytes] = {}
+
+    def item(self, kind: str, number: int) -> Any:
+        """Entry ``number`` of the file's list ``kind``."""
+        entries = self.json.get(kind, [])
+        if not 0 <= number < len(entries):
+            raise MeshError(self.name, f"it names {kind} {number}, but has only {len(entries)}")
+        return entries[number]
+
+    def view(self, number: int) -> bytes:
+        """The bytes of a buffer view."""
+        view = self.item("bufferViews", number)
+        index, start = view["buffer"], view.get("byteOffset", 0)
+        if index not in self._buffers:
+            buffer = self.item("buffers", index)
+            uri = buffer.get("uri")
+            if uri is None:
+                self._buffers[index] = self._blob
+            elif uri.startswith("data:"):
+                self._buffers[index] = base64.b64decode(uri.partition(",")[2])
+            else:
+                self._buffers[index] = self._beside(uri)
+        content = self._buffers[index]
+        if start < 0 or view["byteLength"] < 0 or start + view["byteLength"] > len(content):
+            raise MeshError(self.name, f"buffer {index} ends before bufferView {number}; the file may be truncated")
+        return content[start : start + view["byteLength"]]
+
+    def _rows(self, source: dict, kind: str, width: int, count: int) -> np.ndarray:
+        """Rows (count, width) of numbers of a type, from the byteOffset in the bufferView that ``source`` names."""
+        dtype = np.dtype(kind)
+        stride = self.item("bufferViews", source["bufferView"]).get("byteStride") or dtype.itemsize * width
+        content, start = self.view(source["bufferView"]), source.get("byteOffset", 0)
+        if count and (start < 0 or start + stride * (count - 1) + dtype.itemsize * width > len(content)):
+            raise MeshError(self.name, f"an accessor reads beyond bufferView {source['bufferView']}")
+        if not count:
+            return np.empty((0, width), dtype)
+        return np.ndarray((count, width), dtype, content, start, (stride, dtype.itemsize))
+
+    def numbers(self, accessor_number: int) -> np.ndarray:
+        """The rows (n, k) of an accessor, normalized integers as fractions."""
+        accessor = self.item("accessors", accessor_number)
+        kind, width, count = _TYPES[accessor["componentType"]], _WIDTHS[accessor["type"]], accessor["count"]
+        if not 0 <= count <= self._limit:
+            raise MeshError(self.name, f"an accessor of {count} entries; --max-triangles raises the limit")
+        if "bufferView" in accessor:
+            rows = self._rows(accessor, kind, width, count).copy()
+        else:
+            rows = np.zeros((count, width), kind)
+        if "sparse" in accessor:
+            sparse = accessor["sparse"]
+            places, values = sparse["indices"], sparse["values"]
+            where = self._rows(places, _TYPES[places["componentType"]], 1, sparse["count"])[:, 0]
+            rows[where] = self._rows(values, kind, width, sparse["count"])
+        if accessor.get("normalized") and rows.dtype.kind != "f":
+            return np.maximum(rows.astype(np.float64) / np.iinfo(rows.dtype).max, -1.0)
+        return rows
+
+
+def _check_extensions(document: _Document) -> None:
+    """Refuse an extension that the file requires and that isn't read here."""
+    for extension in document.json.get("extensionsRequired", []):
+        if extension not in _READ and not extension.startswith(_LOOKS):
+            raise MeshError(document.name, f"it requires the extension {extension}", f"a file with {', '.join(_READ)}")
+
+
+def _rotation(xyzw: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) of a quaternion."""
+    x, y, z, w = np.asarray(xyzw, dtype=np.float64) / np.sqrt(np.sum(np.square(xyzw, dtype=np.float64)))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _placement(translation: Any, rotation: Any, scale: Any) -> np.ndarray:
+    """The matrix (4, 4) that scales, then turns, then shifts."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = _rotation(rotation) * np.asarray(scale, dtype=np.float64)
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def _node_matrix(node: dict) -> np.ndarray:
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    rotation, scale = node.get("rotation", (0, 0, 0, 1)), node.get("scale", (1, 1, 1))
+    return _placement(node.get("translation", (0, 0, 0)), rotation, scale)
+
+
+def _instances(document: _Document, node: dict) -> list[np.ndarray]:
+    """Where EXT_mesh_gpu_instancing puts copies of the node's mesh, seen from the node; else one unit matrix."""
+    instancing = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
+    if instancing is None:
+        return [np.eye(4)]
+    given = {name: document.numbers(number) for name, number in instancing["attributes"].items()}
+    rows = []
+    for k in range(min((len(values) for values in given.values()), default=0)):
+        translation = given["TRANSLATION"][k] if "TRANSLATION" in given else (0, 0, 0)
+        rotation = given["ROTATION"][k] if "ROTATION" in given else (0, 0, 0, 1)
+        rows.append(_placement(translation, rotation, given["SCALE"][k] if "SCALE" in given else (1, 1, 1)))
+    return rows
+
+
+def _draco(document: _Document, extension: dict) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        import DracoPy
+    except ImportError:
+        wanted = "DracoPy installed (pip install DracoPy), or the file exported without compression"
+        raise MeshError(document.name, "its meshes are compressed with Draco", wanted) from None
+    mesh = DracoPy.decode(document.view(extension["bufferView"]))
+    return np.asarray(mesh.points, dtype=np.float64).reshape(-1, 3), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and triangles (m, 3) of a primitive; none of points and lines."""
+    mode = primitive.get("mode", TRIANGLES)
+    if mode < TRIANGLES:
+        return np.empty((0, 3)), np.empty((0, 3), np.int64)
+    position = primitive["attributes"]["POSITION"]
+    draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
+    if draco is not None and "bufferView" not in document.item("accessors", position):
+        return _draco(document, draco)
+    vertices = document.numbers(position)
+    if "indices" in primitive:
+        corners = document.numbers(primitive["indices"])[:, 0].astype(np.int64)
+    else:
+        corners = np.arange(len(vertices))
+    if mode == TRIANGLES:
+        if len(corners) % 3:
+            raise MeshError(document.name, f"{len(corners)} corners of triangles, which is no multiple of 3")
+        return vertices, corners.reshape(-1, 3)
+    if mode == STRIP:
+        triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+        triangles[1::2] = triangles[1::2, [1, 0, 2]]
+        return vertices, triangles
+    if mode == FAN:
+        return vertices, np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1)
+    raise MeshError(document.name, f"a primitive of mode {mode}", "modes 0 to 6")
+
+
+def _add_node(document: _Document, number: int, above: np.ndarray, seen: set[int], assembly: Assembly) -> None:
+    """The meshes of a node and of those below it."""
+    if number in seen:
+        raise MeshError(document.name, f"node {number} occurs twice in the scene; its nodes must be a tree")
+    seen.add(number)
+    node = document.item("nodes", number)
+    matrix = above @ _node_matrix(node)
+    if "mesh" in node:
+        mesh = document.item("meshes", node["mesh"])
+        if "skin" in node:
+            raise MeshError(document.name, f"mesh {node['mesh']} is deformed by a skin; apply it before the export")
+        if any(node.get("weights", mesh.get("weights", []))):
+            raise MeshError(document.name, f"mesh {node['mesh']} is morphed; apply the targets before the export")
+        for k, primitive in enumerate(mesh["primitives"]):
+            vertices, triangles = _triangles(document, primitive)
+            for instance in _instances(document, node):
+                assembly.add(vertices, triangles, matrix @ instance, f"primitive {k} of mesh {node['mesh']}")
+    for child in node.get("children", []):
+        _add_node(document, child, matrix, seen, assembly)
+
+
+def add_gltf(data: bytes, beside: Callable[[str], bytes], assembly: Assembly) -> None:
+    """Add the meshes in the default scene of a file's bytes, or of all its nodes where it has no scene.
+
+    ``beside`` gives the bytes of the file that a buffer's URI names. Raises MeshError, or other errors where the file
+    isn't built as glTF says.
+    """
+    document = _Document(data, assembly.name, beside, 3 * assembly.max_triangles + 3)
+    _check_extensions(document)
+    if document.json.get("scenes"):
+        roots = document.item("scenes", document.json.get("scene", 0)).get("nodes", [])
+    else:
+        nodes = document.json.get("nodes", [])
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = [number for number in range(len(nodes)) if number not in children]
+    seen: set[int] = set()
+    for root in roots:
+        _add_node(document, root, np.eye(4), seen, assembly)

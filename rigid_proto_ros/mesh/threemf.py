@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""3D Manufacturing Format (.3mf), core specification 1.3 with the production extension: what is to be built."""
+
+from __future__ import annotations
+
+import io
+import xml.etree.ElementTree as ElementTree
+import zipfile
+
+import numpy as np
+
+from ..base.errors import MeshError
+from .assembly import Assembly
+
+UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
+SUPPORTS = ("support", "solidsupport")
+"""Types of objects that hold a part while it is printed and are no part of it."""
+MAX_PLACES = 100_000
+"""Times that objects are placed, within each other too; a file that goes beyond is refused."""
+_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+_READ = (_CORE, _PRODUCTION, "http://schemas.microsoft.com/3dmanufacturing/material/2015/02")
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return element.tag.rpartition("}")[2]
+
+
+def _matrix(text: str | None) -> np.ndarray:
+    """The matrix (4, 4) of a transform's twelve numbers, which multiply rows from the right."""
+    matrix = np.eye(4)
+    if text is not None:
+        rows = np.array([float(word) for word in text.split()]).reshape(4, 3)
+        matrix[:3] = rows.T
+    return matrix
+
+
+class _Package:
+    """The model files of an archive and their objects."""
+
+    def __init__(self, archive: zipfile.ZipFile, assembly: Assembly) -> None:
+        self._archive = archive
+        self._assembly = assembly
+        self._names = {f"/{name.lower().lstrip('/')}": name for name in archive.namelist()}
+        self._models: dict[str, tuple[ElementTree.Element, dict[str, ElementTree.Element]]] = {}
+        self._places = 0
+
+    def refusal(self, reason: str, accepted: str = "") -> MeshError:
+        """The error that names the file."""
+        return MeshError(self._assembly.name, reason, accepted)
+
+    def root(self) -> str:
+        """Path of the file that holds what is to be built."""
+        if "/_rels/.rels" in self._names:
+            for relation in ElementTree.fromstring(self._archive.read(self._names["/_rels/.rels"])):
+                if relation.get("Type", "").endswith("/3dmodel"):
+                    return "/" + relation.get("Target", "").lstrip("/")
+        models = [name for name in self._names if name.endswith(".model")]
+        if len(models) != 1:
+            raise self.refusal(f"{len(models)} files .model and no relation that says which one is to be built")
+        return models[0]
+
+    def model(self, path: str) -> tuple[ElementTree.Element, dict[str, ElementTree.Element]]:
+        """The root element of a model file and its objects by their ids."""
+        if path not in self._models:
+            name = self._names.get(path.lower())
+            if name is None:
+                raise self.refusal(f"it names the model file {path!r}, which isn't in it")
+            parser = ElementTree.iterparse(io.BytesIO(self._archive.read(name)), events=("start-ns",))
+            prefixes = dict(names for _, names in parser)
+            model = parser.root  # type: ignore[attr-defined]  # set once the file is read
+            for prefix in model.get("requiredextensions", "").split():
+                if prefixes.get(prefix) not in _READ:
+                    raise self.refusal(f"it requires the extension {prefixes.get(prefix, prefix)}")
+            objects = {part.get("id", ""): part for part in model.iter(f"{{{_CORE}}}object")}
+            self._models[path] = model, objects
+        return self._models[path]
+
+    def unit(self, path: str) -> float:
+        """Metres in the unit of a model file."""
+        unit = self.model(path)[0].get("unit", "millimeter")
+        if unit not in UNITS:
+            raise self.refusal(f"unit {unit}", f"a file in one of {', '.join(UNITS)}")
+        return UNITS[unit]
+
+    def place(self, reference: ElementTree.Element, path: str, above: np.ndarray, depth: int) -> None:
+        """Add the object that an item or component of the file ``path`` names."""
+        self._places += 1
+        if self._places > MAX_PLACES or depth > 100:
+            raise self.refusal(f"its components place objects more than {MAX_PLACES} times, or within themselves")
+        target = reference.get(f"{{{_PRODUCTION}}}path", path)
+        number = reference.get("objectid", "")
+        found = self.model(target)[1].get(number)
+        if found is None:
+            raise self.refusal(f"it places object {number!r}, which isn't in {target}")
+        if found.get("type") in SUPPORTS:
+            return
+        matrix = above @ _matrix(reference.get("transform"))
+        for child in found:
+            if _tag(child) == "mesh":
+                ratio = self.unit(target) / self.unit(self.root()) if target != path else 1.0
+                self._assembly.add(*self._mesh(child), matrix @ np.diag([ratio, ratio, ratio, 1.0]), f"object {number}")
+            elif _tag(child) == "components":
+                for component in child:
+                    self.place(component, target, matrix, depth + 1)
+            elif _tag(child) != "metadatagroup":
+                raise self.refusal(f"object {number} is made of {_tag(child)}", "objects of mesh and components")
+
+    def _mesh(self, mesh: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (n, 3) and triangles (m, 3) of a mesh element."""
+        vertices, triangles = [], []
+        for child in mesh:
+            if _tag(child) == "vertices":
+                vertices += [[float(vertex.attrib[axis]) for axis in "xyz"] for vertex in child]
+            elif _tag(child) == "triangles":
+                triangles += [[int(triangle.attrib[corner]) for corner in ("v1", "v2", "v3")] for triangle in child]
+            elif _tag(child) != "trianglesets":
+                raise self.refusal(f"a mesh with {_tag(child)}", "meshes of vertices and triangles")
+        return np.array(vertices).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def add_threemf(data: bytes, assembly: Assembly) -> float:
+    """Add the items to be built by a file's bytes, in its unit, but for supports; returns the metres in that unit.
+
+    Raises MeshError, or other errors where the file isn't built as the specification says.
+    """
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        package = _Package(archive, assembly)
+        root = package.root()
+        unit = package.unit(root)
+        build = package.model(root)[0].find(f"{{{_CORE}}}build")
+        for item in build if build is not None else ():
+            package.place(item, root, np.eye(4), 0)
+    return unit
