@@ -84,6 +84,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fallback", choices=FALLBACKS[1:], default="", help="fallback shape for a mesh that encloses no volume"
     )
+    parser.add_argument(
+        "--accept-open", type=float, default=0.0, metavar="B",
+        help="close holes with flat caps where whatever closes them changes volume and tensor by at most that part "
+        "of themselves (0.01: 1 %%); also of a robot's meshes",
+    )  # fmt: skip
     parser.add_argument("--max-triangles", type=int, default=MAX_TRIANGLES, metavar="N", help="refuse larger meshes")
     parser.add_argument(
         "--verify", action="store_true", help="compare with exact rational arithmetic (exit 1 above 1e-13)"
@@ -205,7 +210,7 @@ def _inspection(args: argparse.Namespace, name: str, scale: list[float], mass: f
     with Progress(f"reading {name}", path.stat().st_size > LARGE_FILE):
         mesh = load_mesh(name, max_triangles=args.max_triangles)
     with Progress(f"examining {len(mesh.triangles)} triangles", len(mesh.triangles) > LARGE_MESH):
-        body = mesh_body(mesh, repair=args.repair, fallback=args.fallback)
+        body = mesh_body(mesh, repair=args.repair, fallback=args.fallback, accept_open=args.accept_open)
         return inspect_mesh(body, model=args.model, scale=scale, mass=mass, density=density, ballast=args.ballast)
 
 

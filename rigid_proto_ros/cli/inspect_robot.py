@@ -143,8 +143,8 @@ def lump(args: argparse.Namespace) -> int:
     from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
     from ..robots.composite_inertia import lump_robot
 
-    for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback"):
-        if getattr(args, flag):
+    for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback", "accept-open"):
+        if getattr(args, flag.replace("-", "_")):
             raise InputError(f"--{flag}", "can't be used with --lump, which takes the robot's own inertials")
     whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path), tuple(args.xacro))
     written = _write_scene(whole, args.as_scene) if args.as_scene else ()
@@ -234,6 +234,7 @@ def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
         density.everywhere or 0.0,
         args.repair,
         args.fallback,
+        args.accept_open,
         args.max_triangles,
         tuple(args.package_path),
         mass.by_link,

@@ -17,7 +17,7 @@ from ..mesh.reading import Mesh, load_mesh
 from ..mesh.union import can_unite
 from .moments import Moments, referenced_vertices
 from .properties import MeshMoments
-from .repair import CRACK, repair_surface, unite_components, weld_cracks
+from .repair import CRACK, close_surface, repair_surface, unite_components, weld_cracks
 from .verdict import INFO, NESTED, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, check_surface
 
 UNION = "union"
@@ -47,18 +47,19 @@ class MeshBody:
         return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles
 
 
-def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "") -> MeshBody:
+def mesh_body(
+    mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "", accept_open: float = 0.0
+) -> MeshBody:
     """The moments of a mesh (or of the one that a path, URI or bundled name stands for) with its verdict.
 
     A surface that bounds no solid is not refused here: asking its moments for the solid, or for a mass from a density,
     raises MeshError with the reason and the flags that help. ``repair`` welds, drops duplicates, orients (cavities stay
     cavities) and caps holes first; "union" then makes one solid of components that overlap or lie inside others;
-    ``fallback`` "hull" or "box" lets that shape stand in for what is still open.
+    ``accept_open`` then closes what is still open with flat caps where whatever closes it changes volume and tensor by
+    less than that part of themselves; ``fallback`` "hull" or "box" lets that shape stand in for what is open all the
+    same.
     """
-    if repair not in (False, True, UNION):
-        raise InputError("mesh_repair", repair, f"true, false, or {UNION}")
-    if fallback not in FALLBACKS:
-        raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
+    _check_options(repair, fallback, accept_open)
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
     checked = _checked(mesh)
@@ -79,9 +80,19 @@ def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "
         if done:
             verdict, _ = check_surface(vertices, triangles, polygon_starts)
             verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
+    effect = verdict.hole_effect
+    if not verdict.closed and effect is not None and effect <= accept_open:
+        triangles, polygon_starts = close_surface(vertices, triangles, polygon_starts)
+        reason = verdict.reason
+        verdict, _ = check_surface(vertices, triangles, polygon_starts)
+        message = f"closed with flat caps, on which at most {effect:.2g} of volume and tensor depend: {reason}"
+        verdict.findings.insert(0, Finding("open_accepted", WARNING, message))
+        known, remember = {}, None
     stand_in = None
-    if fallback and verdict.usable and not verdict.closed:
-        stand_in = _stand_in(vertices, triangles, fallback)
+    if verdict.united:
+        stand_in = "united", functools.cache(lambda: unite_components(vertices, triangles, None)[:2])
+    elif fallback and verdict.usable and not verdict.closed:
+        stand_in = fallback, functools.cache(lambda: _stand_in(vertices, triangles, fallback))
         shape = "convex hull" if fallback == "hull" else "bounding box"
         message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))
@@ -98,6 +109,15 @@ def mesh_body(mesh: Mesh | str, *, repair: bool | str = False, fallback: str = "
         remember=remember,
     )
     return MeshBody(mesh, verdict, moments)
+
+
+def _check_options(repair: bool | str, fallback: str, accept_open: float) -> None:
+    if repair not in (False, True, UNION):
+        raise InputError("mesh_repair", repair, f"true, false, or {UNION}")
+    if fallback not in FALLBACKS:
+        raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
+    if not 0.0 <= accept_open <= 1.0:
+        raise InputError("--accept-open", accept_open, "a number from 0 to 1: part of volume and tensor")
 
 
 def _wants_repair(verdict: Verdict) -> bool:

@@ -147,8 +147,7 @@ def verify_moments(
 ) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
-    moments.solid_raw()  # refuses what bounds no solid
-    vertices, triangles = moments.stand_in or (moments.vertices, moments.triangles)
+    vertices, triangles = moments.solid_surface()  # refuses what bounds no solid
     exact = exact_solid_moments(vertices, triangles, progress).outward().scaled(scale)
     unit = moments.mass_properties("solid", scale=scale, density=1.0)
     points = referenced_vertices(vertices, triangles) * scale

@@ -24,6 +24,8 @@ MODEL_COMS = ("model", "solid")
 be compared alone.
 """
 SCALE_LIMITS = (1e-9, 1e9)
+Surface = tuple[np.ndarray, np.ndarray]
+"""Vertices (n, 3) and triangles (m, 3)."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,8 @@ class MeshMoments:
 
     vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``no_solid``
     says why the surface bounds no solid and what helps, "" that it bounds one: the solid model, and a density, are then
-    refused with it, unless ``stand_in`` (vertices (k, 3), triangles (l, 3)) is given: that solid is then taken instead.
+    refused with it. ``stand_in`` is another solid's name and what makes its vertices (k, 3) and triangles (l, 3): it is
+    then taken instead, for a surface that bounds none or whose parts overlap.
     A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed
     earlier, by model; ``remember`` is called with all of them whenever another one has been computed.
     """
@@ -92,7 +95,7 @@ class MeshMoments:
         *,
         no_solid: str = "",
         name: str = "mesh",
-        stand_in: tuple[np.ndarray, np.ndarray] | None = None,
+        stand_in: tuple[str, Callable[[], Surface]] | None = None,
         known: dict[str, Moments] | None = None,
         remember: Callable[[dict[str, Moments]], None] | None = None,
     ) -> None:
@@ -112,12 +115,16 @@ class MeshMoments:
 
     def solid_raw(self) -> Moments:
         """The solid's signed moments as the file winds it; raises MeshError when the surface isn't closed."""
+        name = "solid" if self.stand_in is None else self.stand_in[0]
+        return self._get(name, lambda: solid_moments(*self.solid_surface()))
+
+    def solid_surface(self) -> Surface:
+        """Vertices and triangles of the solid's surface; raises MeshError when the mesh's isn't closed."""
         if self.stand_in is not None:
-            vertices, triangles = self.stand_in
-            return self._get(("stand-in",), lambda: solid_moments(vertices, triangles))
+            return self.stand_in[1]()
         if self.no_solid:
             raise MeshError(self.name, f"{self.no_solid}, or another model with --mass (mass)")
-        return self._get("solid", lambda: solid_moments(self.vertices, self.triangles))
+        return self.vertices, self.triangles
 
     def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:
         if key not in self._moments:

@@ -12,8 +12,9 @@ import numpy as np
 from ..base.compilation import njit
 from ..base.errors import MeshError
 from ..base.rotation import length, times
+from ..mesh.holes import fan, rims
 from ..mesh.nesting import component_nesting
-from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent
+from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent, surplus_copies
 from ..mesh.union import counted_once, united
 from .verdict import MAX_NESTED_COMPONENTS, counted
 
@@ -52,10 +53,9 @@ class RepairedSurface:
 
     def add_polygon(self, ring: list[int]) -> None:
         """Append a polygon, fanned from its first corner."""
-        fan = np.array([[ring[0], ring[k], ring[k + 1]] for k in range(1, len(ring) - 1)], np.int64)
         if self.polygon_starts is None:
             self.polygon_starts = np.arange(len(self.triangles) + 1)
-        self.triangles = np.concatenate([self.triangles, fan])
+        self.triangles = np.concatenate([self.triangles, fan(ring)])
         self.polygon_starts = np.append(self.polygon_starts, len(self.triangles))
 
     def topology(self) -> Topology:
@@ -80,9 +80,10 @@ def repair_surface(
 def _drop_copies(surface: RepairedSurface) -> list[str]:
     topology = surface.topology()
     done = []
-    if topology.duplicates.any():
-        done.append(f"removed {counted(int(np.count_nonzero(topology.duplicates)), 'duplicate face')}")
-        surface.drop(topology.duplicates)
+    surplus = surplus_copies(topology)
+    if surplus.any():
+        done.append(f"removed {counted(int(np.count_nonzero(surplus)), 'duplicate face')}")
+        surface.drop(surplus)
         topology = surface.topology()
     if 2 * topology.opposites == len(surface.triangles):
         # Every face lies there both ways round: a surface made visible from both sides.
@@ -240,39 +241,28 @@ def _orient(surface: RepairedSurface) -> list[str]:
     return [f"turned {counted(int(np.count_nonzero(turn)), 'face')} to agree with the neighbours"]
 
 
+def close_surface(
+    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Triangles and polygon starts with a cap over whatever keeps the surface open or its edges unbalanced."""
+    surface = RepairedSurface(vertices, triangles, polygon_starts)
+    edges = surface.topology().edges
+    for walk in rims(edges[edges[:, 2] != edges[:, 3]]):
+        surface.add_polygon(walk)
+    return surface.triangles, surface.polygon_starts
+
+
 def _cap_holes(surface: RepairedSurface) -> list[str]:
     """Close each rim with one polygon; rims that meet in a vertex are walked one after the other."""
     topology = surface.topology()
     rim = topology.boundary
     if not len(rim):
         return []
-    forward = rim[:, 2] == 1
-    # The cap runs against its neighbour's direction.
-    tails = np.where(forward, rim[:, 1], rim[:, 0]).tolist()
-    heads = np.where(forward, rim[:, 0], rim[:, 1]).tolist()
-    leaving: dict[int, list[int]] = {}
-    for tail, head in zip(tails, heads, strict=True):
-        leaving.setdefault(tail, []).append(head)
-    caps = 0
-    for start in tails:
-        while leaving.get(start):
-            ring, vertex = [], start
-            while leaving.get(vertex):
-                ring.append(vertex)
-                vertex = leaving[vertex].pop()
-                if vertex in ring and vertex != start:  # a loop hangs on the path: cap it by itself
-                    at = ring.index(vertex)
-                    if len(ring) - at >= 3:
-                        surface.add_polygon(ring[at:])
-                        caps += 1
-                    ring = ring[:at]
-                if vertex == start:
-                    break
-            if vertex == start and len(ring) >= 3:
-                surface.add_polygon(ring)
-                caps += 1
+    walks = rims(rim)
+    for walk in walks:
+        surface.add_polygon(walk)
     edges = "edge" if len(rim) == 1 else "edges"
-    return [f"capped {counted(caps, 'hole')} with {len(rim)} {edges}"] if caps else []
+    return [f"capped {counted(len(walks), 'hole')} with {len(rim)} {edges}"] if walks else []
 
 
 def _turn_outward(surface: RepairedSurface) -> list[str]:

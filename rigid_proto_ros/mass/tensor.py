@@ -147,7 +147,9 @@ def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tupl
         raise TensorError(source, (a, b, c), f"principal moments {why}")
     gap = (c - a - b) / c
     if gap > TRIANGLE_SLACK_GIVEN:
-        raise TensorError(source, (a, b, c), "principal moments A <= B <= C with A + B >= C (1 - 1e-5)")
+        accepted = "principal moments A <= B <= C with A + B >= C (1 - 1e-5), as every body has"
+        remedy = f"with these A and B, C is at most {a + b:.9g} kg m²: look for swapped entries and another unit"
+        raise TensorError(source, (a, b, c), f"{accepted}; {remedy}")
     if gap > TRIANGLE_SLACK_COMPUTED:
         return (f"{source}: A + B falls short of C by {gap:.1e} C (principal moments {a:.9g}, {b:.9g}, {c:.9g})",)
     return ()

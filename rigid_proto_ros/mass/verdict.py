@@ -3,15 +3,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..base.errors import MeshError
 from ..mesh.crossing import self_crossings
+from ..mesh.holes import fan, rims
 from ..mesh.nesting import Nesting, component_nesting
 from ..mesh.planarity import polygon_planarity
-from ..mesh.topology import Components, Topology, component_sums, joined_sets, mesh_topology, referenced_extent
+from ..mesh.topology import (
+    Components,
+    Topology,
+    component_sums,
+    mesh_topology,
+    referenced_extent,
+    surplus_copies,
+)
 from ..mesh.union import can_unite, counted_once, united_volume
 from .moments import solid_moments
 
@@ -32,6 +41,10 @@ NONPLANAR = 1e-9
 """Largest distance of a corner from its polygon's plane, over the mesh's diagonal, that counts as planar."""
 SIZE_RANGE = 1e-60, 1e60
 """Longest sides of surfaces that are judged: moments grow with the fifth power, and doubles end at 1e308."""
+SMALL_HOLES = 0.1
+"""Largest effect of holes that is said together with the option that accepts it."""
+MAX_RIM = 20_000
+"""Unbalanced edges up to which caps are tried; walking along more takes long."""
 LARGE_M, SMALL_M = 5.0, 1e-3
 """Longest sides [m] outside which another unit is suspected: few bodies that one pokes are longer, and every part of
 5 mm to 5 m drawn in millimetres is."""
@@ -53,7 +66,10 @@ class Finding:
 @dataclass
 class Verdict:
     """What was found. ``usable``: coordinates are finite, so that the other models have a meaning; ``closed``: the
-    surface bounds a solid; ``reason``: why not; ``inward``: it is wound inward throughout and is to be turned."""
+    surface bounds a solid; ``reason``: why not; ``inward``: it is wound inward throughout and is to be turned.
+    ``hole_effect``: by what part of itself the volume, or the tensor by that of its largest entry, changes at most by
+    what closes an open surface, None where that isn't known; ``united``: components overlap, and the solid is their
+    union."""
 
     findings: list[Finding] = field(default_factory=list)
     usable: bool = True
@@ -63,6 +79,8 @@ class Verdict:
     winding_consistent: bool = True
     inward: bool = False
     components: int = 0
+    hole_effect: float | None = None
+    united: bool = False
 
     def add(self, code: str, severity: str, message: str, remedy: str = "") -> None:
         """Append a finding; an error also closes the way to the solid, the first one giving the reason."""
@@ -109,27 +127,37 @@ def _check_edges(
     """Open, inconsistently wound, duplicated: each with what is known of the volume."""
     verdict.watertight = topology.watertight
     verdict.winding_consistent = topology.flipped == 0
-    copies = int(np.count_nonzero(topology.duplicates))
-    if copies:
-        message = f"{counted(copies, 'duplicate face')}, which would count twice"
+    surplus = int(np.count_nonzero(surplus_copies(topology)))
+    if surplus:
+        message = f"{counted(surplus, 'duplicate face')}, which would count twice"
         verdict.add("duplicate_faces", ERROR, message, "--repair (mesh_repair) removes the copies")
+    if topology.duplicates.any() and not surplus:
+        message = f"{counted(int(np.count_nonzero(topology.duplicates)), 'duplicate face')} that close the surface"
+        verdict.add("duplicate_faces", INFO, message)
+    caps = _caps(topology)
+    accepting = ""
+    if caps is not None:
+        verdict.hole_effect = _hole_effect(topology, vertices, caps)
+        if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
+            known_to = f"whatever closes it changes volume and tensor by at most {100.0 * verdict.hole_effect:.2g} %"
+            accepting = f"; {known_to}, which --accept-open {_rounded_up(verdict.hole_effect)} accepts"
     if topology.unbalanced and not topology.watertight:
         rim = len(topology.boundary)
         edges = counted(rim, "boundary edge")
         if topology.odd > rim:
             edges += f" and {counted(topology.odd - rim, 'edge')} of 3 or more faces"
         known = _known_volume(sums, half, "how holes are closed")
-        capped = _capped_volume(topology, sums, vertices)
-        if capped is not None:
-            known += f"; flat caps over the holes give {capped:.3g}"
+        if caps is not None:
+            known += f"; flat caps over the holes give {_capped_volume(sums, vertices, caps):.3g}"
         remedy = "--repair (mesh_repair) welds edges and caps holes"
-        verdict.add("open", ERROR, f"open surface with {edges}; {known}", remedy)
+        verdict.add("open", ERROR, f"open surface with {edges}; {known}{accepting}", remedy)
+        accepting = ""
     if topology.flipped:
         edges = f"{counted(topology.flipped, 'edge')} used twice in the same direction"
         known = _known_volume(sums, half, "how faces are turned")
         remedy = "--repair (mesh_repair) turns faces"
-        verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}; {known}", remedy)
-    if topology.nonmanifold and not topology.unbalanced and not copies:
+        verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}; {known}{accepting}", remedy)
+    if topology.nonmanifold and not topology.unbalanced and not surplus:
         message = f"{counted(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently"
         verdict.add("non_manifold", INFO, message)
     if topology.opposites:
@@ -153,22 +181,46 @@ def _known_volume(sums: Components, half: np.ndarray, choice: str) -> str:
     return f"volume ambiguous: {low} to {high}, depending on {choice}"
 
 
-def _capped_volume(topology: Topology, sums: Components, vertices: np.ndarray) -> float | None:
-    """The volume with a cap over each hole, from the rim to its middle; None where the rims aren't closed loops."""
-    rim = topology.boundary
-    forward = rim[:, 2] == 1
-    tails, heads = np.where(forward, rim[:, 0], rim[:, 1]), np.where(forward, rim[:, 1], rim[:, 0])
-    if topology.unbalanced != len(rim) or not np.array_equal(np.sort(tails), np.sort(heads)):
+def _caps(topology: Topology) -> np.ndarray | None:
+    """Triangles (k, 3) over welded vertices that close the surface; None where it is closed or its rims are long."""
+    unbalanced = topology.edges[topology.edges[:, 2] != topology.edges[:, 3]]
+    if not 0 < len(unbalanced) <= MAX_RIM:
         return None
-    numbers, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
-    tail, head = ends[: len(rim)], ends[len(rim) :]
-    hole = joined_sets(tail, head, len(numbers))
-    holes, hole = np.unique(hole, return_inverse=True)
-    points = vertices[numbers] - sums.middle
-    size = np.bincount(hole, minlength=len(holes))
-    centers = np.stack([np.bincount(hole, points[:, k], len(holes)) for k in range(3)], axis=1) / size[:, None]
-    a, b, c = points[head], points[tail], centers[hole[tail]]
+    return np.concatenate([fan(walk) for walk in rims(unbalanced)])
+
+
+def _capped_volume(sums: Components, vertices: np.ndarray, caps: np.ndarray) -> float:
+    a, b, c = (vertices[caps[:, k]] - sums.middle for k in range(3))
     return float(np.sum(sums.volume) + np.sum(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6.0)
+
+
+def _hole_effect(topology: Topology, vertices: np.ndarray, caps: np.ndarray) -> float | None:
+    """As ``Verdict.hole_effect``, of a surface that ``caps`` (k, 3) close: the largest that any surface over the holes
+    can do that has the caps' area and lies no farther from the centre of mass. None for one without a volume.
+
+    Seen from there, an element dA at the distance r adds at most r dA/3 to the volume, r² dA/4 to the first and r³ dA/5
+    to the second moments.
+    """
+    try:
+        moments = solid_moments(vertices, np.concatenate([topology.corners, caps]))
+    except MeshError:
+        return None
+    a, b, c = (vertices[caps[:, k]] - moments.centroid for k in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    reach = np.sqrt(np.max([np.sum(corner**2, axis=1) for corner in (a, b, c)], axis=0))
+    volume = abs(moments.measure)
+    added, first, second = (float(np.sum(areas * reach**k)) / (k + 2) for k in (1, 2, 3))
+    if not added < volume:
+        return None
+    xx, _, _, yy, _, zz = np.abs(moments.second)
+    shifted = first * first / (volume - added)
+    return max(added / volume, (second + shifted) / max(yy + zz, xx + zz, xx + yy))
+
+
+def _rounded_up(value: float) -> str:
+    """Two digits that are no less than ``value``."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 else 1e-12
+    return f"{step * math.ceil(value / step + 1e-9):.2g}"
 
 
 def _check_components(
@@ -192,6 +244,7 @@ def _check_components(
             closed = verdict.closed and not verdict.inward
             lie = topology.corners, topology.component, volume, nesting.depth
             whole = united_volume(vertices, *lie) if closed else None
+            verdict.united = whole is not None and abs(float(np.sum(volume))) > (1.0 + NO_OVERLAP) * whole > 0.0
             _check_overlap(verdict, len(nesting.crossing), float(np.sum(volume)), whole)
     if verdict.inward:
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
@@ -238,11 +291,12 @@ def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | N
         verdict.add(OVERLAPPING, WARNING, f"{overlap}; the volume that they share counts twice{measure}")
         return
     over = abs(volume) / whole - 1.0
-    if over < NO_OVERLAP:
+    if over <= NO_OVERLAP:
         verdict.add(OVERLAPPING, INFO, f"{overlap}, by less than {NO_OVERLAP:g} of the volume")
         return
-    counts = f"the volume that they share counts twice: it overcounts {100.0 * over:.3g} %"
-    verdict.add(OVERLAPPING, WARNING, f"{overlap}; {counts}", "--repair union makes one solid of them")
+    sum_of_parts = f"their volumes' sum of {abs(volume):.4g} would overcount {100.0 * over:.3g} %"
+    remedy = "--repair union (mesh_repair) makes one surface of them, too"
+    verdict.add(OVERLAPPING, WARNING, f"{overlap}; the solid is their union of {whole:.4g}: {sum_of_parts}", remedy)
 
 
 def _check_size(verdict: Verdict, side: float) -> None:

@@ -198,7 +198,10 @@ def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Co
 
     def beside(name: str) -> bytes:
         found = unquote(name)
-        content = read_bounded(path.parent / found, max_bytes, path.name, "a file that it takes its numbers from")
+        try:
+            content = read_bounded(path.parent / found, max_bytes, path.name, "a file with the mesh's numbers")
+        except InputError as error:
+            raise MeshError(error.field, error.received, error.accepted) from None
         files[found] = hashlib.sha256(content).hexdigest()
         return content
 

@@ -280,6 +280,33 @@ def _even_permutation(corners: np.ndarray) -> np.ndarray:
     return ((a < b) & (b < c)) | ((b < c) & (c < a)) | ((c < a) & (a < b))
 
 
+def surplus_copies(topology: Topology) -> np.ndarray:
+    """Which of the ``duplicates`` (m,) bool spoil the surface: without them its edges are balanced better, or what they
+    close by themselves is counted twice. The others it needs to be closed.
+
+    Copies that share an edge are taken or left together.
+    """
+    surplus = topology.duplicates.copy()
+    copies = np.nonzero(surplus)[0]
+    sides = topology.corners[copies][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    owner = np.repeat(np.arange(len(copies)), 3)
+    # The topology's edges are in the order of their lower, then their higher vertex.
+    span = int(topology.corners.max(initial=0)) + 1
+    known = topology.edges[:, 0].astype(np.int64) * span + topology.edges[:, 1]
+    edge = np.searchsorted(known, sides.min(axis=1) * span + sides.max(axis=1))
+    first = np.full(len(known), -1)
+    first[edge[::-1]] = owner[::-1]
+    patch = joined_sets(first[edge], owner, len(copies))
+    excess = topology.edges[:, 2].astype(np.int64) - topology.edges[:, 3]
+    pairs, number = np.unique(patch[owner] * len(known) + edge, return_inverse=True)
+    taken = np.bincount(number, np.where(sides[:, 0] < sides[:, 1], 1, -1), len(pairs))
+    of, excess = pairs // len(known), excess[pairs % len(known)]
+    change = np.bincount(of, np.abs(excess - taken) - np.abs(excess), len(copies))
+    loose = np.bincount(of, taken != 0, len(copies))
+    surplus[copies] = (change[patch] < 0) | (loose[patch] == 0)
+    return surplus
+
+
 @njit(cache=True, nogil=True)
 def _component_sums(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, reference: np.ndarray

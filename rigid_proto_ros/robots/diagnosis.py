@@ -105,6 +105,7 @@ class Options:
     density: float = 0.0
     repair: bool | str = False
     fallback: str = ""
+    accept_open: float = 0.0
     max_triangles: int = MAX_TRIANGLES
     folders: tuple[Path, ...] = ()
     masses: Mapping[str, float] = field(default_factory=dict)
@@ -233,7 +234,8 @@ class Robot:
 
     def _body(self, file: str) -> MeshBody:
         mesh = load_mesh(file, max_triangles=self.options.max_triangles, search=self.search)
-        return mesh_body(mesh, repair=self.options.repair, fallback=self.options.fallback)
+        options = self.options
+        return mesh_body(mesh, repair=options.repair, fallback=options.fallback, accept_open=options.accept_open)
 
     def parts(self, shapes: list[Shape]) -> LinkShapes:
         """The shapes with their meshes; raises InputError for one that can't be taken."""
@@ -317,7 +319,7 @@ def _by_mesh(robot: Robot, mesh: str, scale: np.ndarray | None, link_name: str |
     """The diagnosis of the one link that the mesh belongs to."""
     options = robot.options
     loaded = load_mesh(mesh, max_triangles=options.max_triangles)
-    body = mesh_body(loaded, repair=options.repair, fallback=options.fallback)
+    body = mesh_body(loaded, repair=options.repair, fallback=options.fallback, accept_open=options.accept_open)
     pairs = [pair for pair in robot.fitting(body) if link_name in (None, pair[0].link)]
     if not pairs:
         links = [link for link in robot.links if not link.problem and link_name in (None, link.link)]

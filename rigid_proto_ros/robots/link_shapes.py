@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..mass.from_mesh import MeshBody
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
-from ..mass.verdict import COUNTED_TWICE, WARNING
+from ..mass.verdict import COUNTED_TWICE, OVERLAPPING, WARNING
 from ..mesh.hull import box_surface, convex_hull
 from .reading import Shape
 
@@ -100,6 +100,7 @@ class LinkShapes:
             for body in bodies.values()
             for finding in body.verdict.findings
             if finding.code in COUNTED_TWICE and finding.severity == WARNING
+            if not (finding.code == OVERLAPPING and body.verdict.united)
         )
 
     @cached_property

@@ -11,6 +11,7 @@ from mesh_files import obj
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.inspection import verify_moments
 from rigid_proto_ros.mesh import union
 from rigid_proto_ros.mesh.reading import Mesh
 from rigid_proto_ros.mesh.union import counted_once
@@ -38,14 +39,16 @@ def message(made, code: str) -> str:
 @pytest.mark.parametrize(
     ("shift", "over"), [((0.5, 0.0, 0.0), "33.3 %"), ((0.5, 0.5, 0.0), "14.3 %"), ((0.9, 0.03, 0.02), "4.99 %")]
 )
-def test_an_overlap_is_measured_and_the_union_is_its_remedy(shift, over):
+def test_the_solid_of_parts_that_overlap_is_their_union_and_the_sum_is_told(shift, over):
     pytest.importorskip("manifold3d")
     two = together(box(), moved(box(), shift))
-    made = body(two)
-    assert volume(made) == pytest.approx(2.0, rel=1e-14)
-    assert f"overcounts {over}" in message(made, "overlapping_components")
+    made, once = body(two), 2.0 - np.prod(1.0 - np.array(shift))
+    assert volume(made) == pytest.approx(once, rel=1e-12)
+    assert f"sum of 2 would overcount {over}" in message(made, "overlapping_components")
+    assert len(made.triangles) == 24 and made.moments.moments("shell").measure == pytest.approx(12.0)
+    assert max(verify_moments(made, np.ones(3)).values()) <= 1e-13
     whole = body(two, repair="union")
-    assert volume(whole) == pytest.approx(2.0 - np.prod(1.0 - np.array(shift)), rel=1e-12)
+    assert volume(whole) == pytest.approx(once, rel=1e-12)
     assert {finding.code for finding in whole.verdict.findings} <= {"repaired", "unreferenced_vertices"}
     # The vertices of the file keep their numbers.
     assert np.array_equal(whole.vertices[: len(two[0])], two[0])
@@ -162,7 +165,7 @@ def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
     from rigid_proto_ros.scene.script import read_script
 
     mesh, script, recording = tmp_path / "two.obj", tmp_path / "repair.yaml", tmp_path / "flight.rrd"
-    mesh.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (1.0, 0.3, 0.2)))))
+    mesh.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
     script.write_text("- {t: 0.1, set: {mesh_repair: union}}\n")
     settings = {"mesh": str(mesh), "initial.angular_velocity": [1.0, 2.0, 3.0], "density": 1000.0}
     arguments = [f"--set={name}={value}" for name, value in settings.items()]
@@ -180,6 +183,6 @@ def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
         places.append(row[:3] - matrix_from_quaternion(row[3:7]) @ body.center_of_mass)
     assert [len(drawn.triangles) for drawn in record.meshes] == [24, len(flight.simulation.setup.surface.triangles)]
     assert [drawn.mesh for drawn in record.bodies[-2:]] == [0, 1]
-    assert record.bodies[-1].body.mass == pytest.approx(8500.0)
+    assert record.bodies[-1].body.mass == pytest.approx(8000.0)
     assert np.abs(places[1] - places[0]).max() < 1e-8
     assert np.linalg.norm(record.bodies[-1].body.center_of_mass - record.bodies[-2].body.center_of_mass) > 0.01

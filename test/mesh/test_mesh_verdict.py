@@ -212,6 +212,58 @@ def test_repair_caps_flat_holes_exactly():
     assert solid_volume(few) == pytest.approx(6.0, rel=1e-15)
 
 
+def test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go():
+    vertices, triangles = BALL
+    there_and_back = np.concatenate([triangles, triangles[[3]], triangles[[3]][:, ::-1]])
+    made = body((vertices, there_and_back))
+    assert made.verdict.closed and codes(made)["duplicate_faces"] == "info"
+    assert solid_volume(made) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+    for more in (triangles[[3]], triangles[:7], triangles, np.concatenate([triangles[:7], triangles[[50]]])):
+        spoilt = vertices, np.concatenate([triangles, more])
+        assert codes(body(spoilt))["duplicate_faces"] == "error"
+        assert f"{len(more)} duplicate face" in body(spoilt).verdict.reason
+        repaired = body(spoilt, repair=True)
+        assert repaired.verdict.closed
+        assert solid_volume(repaired) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+
+
+@given(st.integers(0, 10**6), st.sampled_from([1, 2, 5]))
+@settings(max_examples=30, deadline=None)
+def test_whatever_closes_small_holes_changes_no_more_than_is_said(seed, holes):
+    rng = np.random.default_rng(seed)
+    vertices, triangles = sphere(16)
+    vertices = vertices * rng.uniform(0.3, 3.0, 3)
+    whole = body((vertices, triangles))
+    holed = vertices, np.delete(triangles, rng.choice(len(triangles), holes, replace=False), axis=0)
+    effect = body(holed).verdict.hole_effect
+    assert "--accept-open" in body(holed).verdict.reason
+    with pytest.raises(MeshError):
+        body(holed, accept_open=0.5 * effect).moments.moments("solid")
+    for surface in (holed, (vertices, np.delete(triangles, 7, axis=0)), (vertices, turned(triangles, [3, 9]))):
+        effect = body(surface).verdict.hole_effect
+        accepted = body(surface, accept_open=1.001 * effect)
+        assert codes(accepted)["open_accepted"] == "warning"
+        assert abs(solid_volume(accepted) / solid_volume(whole) - 1.0) <= effect
+        tensors = [made.moments.mass_properties(density=1.0).inertia for made in (accepted, whole)]
+        assert np.abs(tensors[0] - tensors[1]).max() <= effect * np.abs(tensors[1]).max()
+
+
+def turned(triangles: np.ndarray, numbers: list[int]) -> np.ndarray:
+    triangles = triangles.copy()
+    triangles[numbers] = triangles[numbers][:, ::-1]
+    return triangles
+
+
+def test_a_wide_opening_is_no_small_hole_even_where_its_cap_is_flat():
+    vertices, triangles = box((1.0, 1.0, 1.0), 4)
+    open_at_top = triangles[~np.all(vertices[triangles][:, :, 2] == 0.5, axis=1)]
+    made = body((vertices, open_at_top))
+    assert made.verdict.hole_effect is None or made.verdict.hole_effect > 0.2
+    assert "--accept-open" not in made.verdict.reason
+    with pytest.raises(InputError, match="from 0 to 1"):
+        body((vertices, open_at_top), accept_open=2.0)
+
+
 def test_what_cannot_be_repaired_stays_refused():
     made = body(moebius(), repair=True)
     assert "Moebius" in made.verdict.findings[0].message
