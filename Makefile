@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: help setup run up workbench test lint pictures build bench stress soak clean pins
+.PHONY: always help setup run up workbench test lint pictures build bench stress soak clean pins
 SHELL := /bin/bash
 # A make that a test starts has its own jobs.
 unexport MAKEFLAGS MFLAGS
@@ -20,7 +20,8 @@ help: ## this list
 
 setup: $(READY) ## .venv with all that run, up, test and lint need
 
-.venv/.pins-%: $(wildcard requirements/*) setup.py
+# Asked at every target: a clone may have been moved, or its Python have gone, since .venv was made.
+.venv/.pins-%: always
 	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
 	@python3 requirements/make_venv.py $*
 
@@ -59,7 +60,7 @@ build: setup ## colcon build into build/, install/ and log/; then: source instal
 bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU and versions
 	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -vE 'references|soak|clients'); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
 
-.venv-bench/.pins: $(READY) benchmarks/requirements.txt
+.venv-bench/.pins: benchmarks/requirements.txt $(wildcard requirements/*) | $(READY)
 	.venv/bin/python -m venv .venv-bench
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet -r requirements/base.txt $$(test -f requirements/ros.txt && echo -r requirements/ros.txt) -r benchmarks/requirements.txt
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .

@@ -24,7 +24,10 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 ROS_SETUP = VENV / ".ros"  # the setup.bash of the ROS installation, for targets of the Makefile
 OPT_ROS = Path("/opt/ros")
+COMPILE_KERNELS = ROOT / "requirements" / "compile_kernels.py"
 SUPPORTED = ((3, 11), (3, 14))
+MADE = VENV / ".made"  # written when an environment is whole: where, of which Python, and what it stands beside
+MADE_WORDS = ("it was made in {}", "it was made with Python {}", "it was made {}")
 STAGES = ("run", "workbench", "all")
 NEEDED_BYTES = {"run": 1.5e9, "workbench": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
 
@@ -260,28 +263,31 @@ def install_beside_ros(python, stage):
         install(python, "--no-deps", *pins()["rerun-sdk"])
 
 
-def is_whole(inner, version, shares):
-    """Whether .venv is an environment of this Python that pip works in, which it isn't when its making was interrupted."""
-    config = VENV / "pyvenv.cfg"
-    if not config.is_file() or ("include-system-site-packages = true" in config.read_text()) != shares:
-        return False
+def defect(inner, version, made):
+    """Why .venv can't be gone on with, in words; empty where it can. ``made`` is what its ``.made`` should say."""
+    if not MADE.is_file():
+        return "its making was interrupted, or it isn't of this Makefile"
+    found_made = MADE.read_text(encoding="utf-8").splitlines()
+    for number, words in enumerate(MADE_WORDS):
+        if found_made[number : number + 1] != [made[number]]:
+            return words.format((found_made[number : number + 1] or ["an unknown way"])[0])
     found = interpreter(str(inner))
-    return found is not None and found[1] == version and runs(str(inner), "import pip._internal.cli.main")
-
-
-def remove_what_no_flight_needs(python):
-    """The installer, and in packages their tests and the headers for those who compile against them: 100 MB."""
-    called(python, "-m", "pip", "--disable-pip-version-check", "uninstall", "--quiet", "--yes", "uv")
-    shutil.rmtree(str(VENV / "include"), ignore_errors=True)
-    for pattern in ("*/tests", "*/*/tests", "*/include"):
-        for folder in VENV.glob("lib/python3*/site-packages/" + pattern):
-            shutil.rmtree(str(folder), ignore_errors=True)
+    if found is None or found[1] != version:
+        return "its Python doesn't run any more"
+    return ""
 
 
 def compile_kernels(python):
     """Start compiling what the first flight needs, on two cores."""
-    script = ROOT / "requirements" / "compile_kernels.py"
-    return [(part, started(python, script, part)) for part in ("integrators", "flight")]
+    return [(part, started(python, COMPILE_KERNELS, part)) for part in ("integrators", "flight")]
+
+
+def await_kernels(progress, compiling):
+    """Wait for the parts of compile_kernels.py that were started."""
+    for part, process in compiling:
+        status, output = progress.wait(process)
+        if status:
+            stop("kernels ({}): {}".format(part, (output.strip().splitlines() or ["failed"])[-1]))
 
 
 def main(stage):
@@ -297,8 +303,12 @@ def main(stage):
     inputs = [*pinned, *sorted(folder.glob("*.in")), ROOT / "setup.py"]
     state = hashlib.sha256(described.encode() + b"".join(f.read_bytes() for f in inputs)).hexdigest()
     stamps = {name: VENV / (".pins-" + name) for name in STAGES}
-    if any(s.is_file() and s.read_text() == state for s in [stamps[n] for n in STAGES[STAGES.index(stage) :]]):
-        stamps[stage].write_text(state)
+    inner = VENV / "bin" / "python"
+    source = "beside the ROS installation's packages" if ros_installed else "with rclpy from PyPI"
+    made = (str(ROOT), "{}.{}".format(*version), source)
+    wrong = defect(inner, version, made) if VENV.is_dir() else "there is none"
+    enough = [stamps[name] for name in STAGES[STAGES.index(stage) :]]
+    if not wrong and any(stamp.is_file() and stamp.read_text() == state for stamp in enough):
         return
     if not runs(python, "import ensurepip, venv"):
         stop("python3-venv is missing; install it with: sudo apt install python{}.{}-venv".format(*version))
@@ -306,15 +316,17 @@ def main(stage):
     if not VENV.is_dir() and free < needed:
         stop("disk: got {:.1f} GB free in {}; accepted: {:.1f} GB or more".format(free / 1e9, ROOT, needed / 1e9))
     start = time.monotonic()
-    inner = VENV / "bin" / "python"
-    if not is_whole(inner, version, ros_installed):
-        source = "beside the ROS installation's packages" if ros_installed else "with rclpy from PyPI"
+    if wrong:
+        if VENV.is_dir():
+            print("making .venv anew: {}".format(wrong), flush=True)
         print("making .venv for {}, Python {}.{}, {}".format(stage, version[0], version[1], source), flush=True)
         options = ["--clear"] + (["--system-site-packages"] if ros_installed else [])
         status, output = called(python, "-m", "venv", *options, VENV)
         if status:
             stop("python -m venv: " + (output.strip().splitlines() or ["failed"])[-1])
-    for stamp in stamps.values():
+    else:
+        print("adding to .venv what {} needs".format("tests and lint" if stage == "all" else stage), flush=True)
+    for stamp in (MADE, *stamps.values()):
         if stamp.is_file():
             stamp.unlink()
     compiling = []
@@ -335,20 +347,20 @@ def main(stage):
         if not compiling:
             begin_compiling()
         progress = Progress("kernels, compiled once")
-        for part, process in compiling:
-            status, output = progress.wait(process)
-            if status:
-                stop("kernels ({}): {}".format(part, (output.strip().splitlines() or ["failed"])[-1]))
+        await_kernels(progress, compiling)
+        if stage != "run":
+            progress = Progress("kernels of all scenes, lessons and scripts, compiled once")
+            compiling.append(("scenes", started(inner, COMPILE_KERNELS, "scenes")))
+            await_kernels(progress, compiling[-1:])
     finally:
         for _, process in compiling:
             if process.poll() is None:
                 process.terminate()
-    if stage != "all":
-        remove_what_no_flight_needs(inner)
     if setup is not None:
         ROS_SETUP.write_text(str(setup), encoding="utf-8")
     elif ROS_SETUP.is_file():
         ROS_SETUP.unlink()
+    MADE.write_text("\n".join(made), encoding="utf-8")
     for name in STAGES[: STAGES.index(stage) + 1]:
         stamps[name].write_text(state)
     print("ready: {} in {:.0f} s".format(VENV, time.monotonic() - start), flush=True)
@@ -361,5 +373,5 @@ if __name__ == "__main__":
     try:
         main(asked)
     except KeyboardInterrupt:
-        print("\nmake setup: interrupted; the next make goes on from here", file=sys.stderr)
+        print("\nmake setup: interrupted; the next make begins anew", file=sys.stderr)
         sys.exit(130)

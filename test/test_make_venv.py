@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 
 import rigid_proto_ros
 
@@ -81,28 +82,34 @@ def test_a_ros_installation_is_found_by_its_distribution_or_where_it_is_the_only
     assert script.ros_setup() == tmp_path / "lyrical" / "setup.bash"
 
 
-def test_an_environment_whose_making_was_interrupted_is_made_anew(script: ModuleType, tmp_path: Path) -> None:
+def test_an_environment_that_is_not_whole_or_not_of_this_place_is_made_anew_and_the_reason_said(
+    script, tmp_path
+) -> None:
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
-    inner = tmp_path / "bin" / "python"
-    assert not script.is_whole(inner, sys.version_info[:2], False)
-    package = next(tmp_path.glob("lib/python3*/site-packages")) / "pip" / "_internal" / "cli"
-    package.mkdir(parents=True)
-    (package / "main.py").touch()
-    assert script.is_whole(inner, sys.version_info[:2], False)
-    assert not script.is_whole(inner, sys.version_info[:2], True) and not script.is_whole(inner, (3, 1), False)
+    inner, version = tmp_path / "bin" / "python", sys.version_info[:2]
+    here = (str(tmp_path), "{}.{}".format(*version), "with rclpy from PyPI")
+    script.MADE = tmp_path / ".made"
+    assert "interrupted" in script.defect(inner, version, here)
+    script.MADE.write_text("\n".join(here), "utf-8")
+    assert script.defect(inner, version, here) == ""
+    elsewhere = ("/elsewhere", *here[1:])
+    assert script.defect(inner, version, elsewhere) == f"it was made in {tmp_path}"
+    assert script.defect(inner, (3, 1), (here[0], "3.1", here[2])) == f"it was made with Python {here[1]}"
+    assert script.defect(inner, version, (*here[:2], "beside ROS")) == "it was made with rclpy from PyPI"
+    inner.unlink()
+    assert script.defect(inner, version, here) == "its Python doesn't run any more"
 
 
-def test_tests_and_headers_in_packages_go_and_nothing_else_does(script, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(script, "called", lambda *_: (0, ""))
-    site = tmp_path / "lib" / "python3.13" / "site-packages"
-    gone = [site / name for name in ("numpy/_core/tests", "numba/tests", "pyarrow/include")]
-    kept = [site / name for name in ("numpy/testing", "pyarrow/lib", "numpy/_core/include")]
-    for folder in [*gone, *kept]:
-        folder.mkdir(parents=True)
-        (folder / "file").touch()
-    script.remove_what_no_flight_needs("python")
-    assert not [folder for folder in gone if folder.exists()]
-    assert not [folder for folder in kept if not (folder / "file").is_file()]
+def test_the_set_up_compiles_what_every_scene_lesson_and_script_needs() -> None:
+    spec = importlib.util.spec_from_file_location("compile_kernels", SOURCE / "requirements" / "compile_kernels.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    flown = module.scenes_and_scripts()
+    assert {scene for scene, script in flown if script is None} == {p.stem for p in (SOURCE / "config").glob("*.yaml")}
+    scripts = [
+        p for p in (SOURCE / "msg_examples").glob("*.yaml") if isinstance(yaml.safe_load(p.read_text("utf-8")), list)
+    ]
+    assert {script for _, script in flown if script} == set(scripts) != set()
 
 
 def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
@@ -119,4 +126,4 @@ def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
         os.killpg(made.pid, signal.SIGINT)
         told = made.communicate(timeout=60)[1]
     assert made.returncode == 130
-    assert told.strip().splitlines() == ["make setup: interrupted; the next make goes on from here"]
+    assert told.strip().splitlines() == ["make setup: interrupted; the next make begins anew"]

@@ -16,7 +16,10 @@ import numpy as np
 from command_rig import RosClient
 from ros_process import RosProcess, descendants
 
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+CHROMIUM = os.environ.get("CHROMIUM", shutil.which("chromium") or shutil.which("chromium-browser")) or None
+"""The browser; ``CHROMIUM=`` hides the one that is installed."""
+
+NO_CHROMIUM = "there is no browser to drive: sudo apt install chromium"
 SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
 FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
 """For tests: without a graphics card, smooth edges and a page that WebGL puts together double the cost of a picture."""

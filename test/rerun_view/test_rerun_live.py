@@ -30,6 +30,8 @@ from rigid_proto_ros.simulation.observer import (
     Started,
 )
 
+pytestmark = pytest.mark.drawn
+
 MACHINE_TARGETS = ("egui_wgpu", "re_renderer::context", "re_perf_telemetry", "wgpu", "winit")
 """Parts of the viewer whose warnings are about the machine, such as drawing without a graphics card."""
 

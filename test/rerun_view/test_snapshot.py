@@ -18,6 +18,8 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
 
+pytestmark = pytest.mark.drawn
+
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from conftest import held_domain
 from ros_process import READY_S, RosProcess, descendants, running_node
-from workbench_page import CHROMIUM, FLAGS, SAID_S, Bench, Ear, Page, bare_page
+from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, SAID_S, Bench, Ear, Page, bare_page
 
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.scene.scene_file import read_scene_text
@@ -29,7 +29,7 @@ from rigid_proto_ros.workbench.side_by_side import START
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser to drive")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the PATH: no browser to drive")
+pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 
 UNIT = 0.5
 """[m] The picture's unit for the teapot, which is 0.32 m across."""

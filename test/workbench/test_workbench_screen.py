@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from workbench_page import CHROMIUM, FLAGS, PATIENCE_S
+from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, PATIENCE_S
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 pytest.importorskip("rclpy", reason="rclpy is not installed: no link to ROS")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser to drive")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the PATH: no browser to drive")
+pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 
 from test_workbench_without_browser import Desk, StandIn
 
