@@ -13,8 +13,7 @@ from ..base.files import output_file
 from ..base.progress import Progress
 
 if TYPE_CHECKING:
-    from ..export.flight_record import FlightRecord
-    from ..export.state_source import StateSource
+    from ..export.flight_record import FlightRecord, Source
 
 ENDINGS = {
     "csv": (".csv",),
@@ -31,14 +30,12 @@ HELP = {
     "usd": "write the motion, with mass properties, for Omniverse, Houdini and others that read USD",
 }
 
+ANIMATIONS = ("gltf", "usd")
+"""Files that ``--fps`` and ``--with`` are of."""
+
 PARTS = ("ghost", "string", "trail")
 
-FOR = {
-    "tolerance": ("gltf", "usd"),
-    "fps": ("gltf", "usd"),
-    "with": ("gltf", "usd"),
-}
-"""Options, and the files that they are of."""
+DEFAULT_FPS = 30.0
 
 
 def add_exports(parser: argparse.ArgumentParser) -> None:
@@ -46,20 +43,10 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("for other tools")
     for name, endings in ENDINGS.items():
         group.add_argument(f"--{name}", metavar=f"FILE{endings[0]}", help=HELP[name])
-    use = {name: f"with {' or '.join(f'--{file}' for file in files)}" for name, files in FOR.items()}
     group.add_argument(
-        "--tolerance",
-        type=float,
-        metavar="T",
-        help=f"{use['tolerance']}: key frames are off by at most T body sizes and 100 T degrees (default 1e-3)",
+        "--fps", type=float, metavar="N", help=f"with --gltf or --usd: frames a second (default {DEFAULT_FPS:g})"
     )
-    group.add_argument(
-        "--fps",
-        type=float,
-        metavar="N",
-        help=f"{use['fps']}: N evenly spaced key frames a second",
-    )
-    group.add_argument("--with", metavar="PART,..", help=f"{use['with']}: draw {', '.join(PARTS)} too")
+    group.add_argument("--with", metavar="PART,..", help=f"with --gltf or --usd: draw {', '.join(PARTS)} too")
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
@@ -74,7 +61,14 @@ def check_exports(args: argparse.Namespace) -> None:
         if not file.lower().endswith(ENDINGS[name]):
             raise InputError(f"--{name}", file, f"a file that ends in {' or '.join(ENDINGS[name])}")
         output_file(f"--{name}", file)
-    _check_numbers(args, files)
+    for option in ("fps", "with"):
+        if getattr(args, option) is not None and not set(ANIMATIONS) & set(files):
+            raise InputError(f"--{option}", "needs --gltf or --usd")
+    if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
+        raise InputError("--fps", args.fps, "frames a second, from 1e-3 to 1e5")
+    for part in _parts(args):
+        if part not in PARTS:
+            raise InputError("--with", part, one_of(part, PARTS))
     for name in files:
         _check_library(name)
 
@@ -95,29 +89,13 @@ def _check_library(name: str) -> None:
         check_usd()
 
 
-def _check_numbers(args: argparse.Namespace, files: dict[str, str]) -> None:
-    for option, of in FOR.items():
-        given = getattr(args, option)
-        if given is not None and not set(of) & set(files):
-            raise InputError(f"--{option}", f"needs {' or '.join(f'--{name}' for name in of)}")
-    if args.tolerance is not None and not (math.isfinite(args.tolerance) and 1e-9 <= args.tolerance <= 0.5):
-        raise InputError("--tolerance", args.tolerance, "a share of the body's size from 1e-9 to 0.5")
-    if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
-        raise InputError("--fps", args.fps, "pictures or keys a second, from 1e-3 to 1e5")
-    if args.fps is not None and args.tolerance is not None:
-        raise InputError("--tolerance", "can't be combined with --fps")
-    for part in _parts(args):
-        if part not in PARTS:
-            raise InputError("--with", part, one_of(part, PARTS))
-
-
 def _parts(args: argparse.Namespace) -> list[str]:
     parts = getattr(args, "with")
     return parts.split(",") if parts is not None else []
 
 
 def write_exports(
-    args: argparse.Namespace, record: FlightRecord, source: StateSource | None, say: Callable[[str], None]
+    args: argparse.Namespace, record: FlightRecord, source: Source | None, say: Callable[[str], None]
 ) -> None:
     """Write what is asked for, and ``say`` a line of each file; raises InputError."""
     files = asked(args)
@@ -141,24 +119,27 @@ def _write_animations(
     args: argparse.Namespace,
     files: dict[str, str],
     record: FlightRecord,
-    source: StateSource | None,
+    source: Source | None,
     say: Callable[[str], None],
 ) -> None:
-    from ..export.animation import animate
-    from ..export.gltf import write_gltf
-    from ..export.usd import write_usd
+    from ..export.flight_record import frames
+    from ..export.tracks import tracks_of
 
-    parts = _parts(args)
-    with Progress("choosing keys") as progress:
-        made = animate(record, source, args.tolerance or 1e-3, args.fps, parts, progress.fraction)
-    for name in ("gltf", "usd"):
+    fps = args.fps or DEFAULT_FPS
+    made, report = frames(record, source, fps)
+    tracks = tracks_of(made, _parts(args))
+    for name in ANIMATIONS:
         if name not in files:
             continue
-        report = list(made.report)
+        lines = [report]
         with Progress(f"writing {files[name]}"):
             if name == "gltf":
-                write_gltf(files[name], record, made, "trail" in parts)
+                from ..export.gltf import write_gltf
+
+                write_gltf(files[name], made, tracks)
             else:
-                report += write_usd(files[name], record, made, args.fps, "trail" in parts)
-        for line in report:
+                from ..export.usd import write_usd
+
+                lines += write_usd(files[name], made, tracks, fps)
+        for line in lines:
             say(f"{files[name]}: {line}")

@@ -158,8 +158,7 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
 
 
 def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
-    from ..export.flight_record import FlightRecord
-    from ..export.state_source import source_of_session
+    from ..export.flight_record import FlightRecord, source_of_session
     from ..session.playback import play
 
     session, record, given = runs[-1], FlightRecord(), given_scene(args.scene)

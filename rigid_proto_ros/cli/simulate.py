@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print_summary(result, recordings)
     if record is not None:
-        from ..export.state_source import source_of_scene
+        from ..export.flight_record import source_of_scene
 
         write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else line)
     if floor := flight.simulation.accuracy_floor:

@@ -7,7 +7,7 @@ for each mesh, moved so that the mesh lies about that centre as it does in the s
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,13 +15,13 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
+from ..picture import style
+from ..picture.backend import DrawnMesh
 from ..picture.string import POINTS
-from ..picture.style import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
-from .animation import Animation
-from .flight_record import DrawnBody, DrawnMesh, FlightRecord
-from .interpolation import Keys
-from .sampling import Motion, Track, body_size, single
-from .string_line import StringKeys
+from ..picture.style import Colour
+from ..simulation.observer import BodyChanged, BodySnapshot, GhostChanged
+from .flight_record import FlightRecord
+from .tracks import MeshSteps, Tracks
 
 if TYPE_CHECKING:
     import pygltflib
@@ -46,22 +46,23 @@ def check_gltf() -> None:
         raise InputError("--gltf", is_missing("pygltflib", "export")) from None
 
 
-@dataclass(frozen=True)
-class Step:
-    """What holds from ``seconds`` on: whether a node is shown, and how it lies."""
-
-    seconds: float
-    scale: np.ndarray
-    translation: np.ndarray
-
-
 @dataclass
 class Document:
-    """A file in the making."""
+    """A file in the making. start_ns: the simulated time [ns] at its second 0."""
 
     gltf: pygltflib.GLTF2
+    start_ns: int
     data: bytearray = field(default_factory=bytearray)
     inputs: dict[bytes, int] = field(default_factory=dict)
+
+    def seconds(self, times_ns: np.ndarray) -> np.ndarray:
+        """Times (n,) [s], in single precision and strictly ascending: of two that it doesn't tell apart the first,
+        which is before a change, goes to the number before.
+        """
+        seconds = (np.maximum(times_ns - self.start_ns, 0) * 1e-9).astype(np.float32)
+        for k in np.flatnonzero(seconds[:-1] >= seconds[1:])[::-1]:
+            seconds[k] = np.nextafter(seconds[k + 1], np.float32(-1.0))
+        return seconds
 
     def accessor(self, values: np.ndarray, target: int | None = None, bounds: bool = False) -> int:
         """The number of an accessor of these values (n,) or (n, c), as float32 or uint32."""
@@ -95,7 +96,7 @@ class Document:
             self.gltf.nodes[parent].children.append(number)
         return number
 
-    def material(self, name: str, colour: tuple[int, int, int], alpha: float = 1.0) -> int:
+    def material(self, name: str, colour: Colour, alpha: float = 1.0) -> int:
         """The number of a new material; colour: sRGB of 0 to 255."""
         import pygltflib
 
@@ -139,42 +140,34 @@ class Document:
         self.gltf.meshes.append(mesh)
         return len(self.gltf.meshes) - 1
 
-    def animate(self, node: int, path: str, keys: Keys, interpolation: str = "LINEAR") -> None:
-        """Play these keys at a node's ``translation``, ``rotation``, ``scale`` or ``weights``."""
+    def animate(
+        self, node: int, path: str, seconds: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR"
+    ) -> None:
+        """Play values (n, c) at seconds (n,) at a node's ``translation``, ``rotation``, ``scale`` or ``weights``."""
         import pygltflib
 
         animation = self.gltf.animations[0]
-        times = keys.times.astype(np.float32)
-        if times.tobytes() not in self.inputs:
-            self.inputs[times.tobytes()] = self.accessor(times, bounds=True)
-        values = keys.values
         if path == "rotation":
-            values = values / np.linalg.norm(values, axis=1, keepdims=True)
-        if path == "weights":
-            values = values.ravel()
-        sampler = pygltflib.AnimationSampler(
-            input=self.inputs[times.tobytes()], output=self.accessor(values), interpolation=interpolation
-        )
+            values = _unit(values)
+        key = seconds.tobytes()
+        if key not in self.inputs:
+            self.inputs[key] = self.accessor(seconds, bounds=True)
+        output = self.accessor(values.ravel() if path == "weights" else values)
+        sampler = pygltflib.AnimationSampler(input=self.inputs[key], output=output, interpolation=interpolation)
         target = pygltflib.AnimationChannelTarget(node=node, path=path)
         animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers), target=target))
         animation.samplers.append(sampler)
 
-    def animate_steps(self, node: int, steps: list[Step]) -> None:
-        """Give a node what holds from time to time; without an animation where that never changes."""
-        target = self.gltf.nodes[node]
-        target.scale, target.translation = steps[0].scale.tolist(), steps[0].translation.tolist()
-        times = np.array([step.seconds for step in steps])
-        for path in ("scale", "translation"):
-            values = np.array([getattr(step, path) for step in steps])
-            if np.ptp(values, axis=0).any():
-                self.animate(node, path, Keys(times, values), "STEP")
+    def animate_steps(self, node: int, seconds: np.ndarray, **values: np.ndarray) -> None:
+        """Give a node what holds from time to time, (n, 3) of a path; without an animation where that never changes."""
+        for path, own in values.items():
+            setattr(self.gltf.nodes[node], path, own[0].tolist())
+            if np.ptp(own, axis=0).any():
+                self.animate(node, path, seconds, own, "STEP")
 
 
-def write_gltf(file: str, record: FlightRecord, made: Animation, trail: bool = False) -> None:
-    """Write an animation: the body, the ghost and the string where it has them, and the centre of mass's path on
-    request.
-    """
-    motion, keys = made.motion, made.keys
+def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
+    """Write the body, and ghost, string and path of the centre of mass where the tracks have them."""
     check_gltf()
     import pygltflib
 
@@ -184,106 +177,97 @@ def write_gltf(file: str, record: FlightRecord, made: Animation, trail: bool = F
             scene=0,
             scenes=[pygltflib.Scene(name="flight", nodes=[0])],
             animations=[pygltflib.Animation(name="flight", channels=[], samplers=[])],
-        )
+        ),
+        int(record.times_ns[0]),
     )
     root = document.node("flight", None, rotation=Y_UP)
-    document.gltf.nodes[root].extras = {"first_time_s": motion.times_ns[0] * 1e-9}
-    surfaces = [_surface(document, mesh) for mesh in record.meshes]
-    styles = (("body", document.material("body", BODY_COLOUR)), ("ghost", -1))
-    for (name, material), track, pose in zip(styles, motion.tracks, keys, strict=False):
-        if name == "ghost":
-            material = document.material("ghost", GHOST_COLOUR, 0.45)
-        body = document.node(name, root)
-        document.gltf.nodes[body].extras = _mass_properties(track.bodies[0])
-        document.gltf.nodes[body].translation = pose.places.values[0].tolist()
-        document.gltf.nodes[body].rotation = _unit(pose.attitudes.values[0])
-        document.animate(body, "translation", pose.places)
-        document.animate(body, "rotation", pose.attitudes)
-        _draw_meshes(document, body, name, material, surfaces, record, motion, track)
-        _show_while_there(document, body, motion, track)
-    if made.string is not None:
-        _draw_string(document, root, made.string, STRING_WIDTH * body_size(record))
-    if trail and len(keys[0].places.times) > 1:
-        _draw_trail(document, root, keys[0].places.values)
+    document.gltf.nodes[root].extras = {"first_time_s": record.times_ns[0] * 1e-9}
+    surfaces: dict[int, tuple[dict[str, int], int]] = {}
+    for name, part, mesh, kind in (
+        ("body", style.BODY, style.BODY_MESH, BodyChanged),
+        ("ghost", style.GHOST, style.GHOST_MESH, GhostChanged),
+    ):
+        times_ns, positions, attitudes = tracks.poses(part)
+        if not len(times_ns):
+            continue
+        seconds = document.seconds(times_ns)
+        node = document.node(name, root, translation=positions[0].tolist(), rotation=_unit(attitudes[:1])[0].tolist())
+        document.gltf.nodes[node].extras = _mass_properties(record.bodies(kind)[0][1])
+        document.animate(node, "translation", seconds, positions)
+        document.animate(node, "rotation", seconds, attitudes)
+        _draw_meshes(document, node, name, tracks.meshes(mesh), style.STYLES[mesh], surfaces)
+        if times_ns[0] > record.times_ns[0]:
+            # A ghost that comes in flight is of no size before.
+            begins = np.array([0.0, seconds[0]], np.float32)
+            document.animate_steps(node, begins, scale=np.array([np.zeros(3), np.ones(3)]))
+    _draw_string(document, root, tracks.string, STRING_WIDTH * tracks.size)
+    if len(tracks.trail) > 1:
+        points = document.accessor(tracks.trail, VERTICES, bounds=True)
+        material = document.material("trail", style.TRAIL_COLOUR)
+        document.node("trail", root, mesh=document.mesh("trail", {"POSITION": points}, None, LINE_STRIP, material))
     _save(document, file)
 
 
-def _unit(attitude: np.ndarray) -> list[float]:
-    return (attitude / np.linalg.norm(attitude)).tolist()
-
-
-def _surface(document: Document, mesh: DrawnMesh) -> tuple[dict[str, int], int]:
-    places, corners, normals = mesh.surface
-    attributes = {
-        "POSITION": document.accessor(places, VERTICES, bounds=True),
-        "NORMAL": document.accessor(normals, VERTICES),
-    }
-    return attributes, document.accessor(corners.ravel(), INDICES)
+def _unit(attitudes: np.ndarray) -> np.ndarray:
+    return attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
 
 
 def _draw_meshes(
     document: Document,
     body: int,
     name: str,
-    material: int,
-    surfaces: list[tuple[dict[str, int], int]],
-    record: FlightRecord,
-    motion: Motion,
-    track: Track,
+    meshes: list[MeshSteps],
+    look: style.Style,
+    surfaces: dict[int, tuple[dict[str, int], int]],
 ) -> None:
     """A node for each mesh that the body is drawn as, below the body's."""
-    spans = motion.spans(track)
-    for number, (attributes, indices) in enumerate(surfaces):
-        if number not in {span.drawn.mesh for span in spans}:
-            continue
-        centre = record.meshes[number].centre
-        steps = []
-        for k, span in enumerate(spans):
-            scale, com = span.drawn.body.scale, span.drawn.body.center_of_mass
-            # Of the first span the time is the flight's start, whenever the body became what it is.
-            seconds = 0.0 if k == 0 else float(single(np.array([span.drawn.time_ns - motion.times_ns[0]]))[0])
-            drawn = scale if span.drawn.mesh == number else np.zeros(3)
-            steps.append(Step(seconds, drawn, scale * centre - com))
-        mesh = document.mesh(f"{name} mesh", attributes, indices, TRIANGLES, material)
-        label = f"{name} mesh" if number == 0 else f"{name} mesh {number + 1}"
-        document.animate_steps(document.node(label, body, mesh=mesh), steps)
-
-
-def _show_while_there(document: Document, node: int, motion: Motion, track: Track) -> None:
-    """A ghost that comes or goes in flight is of no size where there is none."""
-    if track.shown.all():
+    if not meshes:
         return
-    at = np.flatnonzero(np.diff(track.shown.astype(int), prepend=-1))
-    steps = [Step(motion.seconds[k], np.full(3, float(track.shown[k])), np.zeros(3)) for k in at]
-    times = np.array([step.seconds for step in steps])
-    document.animate(node, "scale", Keys(times, np.array([step.scale for step in steps])), "STEP")
+    material = document.material(name, look.colours[0], look.opacity)
+    for number, steps in enumerate(meshes, 1):
+        surface = steps.surface
+        if id(surface) not in surfaces:
+            surfaces[id(surface)] = _surface(document, surface)
+        mesh = document.mesh(f"{name} mesh", *surfaces[id(surface)], TRIANGLES, material)
+        node = document.node(f"{name} mesh" if number == 1 else f"{name} mesh {number}", body, mesh=mesh)
+        document.animate_steps(node, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
 
 
-def _mass_properties(drawn: DrawnBody) -> dict[str, Any]:
+def _surface(document: Document, surface: DrawnMesh) -> tuple[dict[str, int], int]:
+    attributes = {
+        "POSITION": document.accessor(surface.vertices, VERTICES, bounds=True),
+        "NORMAL": document.accessor(surface.normals, VERTICES),
+    }
+    return attributes, document.accessor(surface.triangles.ravel(), INDICES)
+
+
+def _mass_properties(body: BodySnapshot) -> dict[str, Any]:
     """Of the body at the start, for those who read a node's extras: SI units, the tensor about the centre of mass."""
-    known = asdict(drawn.body)
     return {
-        "mass": known["mass"],
-        "center_of_mass": known["center_of_mass"].tolist(),
-        "inertia": known["inertia"].tolist(),
-        "inertia_model": known["inertia_model"],
+        "mass": body.mass,
+        "center_of_mass": np.asarray(body.center_of_mass).tolist(),
+        "inertia": np.asarray(body.inertia).tolist(),
+        "inertia_model": body.inertia_model,
     }
 
 
-def _draw_trail(document: Document, root: int, places: np.ndarray) -> None:
-    material = document.material("trail", TRAIL_COLOUR)
-    points = document.accessor(places, VERTICES, bounds=True)
-    mesh = document.mesh("trail", {"POSITION": points}, None, LINE_STRIP, material)
-    document.node("trail", root, mesh=mesh)
-
-
-def _draw_string(document: Document, root: int, string: StringKeys, width: float) -> None:
+def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | None], width: float) -> None:
     """A node at the free end, whose mesh is bent and stretched by morph targets of weights from 0 to 1: from the least
     to the most of span and sag along each axis.
     """
-    low, high = string.forms.values.min(axis=0), string.forms.values.max(axis=0)
-    sags = bool(low[3:].any() or high[3:].any())
-    along = np.linspace(0.0, 1.0, POINTS if sags else 2)
+    strips = [own for own in string.values() if own is not None]
+    if not strips:
+        return
+    # Per tied frame: the free end, its way to the knot, and how far the middle hangs below the span's.
+    free, knots = np.array([own[0] for own in strips]), np.array([own[-1] for own in strips])
+    sags = [own[len(own) // 2] - 0.5 * (own[0] + own[-1]) if len(own) > 2 else np.zeros(3) for own in strips]
+    forms = np.hstack([knots - free, sags])
+    # Without a string it stays as it was, unseen.
+    tied = np.array([own is not None for own in string.values()])
+    known = np.clip(np.cumsum(tied) - 1, 0, None)
+    free, forms = free[known], forms[known]
+    low, high = forms.min(axis=0), forms.max(axis=0)
+    along = np.linspace(0.0, 1.0, POINTS if forms[:, 3:].any() else 2)
     shares = np.column_stack([along] * 3 + [4.0 * along * (1.0 - along)] * 3)
     around = _cross_sections()
     ways = np.vstack([np.eye(3), np.eye(3)])
@@ -301,14 +285,14 @@ def _draw_string(document: Document, root: int, string: StringKeys, width: float
         "NORMAL": document.accessor(np.tile(around, (len(along), 1)), VERTICES),
     }
     corners = document.accessor(_sides(len(along)).ravel(), INDICES)
-    material = document.material("string", STRING_COLOUR)
+    material = document.material("string", style.STRING_COLOUR)
     mesh = document.mesh("string", attributes, corners, TRIANGLES, material, targets)
     node = document.node("string", root, mesh=mesh)
-    document.animate(node, "translation", string.places)
-    document.animate(node, "scale", string.shown, "STEP")
+    seconds = document.seconds(np.array(list(string), np.int64))
+    document.animate(node, "translation", seconds, free)
+    document.animate_steps(node, seconds, scale=np.repeat(tied[:, np.newaxis], 3, axis=1).astype(float))
     if targets:
-        weights = (string.forms.values[:, moved] - low[moved]) / (high - low)[moved]
-        document.animate(node, "weights", Keys(string.forms.times, weights))
+        document.animate(node, "weights", seconds, (forms[:, moved] - low[moved]) / (high - low)[moved])
 
 
 def _cross_sections() -> np.ndarray:

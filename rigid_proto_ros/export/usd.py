@@ -7,6 +7,7 @@ tensor are the prim's own.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,21 +16,16 @@ from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
 from ..mass.tensor import principal_axes
-from ..picture.style import BODY_COLOUR, GHOST_COLOUR, STRING_COLOUR, TRAIL_COLOUR
-from ..simulation.observer import BodySnapshot
-from .animation import Animation
-from .flight_record import DrawnMesh, FlightRecord
-from .keys import PoseKeys
-from .sampling import Motion, Track, body_size, single
-from .string_line import SAG, StringKeys, string_points
+from ..picture import style
+from ..picture.backend import DrawnMesh
+from ..picture.style import Colour
+from ..simulation.observer import BodyChanged, BodySnapshot
+from .flight_record import FlightRecord
+from .tracks import MeshSteps, Tracks
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
 
-PLAYED_FPS = 60.0
-"""Time codes a second where none are asked for; samples lie wherever they are needed."""
-
-GHOST_OPACITY = 0.45
 TRAIL_WIDTH, STRING_WIDTH = 0.01, 0.012
 """Of the body's size."""
 
@@ -42,13 +38,10 @@ def check_usd() -> None:
         raise InputError("--usd", is_missing("usd-core", "export")) from None
 
 
-def write_usd(
-    file: str, record: FlightRecord, made: Animation, fps: float | None = None, trail: bool = False
-) -> list[str]:
-    """Write an animation: the body, the ghost and the string where it has them, and the centre of mass's path on
-    request. Returns what to say of it, a line each.
+def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> list[str]:
+    """Write the body, and ghost, string and path of the centre of mass where the tracks have them, at ``fps`` time
+    codes a second. Returns what to say of it, a line each.
     """
-    motion, keys, size = made.motion, made.keys, body_size(record)
     check_usd()
     from pxr import Usd, UsdGeom, UsdPhysics
 
@@ -56,24 +49,27 @@ def write_usd(
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
-    rate = fps or PLAYED_FPS
-    stage.SetTimeCodesPerSecond(rate)
-    stage.SetFramesPerSecond(rate)
+    stage.SetTimeCodesPerSecond(fps)
+    stage.SetFramesPerSecond(fps)
+    clock = _Clock(int(record.times_ns[0]), fps)
     stage.SetStartTimeCode(0.0)
-    stage.SetEndTimeCode(float(motion.seconds[-1]) * rate)
+    stage.SetEndTimeCode(clock.code(int(record.times_ns[-1])))
     root = UsdGeom.Xform.Define(stage, "/flight")
     stage.SetDefaultPrim(root.GetPrim())
-    styles = (("body", BODY_COLOUR, 1.0), ("ghost", GHOST_COLOUR, GHOST_OPACITY))
-    for (name, colour, opacity), track, pose in zip(styles, motion.tracks, keys, strict=False):
+    for name, part, mesh in (("body", style.BODY, style.BODY_MESH), ("ghost", style.GHOST, style.GHOST_MESH)):
+        times_ns, positions, attitudes = tracks.poses(part)
+        if not len(times_ns):
+            continue
         prim = UsdGeom.Xform.Define(stage, f"/flight/{name}")
-        _animate(prim, pose, rate)
-        _hide_while_away(prim, motion, track, rate)
-        _draw_meshes(stage, prim, (colour, opacity), record, motion, track, rate)
-    changes = _add_physics(stage, record, motion, rate)
-    if made.string is not None:
-        _draw_string(stage, made.string, rate, STRING_WIDTH * size)
-    if trail and len(keys[0].places.times) > 1:
-        _draw_trail(stage, keys[0].places.values, TRAIL_WIDTH * size)
+        _animate(prim, [clock.code(t) for t in times_ns.tolist()], positions, attitudes)
+        if times_ns[0] > record.times_ns[0]:
+            _show(prim, False, 0.0)
+            _show(prim, True, clock.code(int(times_ns[0])))
+        _draw_meshes(stage, prim, style.STYLES[mesh], tracks.meshes(mesh), clock)
+    changes = _add_physics(stage, record, clock)
+    _draw_string(stage, tracks.string, clock, STRING_WIDTH * tracks.size)
+    if len(tracks.trail) > 1:
+        _draw_trail(stage, tracks.trail, TRAIL_WIDTH * tracks.size)
     with whole_file("--usd", file) as path:
         # The library takes an empty file for a damaged one.
         path.unlink()
@@ -87,22 +83,27 @@ def write_usd(
     ]
 
 
-def _animate(prim: UsdGeom.Xform, pose: PoseKeys, rate: float) -> None:
+@dataclass(frozen=True)
+class _Clock:
+    """Time codes of simulated times; start_ns [ns] is that of code 0."""
+
+    start_ns: int
+    rate: float
+
+    def code(self, time_ns: int) -> float:
+        return max(0, time_ns - self.start_ns) * 1e-9 * self.rate
+
+
+def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, attitudes: np.ndarray) -> None:
     from pxr import Gf, UsdGeom
 
     place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
-    for t, at in zip(pose.places.times.tolist(), pose.places.values.tolist(), strict=True):
-        place.Set(Gf.Vec3d(*at), t * rate)
+    for code, at in zip(codes, positions.tolist(), strict=True):
+        place.Set(Gf.Vec3d(*at), code)
     attitude = prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
-    values = pose.attitudes.values / np.linalg.norm(pose.attitudes.values, axis=1, keepdims=True)
-    for t, (x, y, z, w) in zip(pose.attitudes.times.tolist(), values.tolist(), strict=True):
-        attitude.Set(Gf.Quatd(w, x, y, z), t * rate)
-
-
-def _hide_while_away(prim: UsdGeom.Xform, motion: Motion, track: Track, rate: float) -> None:
-    if not track.shown.all():
-        for k in np.flatnonzero(np.diff(track.shown.astype(int), prepend=-1)):
-            _show(prim, bool(track.shown[k]), motion.seconds[k] * rate)
+    values = attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
+    for code, (x, y, z, w) in zip(codes, values.tolist(), strict=True):
+        attitude.Set(Gf.Quatd(w, x, y, z), code)
 
 
 def _show(prim: UsdGeom.Imageable, shown: bool, time_code: float) -> None:
@@ -112,49 +113,42 @@ def _show(prim: UsdGeom.Imageable, shown: bool, time_code: float) -> None:
 
 
 def _draw_meshes(
-    stage: Usd.Stage,
-    body: UsdGeom.Xform,
-    look: tuple[tuple[int, int, int], float],
-    record: FlightRecord,
-    motion: Motion,
-    track: Track,
-    rate: float,
+    stage: Usd.Stage, body: UsdGeom.Xform, look: style.Style, meshes: list[MeshSteps], clock: _Clock
 ) -> None:
     """A prim for each mesh that the body is drawn as, below the body's; values that change do so from one instant to
     the next.
     """
     from pxr import Gf, UsdGeom
 
-    spans = motion.spans(track)
-    for number, mesh in enumerate(record.meshes):
-        if number not in {span.drawn.mesh for span in spans}:
-            continue
-        name = "mesh" if number == 0 else f"mesh_{number + 1}"
+    for number, steps in enumerate(meshes, 1):
+        name = "mesh" if number == 1 else f"mesh_{number}"
         prim = UsdGeom.Mesh.Define(stage, body.GetPath().AppendChild(name))
-        _fill(prim, mesh, look)
-        ops = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble), prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble)
-        before: tuple[Any, Any] | None = None
-        for k, span in enumerate(spans):
-            scale, com = span.drawn.body.scale, span.drawn.body.center_of_mass
-            values = Gf.Vec3d(*(scale * mesh.centre - com)), Gf.Vec3d(*scale)
-            seconds = 0.0 if k == 0 else float(single(np.array([span.drawn.time_ns - motion.times_ns[0]]))[0])
-            for n, op in enumerate(ops):
-                if len(spans) == 1:
-                    op.Set(values[n])
-                    continue
-                if before is not None:
-                    op.Set(before[n], float(np.nextafter(np.float32(seconds), np.float32(-1.0))) * rate)
-                op.Set(values[n], seconds * rate)
-            before = values
-            if len(spans) > 1:
-                _show(prim, span.drawn.mesh == number, seconds * rate)
+        _fill(prim, steps.surface, look)
+        seen = np.abs(steps.scales).max(axis=1) > 0.0
+        # Where it isn't drawn it has some scale of its own: one of 0 has no inverse.
+        scales = np.where(seen[:, np.newaxis], steps.scales, steps.scales[seen][0])
+        place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
+        size = prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble)
+        for op, values in ((place, steps.positions.tolist()), (size, scales.tolist())):
+            if len(values) == 1:
+                op.Set(Gf.Vec3d(*values[0]))
+                continue
+            for k, time_ns in enumerate(steps.times_ns.tolist()):
+                if k:
+                    op.Set(Gf.Vec3d(*values[k - 1]), clock.code(time_ns))
+                    op.Set(Gf.Vec3d(*values[k]), clock.code(time_ns + 1))
+                else:
+                    op.Set(Gf.Vec3d(*values[0]), 0.0)
+        if len(seen) > 1:
+            for k, time_ns in enumerate(steps.times_ns.tolist()):
+                _show(prim, bool(seen[k]), clock.code(time_ns + 1) if k else 0.0)
 
 
-def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int], float]) -> None:
+def _fill(prim: UsdGeom.Mesh, surface: DrawnMesh, look: style.Style) -> None:
     """The prim's surface, about the middle of its box."""
     from pxr import Gf, UsdGeom, Vt
 
-    points, triangles, normals = mesh.surface
+    points, triangles, normals = surface
     prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
     prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel().astype(np.int32)))
@@ -162,26 +156,26 @@ def _fill(prim: UsdGeom.Mesh, mesh: DrawnMesh, look: tuple[tuple[int, int, int],
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
-    colour, opacity = look
-    prim.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(colour) / 255.0).tolist())])
-    if opacity < 1.0:
-        prim.CreateDisplayOpacityAttr([opacity])
+    prim.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(look.colours[0]) / 255.0).tolist())])
+    if look.opacity < 1.0:
+        prim.CreateDisplayOpacityAttr([look.opacity])
 
 
-def _add_physics(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: float) -> int:
+def _add_physics(stage: Usd.Stage, record: FlightRecord, clock: _Clock) -> int:
     """The rigid body as it is at the start, with its velocities, and gravity: what a physics engine begins with. How
     often mass or tensor change in flight.
     """
     from pxr import Gf, UsdPhysics
 
-    body, row = record.bodies[0].body, record.rows[0]
+    (_, body), *_ = record.bodies(BodyChanged)
+    row = record.rows[0]
     prim = stage.GetPrimAtPath("/flight/body")
     rigid = UsdPhysics.RigidBodyAPI.Apply(prim)
     rigid.CreateVelocityAttr(Gf.Vec3f(*row[7:10].tolist()))
     spin = np.degrees(rotate(*row[3:7].tolist(), *row[10:13].tolist()))
     rigid.CreateAngularVelocityAttr(Gf.Vec3f(*spin.tolist()))
-    steps = _mass_steps(record, motion)
-    _add_mass(UsdPhysics.MassAPI.Apply(prim), steps, rate)
+    steps = _mass_steps(record)
+    _add_mass(UsdPhysics.MassAPI.Apply(prim), steps, clock)
     scene = UsdPhysics.Scene.Define(stage, "/flight/physics_scene")
     pull = float(np.linalg.norm(body.gravity))
     scene.CreateGravityMagnitudeAttr(pull)
@@ -189,20 +183,19 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord, motion: Motion, rate: f
     return len(steps) - 1
 
 
-def _mass_steps(record: FlightRecord, motion: Motion) -> list[tuple[float, BodySnapshot]]:
-    """The bodies whose mass or tensor is other than the one's before, and the times [s] from which they are."""
-    steps: list[tuple[float, BodySnapshot]] = []
-    for drawn in record.bodies:
-        seconds = max(0.0, float(single(np.array([drawn.time_ns - motion.times_ns[0]]))[0]))
-        if steps and steps[-1][0] == seconds:
+def _mass_steps(record: FlightRecord) -> list[tuple[int, BodySnapshot]]:
+    """The bodies whose mass or tensor is other than the one's before, and the times [ns] from which they are."""
+    steps: list[tuple[int, BodySnapshot]] = []
+    for time_ns, body in record.bodies(BodyChanged):
+        if steps and steps[-1][0] == time_ns:
             steps.pop()
         before = steps[-1][1] if steps else None
-        if before is None or before.mass != drawn.body.mass or not np.array_equal(before.inertia, drawn.body.inertia):
-            steps.append((seconds, drawn.body))
+        if before is None or before.mass != body.mass or not np.array_equal(before.inertia, body.inertia):
+            steps.append((time_ns, body))
     return steps
 
 
-def _add_mass(mass: Any, steps: list[tuple[float, BodySnapshot]], rate: float) -> None:
+def _add_mass(mass: Any, steps: list[tuple[int, BodySnapshot]], clock: _Clock) -> None:
     """Mass, centre of mass in the prim's space, principal moments [kg m²] and the attitude of their axes in it: by
     default those of the start, and time samples where they change, from one instant to the next.
     """
@@ -211,7 +204,7 @@ def _add_mass(mass: Any, steps: list[tuple[float, BodySnapshot]], rate: float) -
     mass.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
     attributes = mass.CreateMassAttr(), mass.CreateDiagonalInertiaAttr(), mass.CreatePrincipalAxesAttr()
     before: tuple[Any, ...] | None = None
-    for seconds, body in steps:
+    for time_ns, body in steps:
         moments, axes = principal_axes(body.inertia)
         x, y, z, w = quaternion_from_matrix(axes).tolist()
         values = body.mass, Gf.Vec3f(*moments.tolist()), Gf.Quatf(w, x, y, z)
@@ -219,40 +212,46 @@ def _add_mass(mass: Any, steps: list[tuple[float, BodySnapshot]], rate: float) -
             if before is None:
                 attribute.Set(values[n])
             else:
-                attribute.Set(before[n], float(np.nextafter(np.float32(seconds), np.float32(-1.0))) * rate)
+                attribute.Set(before[n], clock.code(time_ns))
             if len(steps) > 1:
-                attribute.Set(values[n], seconds * rate)
+                attribute.Set(values[n], 0.0 if before is None else clock.code(time_ns + 1))
         before = values
 
 
-def _draw_string(stage: Usd.Stage, string: StringKeys, rate: float, width: float) -> None:
+def _draw_string(stage: Usd.Stage, string: dict[int, np.ndarray | None], clock: _Clock, width: float) -> None:
     from pxr import Vt
 
-    times = np.union1d(string.places.times, string.forms.times)
-    shapes = string.played(times)
-    shown = string_points(shapes)
+    known = [own for own in string.values() if own is not None]
+    if not known:
+        return
     # Every sample needs as many points.
-    if not shapes[:, SAG].any():
-        shown = shown[:, [0, -1]]
-    curve = _line(stage, "/flight/string", shown.shape[1], STRING_COLOUR, width)
-    for seconds, seen in zip(string.shown.times.tolist(), string.shown.values[:, 0].tolist(), strict=True):
-        _show(curve, bool(seen), seconds * rate)
+    count = max(map(len, known))
+    curve = _line(stage, "/flight/string", count, style.STRING_COLOUR, width)
     points, extent = curve.CreatePointsAttr(), curve.CreateExtentAttr()
-    for seconds, now in zip(times.tolist(), shown.astype(np.float32), strict=True):
-        points.Set(Vt.Vec3fArray.FromNumpy(now), seconds * rate)
-        extent.Set(Vt.Vec3fArray.FromNumpy(_extent(now, width)), seconds * rate)
+    before = None
+    for time_ns, own in string.items():
+        code = clock.code(time_ns)
+        if before is None or before != (own is not None):
+            before = own is not None
+            _show(curve, before, code)
+        if own is None:
+            continue
+        if len(own) < count:
+            own = own[0] + np.linspace(0.0, 1.0, count)[:, np.newaxis] * (own[-1] - own[0])
+        points.Set(Vt.Vec3fArray.FromNumpy(own.astype(np.float32)), code)
+        extent.Set(Vt.Vec3fArray.FromNumpy(_extent(own.astype(np.float32), width)), code)
 
 
 def _draw_trail(stage: Usd.Stage, places: np.ndarray, width: float) -> None:
     from pxr import Vt
 
     points = places.astype(np.float32)
-    curve = _line(stage, "/flight/trail", len(points), TRAIL_COLOUR, width)
+    curve = _line(stage, "/flight/trail", len(points), style.TRAIL_COLOUR, width)
     curve.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(_extent(points, width)))
 
 
-def _line(stage: Usd.Stage, path: str, count: int, colour: tuple[int, int, int], width: float) -> UsdGeom.BasisCurves:
+def _line(stage: Usd.Stage, path: str, count: int, colour: Colour, width: float) -> UsdGeom.BasisCurves:
     from pxr import Gf, UsdGeom
 
     curve = UsdGeom.BasisCurves.Define(stage, path)

@@ -9,7 +9,19 @@ import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ..mass.tensor import equimomental_shapes, principal_axes
-from ..simulation.observer import BodySnapshot, ShownLoad, ShownString
+from ..simulation.observer import (
+    BodyChanged,
+    BodySnapshot,
+    Event,
+    GhostChanged,
+    LoadBegan,
+    LoadEnded,
+    MeshChanged,
+    ShownLoad,
+    ShownString,
+    Started,
+    StringChanged,
+)
 from ..simulation.quantities import attitude_angle
 from . import style
 from .arrows import ArrowScales, Loads
@@ -116,6 +128,24 @@ class Picture:
             self._poinsot.set_body(self.shape.moments, self.shape.axes)
 
     # What changes
+
+    def on(self, event: Event) -> None:
+        """Take an event of the flight; states are drawn in batches by ``draw``, so that they are none."""
+        match event:
+            case Started(time_ns=time_ns, vertices=vertices, triangles=triangles):
+                self.set_mesh(time_ns, vertices, triangles)
+            case MeshChanged(time_ns=time_ns, vertices=vertices, triangles=triangles):
+                self.set_mesh(time_ns, vertices, triangles)
+            case BodyChanged(time_ns, body):
+                self.set_body(time_ns, body)
+            case GhostChanged(time_ns, body):
+                self.set_ghost(time_ns, body)
+            case LoadBegan(time_ns, load_id, load):
+                self.load_began(time_ns, load_id, load)
+            case LoadEnded(time_ns, load_id):
+                self.load_ended(time_ns, load_id)
+            case StringChanged(time_ns, string):
+                self.set_string(time_ns, string)
 
     def set_mesh(self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
         """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); ``set_body`` follows."""
