@@ -277,6 +277,15 @@ def defect(inner, version, made):
     return ""
 
 
+def remove_what_no_flight_needs(python):
+    """The installer, and in packages their tests and the headers for those who compile against them: 100 MB."""
+    called(python, "-m", "pip", "--disable-pip-version-check", "uninstall", "--quiet", "--yes", "uv")
+    shutil.rmtree(str(VENV / "include"), ignore_errors=True)
+    for pattern in ("*/tests", "*/*/tests", "*/include"):
+        for folder in VENV.glob("lib/python3*/site-packages/" + pattern):
+            shutil.rmtree(str(folder), ignore_errors=True)
+
+
 def compile_kernels(python):
     """Start compiling what the first flight needs, on two cores."""
     return [(part, started(python, COMPILE_KERNELS, part)) for part in ("integrators", "flight")]
@@ -356,6 +365,8 @@ def main(stage):
         for _, process in compiling:
             if process.poll() is None:
                 process.terminate()
+    if stage != "all":
+        remove_what_no_flight_needs(inner)
     if setup is not None:
         ROS_SETUP.write_text(str(setup), encoding="utf-8")
     elif ROS_SETUP.is_file():
