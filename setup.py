@@ -24,6 +24,8 @@ ROS = [
     'ros-kilted-common-interfaces==5.5.1; python_version >= "3.14"',
 ]
 MCAP = ["mcap>=1.2,<2"]
+# Reads MJCF files.
+ROBOTS = ["mujoco>=3.3"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 # Motion for other tools: tables, glTF, USD.
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
@@ -82,9 +84,10 @@ setup(
     python_requires=">=3.11",
     install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", "msgspec>=0.19"],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
         "ros": ROS,
         "meshes": MESHES,
+        "robots": ROBOTS,
         "rerun": RERUN,
         "mcap": MCAP,
         "workbench": WORKBENCH,

@@ -54,6 +54,7 @@ ALLOWED = {
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "collada": ("mesh.collada",),
     "DracoPy": ("mesh.gltf",),
+    "mujoco": ("robots.mjcf",),
     "manifold3d": ("mesh.union", "bodies.surfaces"),
     "rerun": ("rerun_view",),
     "rerun_bindings": ("rerun_view",),

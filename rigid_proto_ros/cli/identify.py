@@ -213,10 +213,10 @@ def _inertials(path: Path) -> dict[str, Candidate]:
     from ..robots.reading import read_robot
 
     found = {}
-    for link in read_robot(path):
+    for link in read_robot(path).links:
         if not link.problem and link.mass > 0.0:
-            check_tensor(link.inertia, source=f"{path.name}, {link.link}")
-            found[f"{path.name}, {link.link}"] = Candidate(link.mass, link.inertia, fixes_mass=True)
+            check_tensor(link.inertia, source=f"{path.name}, {link.name}")
+            found[f"{path.name}, {link.name}"] = Candidate(link.mass, link.inertia, fixes_mass=True)
     if not found:
         raise InputError("--against", str(path), "a robot file with inertials")
     return found

@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..mass.properties import MassProperties
 from ..mass.tensor import six_from_tensor
 from .link_shapes import LinkShapes
-from .reading import Shape
+from .model import Shape
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -16,9 +15,9 @@ from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
-from .link_shapes import primitive_surface
-from .poses import Pose, link_poses
-from .reading import COLLISION, VISUAL, LinkInertial, Shape, links_of, robot_root
+from .link_shapes import Meshes, primitive_surface
+from .model import COLLISION, HERE, VISUAL, Link, Pose, Shape
+from .reading import read_robot
 
 
 @dataclass(frozen=True)
@@ -44,71 +43,66 @@ def lump_robot(
 
     Raises InputError for a file without inertials, for joints that it doesn't have, and for links that make no tree.
     """
-    root = robot_root(path, folders, xacro)
-    links = links_of(root, path)
-    if root.tag == "mujoco":
-        _require_inertials(root)
-    poses = link_poses(root, path, joints)
-    parents = {id(child): parent for parent in root.iter() for child in parent}
-    placed = [(link, poses.get(_link_id(link, parents))) for link in links]
-    reached = [(link, pose) for link, pose in placed if pose is not None]
-    if len(reached) < len(placed):
-        lost = next(link.link for link, pose in placed if pose is None)
+    robot = read_robot(path, folders, xacro)
+    search = Search(path.parent, folders)
+    links = robot.simulated() if robot.simulated else [_computed(link, Meshes(search)) for link in robot.links]
+    poses = robot.poses(joints)
+    lost = next((link.name for link in links if link.name not in poses), None)
+    if lost is not None:
         raise InputError("lump", f"link {lost!r} is connected to no other; accepted: one tree of links")
-    heavy = [(link, pose) for link, pose in reached if not link.problem]
-    properties = _together(heavy, path)
+    heavy = [(link, poses[link.name]) for link in links if not link.problem]
+    properties = together(heavy, path.name)
     check_tensor(properties.inertia, source=f"tensor of {path.name} as one body")
-    vertices, triangles, absent = _merged(reached, Search(path.parent, folders))
+    vertices, triangles, absent = _merged([(link, poses[link.name]) for link in links], search)
     return Lump(
         properties,
         vertices,
         triangles,
-        tuple((link.link, link.mass) for link, _ in heavy),
-        tuple(link.link for link, _ in reached if link.problem),
+        tuple((link.name, link.mass) for link, _ in heavy),
+        tuple(link.name for link in links if link.problem),
         absent,
         tuple(filter(None, (_doubt(link) for link, _ in heavy))),
     )
 
 
-def _doubt(link: LinkInertial) -> str:
+def _computed(link: Link, meshes: Meshes) -> Link:
+    """The link with the inertial that an SDF leaves to the simulator: its collision shapes at their densities, scaled
+    to the mass where it is given. Raises InputError for shapes that enclose no volume.
+    """
+    if not link.computed:
+        return link
+    solids = []
+    for shape in (shape for shape in link.shapes if shape.role == COLLISION):
+        part = meshes.parts([shape])
+        properties = part.properties(shape.density * part.volume())
+        own = replace(link, mass=properties.mass, center_of_mass=properties.center_of_mass, inertia=properties.inertia)
+        solids.append((own, HERE))
+    whole = together(solids, f"link {link.name}")
+    mass = link.mass if link.mass > 0.0 else whole.mass
+    inertia = whole.inertia * (mass / whole.mass)
+    return replace(link, mass=mass, center_of_mass=whole.center_of_mass, inertia=inertia, problem="")
+
+
+def _doubt(link: Link) -> str:
     """What is wrong with a link's own tensor; that of a point mass is 0."""
     try:
         if np.any(link.inertia):
-            check_tensor(link.inertia, source=f"link {link.link}")
+            check_tensor(link.inertia, source=f"link {link.name}")
     except InputError as error:
         return str(error)
     return ""
 
 
-def _link_id(link: LinkInertial, parents: Mapping[int, Element]) -> int:
-    """The id of the element of the link, of which the inertial may be what was kept."""
-    element = link.element
-    if element is not None and element.tag == "inertial":
-        element = parents[id(element)]
-    return id(element)
-
-
-def _require_inertials(root: Element) -> None:
-    """Refuse an MJCF of which MuJoCo takes masses from geoms."""
-    compiler = {key: value for element in root.iter("compiler") for key, value in element.attrib.items()}
-    if compiler.get("inertiafromgeom", "auto") == "true":
-        raise InputError("lump", "inertiafromgeom='true'", "an MJCF whose bodies have an <inertial>")
-    for body in root.iter("body"):
-        if body.find("inertial") is None and body.find("geom") is not None:
-            name = body.get("name", "?")
-            raise InputError("lump", f"body {name!r} without an <inertial>", "an MJCF whose bodies with geoms have one")
-
-
-def _together(links: list[tuple[LinkInertial, Pose]], path: Path) -> MassProperties:
+def together(links: list[tuple[Link, Pose]], whole: str) -> MassProperties:
     """Mass, COM and tensor of all links by the parallel axis theorem, about the common COM."""
     for link, _ in links:
         if not 0.0 <= link.mass < math.inf or not np.isfinite(link.inertia).all():
-            raise InputError("lump", f"mass {link.mass:g} of link {link.link}", "finite masses >= 0 and finite tensors")
+            raise InputError("lump", f"mass {link.mass:g} of link {link.name}", "finite masses >= 0 and finite tensors")
     masses = np.array([link.mass for link, _ in links])
     centers = np.array([pose.rotation @ link.center_of_mass + pose.position for link, pose in links]).reshape(-1, 3)
     mass = float(masses.sum())
     if not mass > 0.0:
-        raise InputError("lump", path.name, "a robot file with inertials")
+        raise InputError("lump", whole, "inertials")
     center = masses @ centers / mass
     inertia = np.zeros((3, 3))
     for (link, pose), own in zip(links, centers, strict=True):
@@ -118,7 +112,7 @@ def _together(links: list[tuple[LinkInertial, Pose]], path: Path) -> MassPropert
     return MassProperties(mass, center, 0.5 * (inertia + inertia.T))
 
 
-def _merged(links: list[tuple[LinkInertial, Pose]], search: Search) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Vertices, triangles, and what is missing, of what the links show; of those that show nothing what they collide
     with.
     """
@@ -130,7 +124,7 @@ def _merged(links: list[tuple[LinkInertial, Pose]], search: Search) -> tuple[np.
             try:
                 vertices, triangles = _surface(shape, search)
             except InputError as error:
-                absent.append(f"{link.link}: {error}")
+                absent.append(f"{link.name}: {error}")
                 continue
             whole = pose @ Pose(shape.rotation, shape.position)
             parts.append((vertices @ whole.rotation.T + whole.position, triangles))

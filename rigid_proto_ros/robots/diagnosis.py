@@ -15,7 +15,6 @@ the better of both is named; a mass distribution may lie in either.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -29,12 +28,11 @@ from ..mass.properties import MassProperties
 from ..mesh.locate import Search, resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .causes import LIMIT, explain_center, explain_inertia
-from .link_shapes import LinkShapes, primitive_solid
-from .reading import COLLISION, VISUAL, LinkInertial, Shape, read_robot
+from .link_shapes import LinkShapes, Meshes
+from .model import COLLISION, VISUAL, WATER, Link, Shape
+from .reading import read_robot
 from .realizable import MAX_ROUNDING, beyond_shapes, impossible_inertial
 
-WATER = 1000.0
-"""kg/m³ of a link of which no mass is known."""
 IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
 NOT_UNIFORM, UNIFORM, UNKNOWN = "not uniform", "uniform", "unknown"
 WRONG = (IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED)
@@ -123,7 +121,7 @@ class Options:
         return self.mass or self.density * volume
 
 
-def _tensor_error(link: LinkInertial, truth: MassProperties) -> tuple[float, float]:
+def _tensor_error(link: Link, truth: MassProperties) -> tuple[float, float]:
     """(relative difference of the tensor, how much of it the digits printed don't explain)."""
     size = float(np.max(np.abs(truth.inertia)))
     # A rounded mass changes the whole tensor by one factor, rounded entries change each by its own step.
@@ -135,13 +133,13 @@ def _tensor_error(link: LinkInertial, truth: MassProperties) -> tuple[float, flo
     return float(np.max(np.abs(link.inertia - truth.inertia))) / size, float(np.max(left)) / size
 
 
-def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by: str = "") -> LinkDiagnosis:
+def diagnose(link: Link, parts: LinkShapes, options: Options, judged_by: str = "") -> LinkDiagnosis:
     """Compare one link with shapes of its own as a solid of one density."""
-    plain = LinkDiagnosis(link.link, parts.names, UNKNOWN, link.mass, judged_by=judged_by)
+    plain = LinkDiagnosis(link.name, parts.names, UNKNOWN, link.mass, judged_by=judged_by)
     try:
         volume = parts.volume()
         plain = replace(plain, volume=volume, doubts=parts.doubts)
-        wanted = options.mass_of(link.link, volume)
+        wanted = options.mass_of(link.name, volume)
         if link.problem:
             return replace(plain, note=link.problem, expected=parts.properties(wanted or WATER * volume))
         finite = np.all(np.isfinite(link.inertia)) and np.all(np.isfinite(link.center_of_mass))
@@ -183,18 +181,23 @@ def diagnose(link: LinkInertial, parts: LinkShapes, options: Options, judged_by:
     )
 
 
-class Robot:
-    """A robot file's links, and the meshes that they name, each loaded once.
+class Doctor:
+    """Judges the links of a robot file.
 
     Raises InputError for a total mass that the links' given masses leave nothing of, and for names of no link.
     """
 
-    def __init__(self, path: Path, links: list[LinkInertial], options: Options) -> None:
-        self.path = path
+    def __init__(self, path: Path, links: list[Link], options: Options, meshes: Meshes | None = None) -> None:
         self.options = options
-        self.search = Search(path.parent, options.folders)
+        search = Search(path.parent, options.folders)
+        self.meshes = meshes or Meshes(
+            search,
+            options.max_triangles,
+            repair=options.repair,
+            fallback=options.fallback,
+            accept_open=options.accept_open,
+        )
         self.links = links
-        self.body = functools.cache(self._body)
         for name in (*options.masses, *options.densities):
             self.require(name)
         if options.total_mass:
@@ -202,7 +205,7 @@ class Robot:
 
     def require(self, name: str) -> None:
         """Raise InputError when not one link has this name."""
-        names = [known.link for known in self.links]
+        names = [known.name for known in self.links]
         if names.count(name) > 1:
             raise InputError("link", f"{names.count(name)} links are called {name!r}")
         if name not in names:
@@ -216,41 +219,23 @@ class Robot:
         rest = total
         for link in self.links:
             volume = self.diagnose(link).volume
-            known = self.options.mass_of(link.link, volume)
+            known = self.options.mass_of(link.name, volume)
             if known or not (volume or link.problem):
                 rest -= known or link.mass
             elif not link.problem:
-                self.require(link.link)
-                volumes[link.link] = volume
+                self.require(link.name)
+                volumes[link.name] = volume
         if not volumes or not rest > 0.0:
             left = f"{rest:.6g} kg for {len(volumes)} links that enclose a volume"
             raise InputError("--total-mass", total, f"more than the mass of the other links; it leaves {left}")
         density = rest / sum(volumes.values())
         return {**given, **{name: density * volume for name, volume in volumes.items()}}
 
-    def diagnoses(self, only: str | None = None) -> list[tuple[LinkInertial, LinkDiagnosis]]:
+    def diagnoses(self, only: str | None = None) -> list[tuple[Link, LinkDiagnosis]]:
         """The links (or that one) with their diagnoses, in the file's order."""
-        return [(link, self.diagnose(link)) for link in self.links if only in (None, link.link)]
+        return [(link, self.diagnose(link)) for link in self.links if only in (None, link.name)]
 
-    def _body(self, file: str) -> MeshBody:
-        mesh = load_mesh(file, max_triangles=self.options.max_triangles, search=self.search)
-        options = self.options
-        return mesh_body(mesh, repair=options.repair, fallback=options.fallback, accept_open=options.accept_open)
-
-    def parts(self, shapes: list[Shape]) -> LinkShapes:
-        """The shapes with their meshes; raises InputError for one that can't be taken."""
-        found: list[tuple[Shape, MeshBody | None]] = []
-        for shape in shapes:
-            if shape.problem:
-                raise InputError(shape.file or shape.kind, shape.problem)
-            if shape.kind == "mesh":
-                found.append((shape, self.body(shape.file)))
-            else:
-                primitive_solid(shape.kind, shape.size)
-                found.append((shape, None))
-        return LinkShapes(found)
-
-    def diagnose(self, link: LinkInertial) -> LinkDiagnosis:
+    def diagnose(self, link: Link) -> LinkDiagnosis:
         """The verdict on a link: by what it shows and by what it collides with, the better of both."""
         found, inside = [], []
         for role in (VISUAL, COLLISION):
@@ -258,17 +243,17 @@ class Robot:
             if not shapes:
                 continue
             try:
-                parts = self.parts(shapes)
+                parts = self.meshes.parts(shapes)
                 inside.append(parts.points)
                 found.append(diagnose(link, parts, self.options, role))
             except InputError as error:
                 note = ": ".join(filter(None, (link.problem, str(error))))
                 name = shapes[0].file or shapes[0].kind
-                found.append(LinkDiagnosis(link.link, name, UNKNOWN, link.mass, note=note, judged_by=role))
-        bare = LinkDiagnosis(link.link, "", UNKNOWN, link.mass, note=link.problem or "no shape to compare it with")
+                found.append(LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=role))
+        bare = LinkDiagnosis(link.name, "", UNKNOWN, link.mass, note=link.problem or "no shape to compare it with")
         return judged(link, min(found, key=_quality, default=bare), inside)
 
-    def fitting(self, body: MeshBody) -> list[tuple[LinkInertial, Shape]]:
+    def fitting(self, body: MeshBody) -> list[tuple[Link, Shape]]:
         """The links' shapes that are the mesh: by its whole path, else by as many of the path's last parts as agree."""
         shapes = [(link, shape) for link in self.links for shape in link.shapes if shape.kind == "mesh"]
         same = [(link, shape) for link, shape in shapes if self._is_file(shape.file, Path(body.mesh.path))]
@@ -280,12 +265,12 @@ class Robot:
 
     def _is_file(self, name: str, path: Path) -> bool:
         try:
-            return resolve_mesh(name, self.search) == path
+            return resolve_mesh(name, self.meshes.search) == path
         except InputError:
             return False
 
 
-def judged(link: LinkInertial, diagnosis: LinkDiagnosis, inside: list[np.ndarray]) -> LinkDiagnosis:
+def judged(link: Link, diagnosis: LinkDiagnosis, inside: list[np.ndarray]) -> LinkDiagnosis:
     """The diagnosis with the verdict that the link's inertial is impossible, where it is; ``inside``: points (n, 3) of
     the shapes.
     """
@@ -315,20 +300,20 @@ def _common_parts(first: str, second: str) -> int:
     return count
 
 
-def _by_mesh(robot: Robot, mesh: str, scale: np.ndarray | None, link_name: str | None) -> LinkDiagnosis:
+def _by_mesh(doctor: Doctor, mesh: str, scale: np.ndarray | None, link_name: str | None) -> LinkDiagnosis:
     """The diagnosis of the one link that the mesh belongs to."""
-    options = robot.options
+    options = doctor.options
     loaded = load_mesh(mesh, max_triangles=options.max_triangles)
     body = mesh_body(loaded, repair=options.repair, fallback=options.fallback, accept_open=options.accept_open)
-    pairs = [pair for pair in robot.fitting(body) if link_name in (None, pair[0].link)]
+    pairs = [pair for pair in doctor.fitting(body) if link_name in (None, pair[0].name)]
     if not pairs:
-        links = [link for link in robot.links if not link.problem and link_name in (None, link.link)]
+        links = [link for link in doctor.links if not link.problem and link_name in (None, link.name)]
         pairs = [(link, Shape(VISUAL, "mesh", np.eye(3), np.zeros(3), mesh)) for link in links]
     different = {
-        (link.link, shape.scale.tobytes(), shape.rotation.tobytes(), shape.position.tobytes()) for link, shape in pairs
+        (link.name, shape.scale.tobytes(), shape.rotation.tobytes(), shape.position.tobytes()) for link, shape in pairs
     }
     if len(different) != 1:
-        names = ", ".join(dict.fromkeys(f"{link.link} ({shape.file})" for link, shape in pairs)) or "none"
+        names = ", ".join(dict.fromkeys(f"{link.name} ({shape.file})" for link, shape in pairs)) or "none"
         accepted = "name it by its whole path, or the link with --link"
         raise InputError("compare", f"{body.mesh.name} fits {len(different)} shapes of: {names}; {accepted}")
     link, shape = pairs[0]
@@ -351,12 +336,12 @@ def compare_robot(
 
     Raises InputError when the file, or nothing in it, can be diagnosed.
     """
-    robot = Robot(path, read_robot(path, options.folders, options.xacro), options)
+    doctor = Doctor(path, read_robot(path, options.folders, options.xacro).links, options)
     if link is not None:
-        robot.require(link)
+        doctor.require(link)
     if mesh is not None:
-        return [_by_mesh(robot, mesh, scale, link)]
-    diagnoses = [diagnosis for _, diagnosis in robot.diagnoses(link)]
+        return [_by_mesh(doctor, mesh, scale, link)]
+    diagnoses = [diagnosis for _, diagnosis in doctor.diagnoses(link)]
     if not diagnoses:
         raise InputError("compare", path.name, "links with an inertial or a shape")
     return sorted(diagnoses, key=lambda diagnosis: (VERDICTS.index(diagnosis.status), -diagnosis.error))

@@ -19,8 +19,10 @@ from ..base.files import read_bounded
 from ..mass.export import is_flat, quaternion_wxyz
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
-from .diagnosis import NOT_UNIFORM, UNIFORM, UNKNOWN, LinkDiagnosis, Options, Robot
-from .reading import MAX_BYTES, LinkInertial, is_xacro, links_of, parse_xml
+from .diagnosis import NOT_UNIFORM, UNIFORM, UNKNOWN, Doctor, LinkDiagnosis, Options
+from .model import Link
+from .reading import robot_of
+from .robot_xml import MAX_BYTES, is_xacro, parse_xml
 
 _SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
@@ -217,22 +219,20 @@ def _indent(data: bytes, start: int) -> bytes:
     return data[line - data[:line].endswith(b"\r") : start]
 
 
-def _reason_to_leave(
-    link: LinkInertial, diagnosis: LinkDiagnosis, options: Options, places: dict, everything: bool
-) -> str:
+def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, options: Options, places: dict, everything: bool) -> str:
     """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
     if diagnosis.status == NOT_UNIFORM and not everything:
         return "a body of its shapes can have it; --all makes it uniform"
-    if link.problem and not options.mass_of(link.link, diagnosis.volume):
+    if link.problem and not options.mass_of(link.name, diagnosis.volume):
         return f"{diagnosis.note}; --mass LINK=M or --density LINK=D writes one"
     if diagnosis.expected is None:
         if diagnosis.volume:
             return "its mass isn't a positive number; --mass LINK=M or --density LINK=D says what it is"
         return diagnosis.note
     if link.element is None or id(link.element) not in places:
-        return "it stands in an included file"
+        return "it stands in another file, or its body has no name"
     frame = link.element.find("pose")
-    if link.element.tag == "inertial" and frame is not None and frame.get("relative_to", "") not in ("", link.link):
+    if link.element.tag == "inertial" and frame is not None and frame.get("relative_to", "") not in ("", link.name):
         return f"its <pose> is relative to {frame.get('relative_to')!r}"
     return ""
 
@@ -259,25 +259,25 @@ def fix_robot(
     # Included files are put into the tree by reading it.
     elements = [element for element in root.iter() if element.tag in ("inertial", "link")]
     places = {id(element): span for element, span in zip(elements, spans, strict=True)}
-    robot = Robot(path, links_of(root, path), options)
+    doctor = Doctor(path, robot_of(root, path).links, options)
     if link is not None:
-        robot.require(link)
+        doctor.require(link)
     written: dict[int, tuple[_Span, bytes]] = {}
-    diagnosed = robot.diagnoses(link)
+    diagnosed = doctor.diagnoses(link)
     reasons = []
     for known, diagnosis in diagnosed:
         if diagnosis.status == UNIFORM or (diagnosis.status == UNKNOWN and not known.problem):
             reasons.append(diagnosis.note if diagnosis.status == UNKNOWN else "")
             continue
-        reasons.append(_reason_to_leave(known, diagnosis, robot.options, places, everything))
+        reasons.append(_reason_to_leave(known, diagnosis, doctor.options, places, everything))
         if not reasons[-1] and known.element is not None and diagnosis.expected is not None:
             span = places[id(known.element)]
             text = _rewritten(data, span, known, diagnosis.expected, _WRITERS[str(root.tag)])
             written[id(known.element)] = span, text
     for span, text in sorted(written.values(), key=lambda item: -item[0].start):
         data = data[: span.start] + text + data[span.end :]
-    again = Robot(path, links_of(parse_xml(data, path), path), replace(robot.options, total_mass=0.0))
-    again.body = robot.body
+    options = replace(doctor.options, total_mass=0.0)
+    again = Doctor(path, robot_of(parse_xml(data, path), path).links, options, doctor.meshes)
     after = again.diagnoses(link)
     links = []
     for (known, before), (_, now), left in zip(diagnosed, after, reasons, strict=True):
@@ -285,7 +285,7 @@ def fix_robot(
     return data, links
 
 
-def _rewritten(data: bytes, span: _Span, link: LinkInertial, properties: MassProperties, write: _Writer) -> bytes:
+def _rewritten(data: bytes, span: _Span, link: Link, properties: MassProperties, write: _Writer) -> bytes:
     """The element's bytes with the values of ``properties``; of a link without an inertial, with one added."""
     if span.tag == "inertial" and link.element is not None:
         inertial = _Edited(data[span.start : span.end], _indent(data, span.start))

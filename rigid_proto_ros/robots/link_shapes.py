@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Iterable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import InputError
-from ..mass.from_mesh import MeshBody
+from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
 from ..mass.verdict import COUNTED_TWICE, OVERLAPPING, WARNING
 from ..mesh.hull import box_surface, convex_hull
-from .reading import Shape
+from ..mesh.locate import Search
+from ..mesh.reading import MAX_TRIANGLES, load_mesh
+from .model import Shape
 
 SEGMENTS = 48
 """Corners of a round shape's circle; a multiple of 4, so that its box is exact."""
@@ -77,6 +82,33 @@ def _revolved(radius: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.nd
         triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
     triangles.append(np.stack([last + near, last + far, np.full(SEGMENTS, top)], axis=1))
     return vertices, np.concatenate(triangles)
+
+
+class Meshes:
+    """The meshes that a robot's shapes name, each loaded once; ``treatment``: arguments of mesh_body."""
+
+    def __init__(self, search: Search, max_triangles: int = MAX_TRIANGLES, **treatment: Any) -> None:
+        self.search = search
+        self.max_triangles = max_triangles
+        self.treatment = treatment
+        self.body = functools.cache(self._body)
+
+    def _body(self, file: str) -> MeshBody:
+        mesh = load_mesh(file, max_triangles=self.max_triangles, search=self.search)
+        return mesh_body(mesh, **self.treatment)
+
+    def parts(self, shapes: Iterable[Shape]) -> LinkShapes:
+        """The shapes with their meshes; raises InputError for one that can't be taken."""
+        found: list[tuple[Shape, MeshBody | None]] = []
+        for shape in shapes:
+            if shape.problem:
+                raise InputError(shape.file or shape.kind, shape.problem)
+            if shape.kind == "mesh":
+                found.append((shape, self.body(shape.file)))
+            else:
+                primitive_solid(shape.kind, shape.size)
+                found.append((shape, None))
+        return LinkShapes(found)
 
 
 class LinkShapes:

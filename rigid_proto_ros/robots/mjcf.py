@@ -1,248 +1,238 @@
 # SPDX-License-Identifier: MIT
-"""MJCF: geoms and inertials of bodies; included files, default classes and frames as MuJoCo's compiler takes them."""
+"""MJCF: bodies with geoms and inertials, as MuJoCo's own compiler takes default classes, frames, attached models and
+orientations.
+"""
 
 from __future__ import annotations
 
-import math
-from collections import ChainMap
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+import contextlib
+import warnings
+from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.files import read_bounded
-from .reading import (
+from .model import (
     COLLISION,
-    MAX_BYTES,
+    OTHER,
+    SLIDES,
+    TURNS,
     VISUAL,
-    LinkInertial,
+    Connection,
+    Joint,
+    Link,
+    Pose,
+    Robot,
     Shape,
-    floats,
-    link_inertial,
-    parse_xml,
-    placed,
+    bare_link,
+    printed_link,
     rotation_from_wxyz,
 )
+from .robot_xml import MAX_BYTES, parse_xml
 
 MAX_INCLUDES = 200
-"""Files that one model may include; MuJoCo takes each file once."""
-
-_Attributes = Mapping[str, str]
 
 
-@dataclass(frozen=True)
-class Model:
-    """What holds for all bodies: angles in degrees, Euler sequence, mesh assets by name, attributes by class, tag."""
-
-    degrees: bool
-    sequence: str
-    meshes: dict[str, _Attributes]
-    folder: str
-    bare_names: bool
-    defaults: dict[str, dict[str, _Attributes]]
-
-    def attributes(self, element: Element, childclass: str) -> _Attributes:
-        """The element's own attributes, then those of its class, or of the class that its body's children have."""
-        name = element.get("class") or childclass or "main"
-        if name not in self.defaults:
-            raise InputError("robot file", f"default class {name}", f"one of {', '.join(self.defaults)}")
-        return ChainMap(dict(element.attrib), dict(self.defaults[name].get(element.tag, {})))
-
-
-def _with_includes(root: Element, path: Path) -> None:
-    """Put the content of included files, named from the main file's folder, in the place of each <include>."""
-    taken = {path.resolve()}
-    waiting = [root]
-    while waiting:
-        parent = waiting.pop()
-        for place, child in reversed(list(enumerate(parent))):
-            if child.tag != "include":
-                waiting.append(child)
-                continue
-            file = (path.parent / child.get("file", "")).resolve()
-            if file in taken or len(taken) > MAX_INCLUDES:
-                raise InputError(
-                    "robot file", f"<include file={child.get('file')!r}>", "each file included once, at most 200"
-                )
-            taken.add(file)
-            content = parse_xml(read_bounded(file, MAX_BYTES, "robot file", "an MJCF file to include"), file)
-            parent[place : place + 1] = list(content)
-            waiting.extend(content)
-            waiting.append(parent)
+def _with_includes(parent: Element, path: Path, above: tuple[Path, ...]) -> int:
+    """Put the content of included files, named from the main file's folder, in the place of each <include>, and count
+    them; ``above``: the files that are being read.
+    """
+    count = 0
+    for child in list(parent):
+        if child.tag != "include":
+            count += _with_includes(child, path, above)
+            continue
+        file = (path.parent / child.get("file", "")).resolve()
+        if file in above or len(above) > MAX_INCLUDES:
+            raise InputError(
+                "robot file", f"<include file={child.get('file')!r}>", "files that don't include themselves"
+            )
+        content = parse_xml(read_bounded(file, MAX_BYTES, "robot file", "an MJCF file to include"), file)
+        count += 1 + _with_includes(content, path, (*above, file))
+        place = list(parent).index(child)
+        parent[place : place + 1] = list(content)
+    if count > MAX_INCLUDES:
+        raise InputError("robot file", f"{path.name} includes {count} files", f"at most {MAX_INCLUDES}")
+    return count
 
 
-def _defaults(root: Element) -> dict[str, dict[str, _Attributes]]:
-    """Attributes by class and tag; a class has those of the class that it stands in, but for its own."""
-    found: dict[str, dict[str, _Attributes]] = {"main": {}}
+class _Source:
+    """A model's text, and what MuJoCo makes of it; files that it names are looked for beside it."""
 
-    def take(element: Element, name: str, inherited: dict[str, _Attributes]) -> None:
-        own = {**inherited, **found.get(name, {})}
-        for child in element:
-            if child.tag != "default":
-                own[child.tag] = {**own.get(child.tag, {}), **child.attrib}
-        found[name] = own
-        for child in element.findall("default"):
-            take(child, child.get("class", "main"), own)
+    def __init__(self, root: Element, path: Path) -> None:
+        try:
+            import mujoco
+        except ImportError:
+            raise InputError("robot file", f"MJCF: {is_missing('mujoco', 'robots')}") from None
+        self.mujoco: ModuleType = mujoco
+        self.text = ElementTree.tostring(root, encoding="unicode")
+        self.path = path
 
-    for element in root.findall("default"):
-        take(element, element.get("class", "main"), {})
+    def parsed(self) -> Any:
+        """A new MjSpec: what the file says, default classes applied, models attached, nothing computed."""
+        try:
+            with contextlib.chdir(self.path.parent):
+                spec = self.mujoco.MjSpec.from_string(self.text)
+        except ValueError as error:
+            raise self._refusal("reads", error) from None
+        spec.compiler.fusestatic = spec.compiler.discardvisual = False  # which would drop bodies and geoms
+        unneeded = ("keys", "sensors", "actuators", "equalities", "tendons", "pairs", "excludes", "skins", "tuples")
+        for kind in unneeded:
+            for element in list(getattr(spec, kind)):
+                spec.delete(element)
+        return spec
+
+    def compiled(self, spec: Any) -> Any:
+        """The MjModel of a spec."""
+        try:
+            with contextlib.chdir(self.path.parent), warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of attributes that will be dropped some day
+                return spec.compile()
+        except ValueError as error:
+            raise self._refusal("compiles", error) from None
+
+    def _refusal(self, verb: str, error: ValueError) -> InputError:
+        reason = " ".join(str(error).replace("XML Error:", "").replace("Error:", "").split())
+        return InputError("robot file", self.path.name, f"what MuJoCo {verb} ({reason})")
+
+    def without_files(self) -> Any:
+        """A new spec whose meshes, height fields and textures are gone: small spheres stand where they were."""
+        spec = self.parsed()
+        drawn = self.mujoco.mjtGeom
+        for geom in spec.geoms:
+            if geom.meshname or geom.type in (drawn.mjGEOM_HFIELD, drawn.mjGEOM_PLANE, drawn.mjGEOM_SDF):
+                geom.type, geom.size, geom.fromto = drawn.mjGEOM_SPHERE, [1.0, 0.0, 0.0], [np.nan, 0, 0, 0, 0, 0]
+            geom.meshname = geom.hfieldname = geom.material = ""
+        for site in spec.sites:
+            site.material = ""
+        for kind in ("meshes", "hfields", "materials", "textures"):
+            for element in list(getattr(spec, kind)):
+                spec.delete(element)
+        return spec
+
+
+def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int) -> Shape | None:
+    """The shape of a geom, raw as the file has it, at its compiled place; None for those that are no solid."""
+    kind = str(raw.type).rpartition("_")[2].lower()
+    if kind in ("plane", "hfield"):
+        return None
+    role = COLLISION if raw.contype or raw.conaffinity else VISUAL
+    shape = Shape(role, kind, rotation_from_wxyz(model.geom_quat[number]), model.geom_pos[number].copy())
+    if kind == "mesh":
+        return _mesh(shape, raw.meshname, meshes, spec.strippath)
+    if raw.meshname:
+        return replace(shape, problem=f"a {kind} fitted to a mesh")
+    a, b, c = (2.0 * model.geom_size[number]).tolist()
+    sizes = {
+        "box": (a, b, c),
+        "cylinder": (0.5 * a, b),
+        "capsule": (0.5 * a, b),
+        "sphere": (0.5 * a,),
+        "ellipsoid": (0.5 * a, 0.5 * b, 0.5 * c),
+    }
+    if kind not in sizes:
+        return replace(shape, problem=f"a geom of type {kind}, which isn't known here")
+    return replace(shape, size=sizes[kind])
+
+
+def _mesh(shape: Shape, name: str, meshes: dict[str, Any], strip: bool) -> Shape:
+    if name not in meshes:
+        return replace(shape, file=name, problem=f"mesh {name!r}, which no <asset> declares")
+    mesh = meshes[name]
+    if not mesh.file:
+        return replace(shape, file=name, problem="a mesh that is written out in the file itself")
+    if np.any(mesh.refpos) or mesh.refquat.tolist() != [1.0, 0.0, 0.0, 0.0]:
+        return replace(shape, file=mesh.file, problem="a mesh with refpos or refquat")
+    file = Path(mesh.file).name if strip else mesh.file
+    return replace(shape, file=str(Path(mesh.compiler.meshdir or "") / file), scale=mesh.scale.copy())
+
+
+def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial: Element | None) -> Link:
+    """A body with the inertial that the file has."""
+    bare = bare_link(name, shapes, None)
+    if not body.explicitinertial:
+        return bare
+    if np.isnan(body.fullinertia[0]):
+        a, b, c = body.inertia.tolist()
+        six = [a, 0.0, 0.0, b, 0.0, c]
+    else:
+        xx, yy, zz, xy, xz, yz = body.fullinertia.tolist()
+        six = [xx, xy, xz, yy, yz, zz]
+    quaternion = body.iquat
+    if body.ialt.type != type(body.ialt.type).mjORIENTATION_QUAT:
+        of = body.compiler
+        quaternion = spec.resolve_orientation(degree=of.degree, sequence=of.eulerseq, orientation=body.ialt)
+    center = [repr(value) for value in body.ipos.tolist()]
+    return printed_link(bare, repr(body.mass), center, [repr(v) for v in six], rotation_from_wxyz(quaternion), inertial)
+
+
+def _connections(source: _Source, model: Any, names: list[str]) -> list[Connection]:
+    """The bodies in their parents, with their joints."""
+    kinds = {int(source.mujoco.mjtJoint.mjJNT_HINGE): TURNS, int(source.mujoco.mjtJoint.mjJNT_SLIDE): SLIDES}
+    found = []
+    for body in range(1, model.nbody):
+        path: list[Pose | Joint] = [Pose(rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])]
+        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+            anchor = Pose(np.eye(3), model.jnt_pos[joint])
+            kind = kinds.get(int(model.jnt_type[joint]), OTHER)
+            zero = float(model.qpos0[model.jnt_qposadr[joint]]) if kind != OTHER else 0.0
+            name = model.joint(joint).name or f"joint {joint}"
+            path += [anchor, Joint(name, kind, model.jnt_axis[joint], zero), anchor.inverse()]
+        parent = int(model.body_parentid[body])
+        found.append(Connection(names[parent] if parent else None, names[body], tuple(path)))
     return found
 
 
-def mjcf_model(root: Element) -> Model:
-    """What holds for all bodies of a model whose included files have been put in."""
-    compiler: dict[str, str] = {}
-    for element in root.findall("compiler"):
-        compiler.update(element.attrib)
-    if compiler.get("coordinate", "local") != "local":
-        raise InputError(
-            "robot file", f"coordinate={compiler['coordinate']!r}", "local coordinates, as MuJoCo since 2.3.4"
+def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Link]:
+    """The links with the masses that MuJoCo takes: of its <compiler>, and of the geoms where there are no inertials."""
+    spec = source.parsed()
+    from_geoms = spec.compiler.inertiafromgeom == source.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    if not from_geoms and all(body.explicitinertial or not body.geoms for body in spec.bodies[1:]):
+        spec = source.without_files()
+    model = source.compiled(spec)
+    known = {link.name: link for link in links}
+    found = []
+    for body, name in list(enumerate(names))[1:]:
+        rotation = rotation_from_wxyz(model.body_iquat[body])
+        inertia = rotation @ np.diag(model.body_inertia[body]) @ rotation.T
+        link = known.get(name) or bare_link(name, (), None)
+        problem = "" if model.body_mass[body] > 0.0 else "no mass"
+        center = model.body_ipos[body].copy()
+        found.append(
+            replace(link, mass=float(model.body_mass[body]), center_of_mass=center, inertia=inertia, problem=problem)
         )
-    model = Model(
-        compiler.get("angle", "degree") != "radian",
-        compiler.get("eulerseq", "xyz"),
-        {},
-        compiler.get("meshdir") or compiler.get("assetdir") or "",
-        compiler.get("strippath", "false") == "true",
-        _defaults(root),
-    )
-    for asset in root.findall("asset"):
-        for mesh in asset.findall("mesh"):
-            attributes = model.attributes(mesh, "")
-            name = attributes.get("name") or Path(attributes.get("file", "")).stem
-            model.meshes[name] = attributes
-    return model
+    return found
 
 
-def element_rotation(attributes: _Attributes, model: Model) -> np.ndarray:
-    """Orientation of an MJCF element: quat, axisangle, xyaxes, zaxis or euler."""
-    turn = math.pi / 180.0 if model.degrees else 1.0
-    if attributes.get("axisangle"):
-        x, y, z, angle = floats(attributes["axisangle"], "", 4)
-        axis = np.array([x, y, z]) / np.linalg.norm([x, y, z])
-        half = 0.5 * angle * turn
-        return rotation_from_wxyz([math.cos(half), *(math.sin(half) * axis)])
-    if attributes.get("xyaxes"):
-        values = floats(attributes["xyaxes"], "", 6)
-        x = values[:3] / np.linalg.norm(values[:3])
-        y = values[3:] - x * (x @ values[3:])
-        y /= np.linalg.norm(y)
-        return np.stack([x, y, np.cross(x, y)], axis=1)
-    if attributes.get("zaxis"):
-        return _turn_to(floats(attributes["zaxis"], "", 3))
-    if attributes.get("euler"):
-        rotation = np.eye(3)
-        for letter, angle in zip(model.sequence, floats(attributes["euler"], "", 3) * turn, strict=True):
-            axis = np.eye(3)["xyz".index(letter.lower())]
-            single = rotation_from_wxyz([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * axis)])
-            rotation = rotation @ single if letter.islower() else single @ rotation  # intrinsic, or extrinsic
-        return rotation
-    return rotation_from_wxyz(floats(attributes.get("quat"), "1 0 0 0", 4))
-
-
-def _turn_to(direction: np.ndarray) -> np.ndarray:
-    """The shortest turn (3, 3) that brings z to ``direction`` (3,)."""
-    z = direction / np.linalg.norm(direction)
-    return rotation_from_wxyz([1.0 + z[2], -z[1], z[0], 0.0] if z[2] > -1.0 else [0.0, 1.0, 0.0, 0.0])
-
-
-def _geom(geom: Element, model: Model, childclass: str) -> Shape | None:
-    """The shape of a geom in its parent's frame; None for those that are no solid (planes, height fields)."""
-    attributes = model.attributes(geom, childclass)
-    touches = attributes.get("contype", "1") != "0" or attributes.get("conaffinity", "1") != "0"
-    role = COLLISION if touches else VISUAL
-    kind = attributes.get("type", "sphere")
-    rotation = element_rotation(attributes, model)
-    position = floats(attributes.get("pos"), "0 0 0", 3)
-    if kind in ("plane", "hfield"):
-        return None
-    if kind == "mesh":
-        return _mesh(Shape(role, kind, rotation, position), attributes.get("mesh", ""), model)
-    shape = Shape(role, kind, rotation, position)
-    if kind not in ("box", "cylinder", "sphere", "capsule", "ellipsoid"):
-        return replace(shape, problem=f"a geom of type {kind}, which isn't known here")
-    if attributes.get("mesh"):
-        return replace(shape, problem=f"a {kind} fitted to a mesh")
-    size = [float(word) for word in attributes.get("size", "").split()]
-    if attributes.get("fromto"):
-        ends = floats(attributes["fromto"], "", 6).reshape(2, 3)
-        along = ends[1] - ends[0]
-        shape = replace(shape, rotation=_turn_to(along), position=ends.mean(axis=0))
-        half = 0.5 * float(np.linalg.norm(along))
-        size = [*size[:1], half] if kind in ("cylinder", "capsule") else [size[0], size[0], half]
-    full = {
-        "box": lambda: (2.0 * size[0], 2.0 * size[1], 2.0 * size[2]),
-        "cylinder": lambda: (size[0], 2.0 * size[1]),
-        "capsule": lambda: (size[0], 2.0 * size[1]),
-        "sphere": lambda: (size[0],),
-        "ellipsoid": lambda: (size[0], size[1], size[2]),
-    }
-    try:
-        return replace(shape, size=full[kind]())
-    except IndexError:
-        raise ValueError(f"size={attributes.get('size')!r} of a {kind}") from None
-
-
-def _mesh(shape: Shape, name: str, model: Model) -> Shape:
-    if name not in model.meshes:
-        return replace(shape, file=name, problem=f"mesh {name!r}, which no <asset> declares")
-    mesh = model.meshes[name]
-    file = mesh.get("file", "")
-    if not file:
-        return replace(shape, file=name, problem="a mesh that is written out in the file itself")
-    if any(floats(mesh.get("refpos"), "0 0 0", 3)) or mesh.get("refquat", "1 0 0 0").split() != ["1", "0", "0", "0"]:
-        return replace(shape, file=file, problem="a mesh with refpos or refquat")
-    bare = Path(file).name if model.bare_names else file
-    return replace(shape, file=str(Path(model.folder) / bare), scale=floats(mesh.get("scale"), "1 1 1", 3))
-
-
-def _shapes(body: Element, model: Model, childclass: str) -> Iterator[Shape]:
-    """The shapes of a body's geoms, those in its frames included, in the body's frame."""
-    for child in body:
-        if child.tag == "geom":
-            shape = _geom(child, model, childclass)
-            if shape is not None:
-                yield shape
-        elif child.tag == "frame":
-            rotation = element_rotation(child.attrib, model)
-            position = floats(child.get("pos"), "0 0 0", 3)
-            for shape in _shapes(child, model, child.get("childclass") or childclass):
-                yield placed(shape, rotation, position)
-
-
-def _bodies(element: Element, childclass: str) -> Iterator[tuple[Element, str]]:
-    """The bodies below an element with the class that their geoms have."""
-    for child in element:
-        if child.tag in ("body", "frame", "replicate"):
-            inner = child.get("childclass") or childclass
-            if child.tag == "body":
-                yield child, inner
-            yield from _bodies(child, inner)
-
-
-def read_mjcf(root: Element, path: Path) -> list[LinkInertial]:
-    """Bodies of an MJCF that have an inertial; of the others MuJoCo computes it itself."""
-    _with_includes(root, path)
-    model = mjcf_model(root)
+def read_mjcf(root: Element, path: Path) -> Robot:
+    """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
+    inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
+    _with_includes(root, path, (path.resolve(),))
+    source = _Source(root, path)
+    spec, frames = source.parsed(), source.without_files()
+    for body in frames.bodies[1:]:  # what the file says of inertials may be what MuJoCo refuses
+        body.explicitinertial, body.mass, body.inertia = True, 1.0, [1.0, 1.0, 1.0]
+        body.fullinertia = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+    model = source.compiled(frames)
+    names = [model.body(body).name or f"body {body}" for body in range(model.nbody)]
+    meshes = {mesh.name: mesh for mesh in spec.meshes}
+    shapes: dict[int, list[Shape | None]] = {body: [] for body in range(model.nbody)}
+    for raw, placed in zip(spec.geoms, frames.geoms, strict=True):
+        shapes[int(model.geom_bodyid[placed.id])].append(_shape(spec, raw, meshes, model, placed.id))
     links = []
-    for world in root.findall("worldbody"):
-        for body, childclass in _bodies(world, ""):
-            inertial = body.find("inertial")
-            if inertial is None:
-                continue
-            rotation = element_rotation(inertial.attrib, model)
-            words = inertial.get("fullinertia", "").split()
-            if words:
-                xx, yy, zz, xy, xz, yz = words
-                six = [xx, xy, xz, yy, yz, zz]
-            else:
-                a, b, c = inertial.get("diaginertia", "").split()
-                six = [a, "0", "0", b, "0", c]
-            shapes = list(_shapes(body, model, childclass))
-            name = body.get("name", "?")
-            mass, position = inertial.get("mass", ""), inertial.get("pos")
-            links.append(link_inertial(name, mass, position, six, rotation, shapes, inertial))
-    return links
+    for raw, placed in zip(spec.bodies[1:], frames.bodies[1:], strict=True):
+        link = _link(spec, raw, names[placed.id], shapes[placed.id], inertials.get(raw.name) if raw.name else None)
+        if link.shapes or not link.problem:
+            links.append(link)
+    return Robot(
+        links,
+        names[1:],
+        lambda: _connections(source, model, names),
+        lambda: _simulated(source, links, names),
+    )

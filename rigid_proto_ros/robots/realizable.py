@@ -16,7 +16,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..mass.tensor import check_tensor
 from ..mesh.hull import convex_hull
-from .reading import LinkInertial
+from .model import Link
 
 MARGIN = 1e-3
 """Part of the shapes' diagonal by which they may be larger than they are drawn."""
@@ -28,7 +28,7 @@ REFINED = (0.1, 0.03, 0.01, 0.003, 0.001)
 """Turns [rad] by which the worst axis is then looked for nearby."""
 
 
-def impossible_inertial(link: LinkInertial) -> tuple[str, ...]:
+def impossible_inertial(link: Link) -> tuple[str, ...]:
     """Why no body has the link's inertial; empty when one has."""
     if not 0.0 < link.mass < math.inf:
         remedy = "; a link without mass needs no inertial" if link.mass == 0.0 and not np.any(link.inertia) else ""
@@ -42,7 +42,7 @@ def impossible_inertial(link: LinkInertial) -> tuple[str, ...]:
     return ()
 
 
-def beyond_shapes(link: LinkInertial, points: np.ndarray) -> str:
+def beyond_shapes(link: Link, points: np.ndarray) -> str:
     """Why no mass distribution within the hull of ``points`` (n, 3) has the link's inertial, which some body has; ""
     when one may have.
     """

@@ -77,7 +77,7 @@ def test_sdf_and_urdf_and_mjcf_are_read_back_by_our_own_reader(properties, tmp_p
     }
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-        (link,) = read_robot(tmp_path / name)
+        (link,) = read_robot(tmp_path / name).links
         assert link.mass == properties.mass
         assert link.center_of_mass.tolist() == properties.center_of_mass.tolist()
         assert off(link.inertia, properties) <= 1e-14, name
@@ -101,7 +101,7 @@ def test_the_com_frame_has_no_offset_and_says_where_the_mesh_goes(properties):
 def test_quaternions_of_half_turns_and_others_give_the_rotation_back(seed):
     from mass_solids import rotation
 
-    from rigid_proto_ros.robots.reading import rotation_from_wxyz
+    from rigid_proto_ros.robots.model import rotation_from_wxyz
 
     for R in (rotation(seed), np.diag([1.0, -1, -1]), np.diag([-1.0, 1, -1]), np.diag([-1.0, -1, 1]), np.eye(3)):
         assert rotation_from_wxyz(quaternion_wxyz(R)) == pytest.approx(R, abs=1e-15)

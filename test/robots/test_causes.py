@@ -9,7 +9,7 @@ import pytest
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.tensor import six_from_tensor
-from rigid_proto_ros.robots.reading import rotation_from_rpy
+from rigid_proto_ros.robots.model import rotation_from_rpy
 
 MASS = 0.7
 RPY = (0.3, -0.5, 0.9)

@@ -14,7 +14,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.robots.diagnosis import Options, compare_robot
 from rigid_proto_ros.robots.link_shapes import LinkShapes, primitive_solid
-from rigid_proto_ros.robots.reading import Shape, printed_steps, rotation_from_rpy
+from rigid_proto_ros.robots.model import Shape, printed_steps, rotation_from_rpy
 
 CUBE = CUBE_VERTICES - 0.5  # about its centre: inertia m/6 on the diagonal
 SIXTH = 1.0 / 6.0
@@ -112,9 +112,9 @@ def test_mjcf_is_read_as_its_compiler_reads_it(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "words_of_refusal"),
     [
-        ('<include file="robot.xml"/>', "included once"),
+        ('<include file="robot.xml"/>', "include themselves"),
         ('<include file="none.xml"/>', "none.xml"),
-        (f'<worldbody><body name="b"><geom class="no" type="sphere"/>{BODY}</body></worldbody>', "default class no"),
+        (f'<worldbody><body name="b"><geom class="no" type="sphere"/>{BODY}</body></worldbody>', "unknown default"),
         ('<compiler coordinate="global"/>', "coordinate"),
     ],
 )

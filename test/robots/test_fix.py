@@ -73,7 +73,7 @@ def test_only_the_inertials_of_a_urdf_change(parts):
     text = data.decode()
     assert "<inertial  >  <!-- weighed: ä -->" in text and '<mass   value=" 2.50 "/><!-- <mass value="9"/> -->' in text
     assert text.count('note=">"') == 1 and re.search(r'<origin rpy="0 0 0" xyz="[^"]+"/>\r\n\t\t</inertial>', text)
-    (arm, _, _, one) = read_robot(_written(path, data))
+    (arm, _, _, one) = read_robot(_written(path, data)).links
     assert arm.mass == 2.5 and arm.center_of_mass == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
     assert one.inertia == pytest.approx(3.0 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-12)
     assert_finds_nothing(path, data, "bare", "open")
@@ -88,7 +88,7 @@ def test_masses_and_densities_of_links_write_what_was_missing(parts):
     path = parts / "robot.urdf"
     path.write_bytes(URDF.encode())
     data, links = fixed(path, masses={"bare": 0.5}, densities={"one": 2000.0})
-    by_name = {link.link: link for link in read_robot(_written(path, data))}
+    by_name = {link.name: link for link in read_robot(_written(path, data)).links}
     assert by_name["bare"].mass == 0.5 and by_name["one"].mass == pytest.approx(2000.0 * 0.006, rel=1e-12)
     assert by_name["bare"].inertia == pytest.approx(0.5 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-12)
     assert links["bare"].before.status == "unknown" and links["bare"].after.status == "uniform"
@@ -99,12 +99,12 @@ def test_a_total_mass_is_shared_out_at_one_density(parts):
     path = parts / "robot.urdf"
     path.write_bytes(URDF.encode())
     data, _ = fixed(path, total_mass=10.0)
-    masses = {link.link: link.mass for link in read_robot(_written(path, data))}
+    masses = {link.name: link.mass for link in read_robot(_written(path, data)).links}
     # The open mesh keeps its kilogram; the arm has two bars, the other link one.
     assert (masses["open"], masses["arm"], masses["one"]) == pytest.approx((1.0, 6.0, 3.0), rel=1e-14)
     path.write_bytes(URDF.encode())
     data, _ = fixed(path, total_mass=10.0, masses={"one": 4.0})
-    masses = {link.link: link.mass for link in read_robot(_written(path, data))}
+    masses = {link.name: link.mass for link in read_robot(_written(path, data)).links}
     assert (masses["arm"], masses["one"]) == pytest.approx((5.0, 4.0), rel=1e-14)
     for options, refusal in (({"total_mass": 0.5}, "total-mass"), ({"masses": {"amr": 1.0}}, "did you mean arm")):
         with pytest.raises(InputError, match=refusal):
@@ -130,7 +130,7 @@ def test_an_sdfs_elements_are_changed_and_added_in_place(parts):
     text = data.decode()
     assert "<mass> 2 </mass> <!-- kg -->" in text and re.search(r"<iyy> [\d.e-]+ </iyy>", text)
     assert re.search(r"\n    <pose>0\.1 \S+ \S+ 0 0 0</pose>\n  </inertial>", text)
-    (link,) = read_robot(_written(path, data))
+    (link,) = read_robot(_written(path, data)).links
     assert link.center_of_mass == pytest.approx([0.1, 0.0, 0.0], abs=1e-15) and link.mass == 2.0
     assert_finds_nothing(path, data)
 
@@ -154,7 +154,7 @@ def test_an_mjcfs_inertials_keep_their_form_and_mujoco_reads_them(parts):
     (parts / "more.xml").write_text(MORE)
     data, links = fixed(path)
     assert outside(data) == outside(MJCF.encode())
-    assert "included file" in links["more"].left
+    assert "another file" in links["more"].left
     text = data.decode()
     assert (
         text.count("fullinertia") == 1

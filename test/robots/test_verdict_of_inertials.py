@@ -12,7 +12,7 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.robots.diagnosis import Options, compare_robot
 from rigid_proto_ros.robots.link_shapes import primitive_surface
-from rigid_proto_ros.robots.reading import LinkInertial, rotation_from_rpy
+from rigid_proto_ros.robots.model import Link, rotation_from_rpy
 from rigid_proto_ros.robots.realizable import MARGIN, beyond_shapes
 
 BOX = '<visual><geometry><box size="1 2 3"/></geometry></visual>'
@@ -105,14 +105,14 @@ def test_visual_and_collision_shapes_together_bound_the_mass(tmp_path):
     }
 
 
-def point_masses(masses, points) -> LinkInertial:
+def point_masses(masses, points) -> Link:
     """The inertial of point masses (n,) at points (n, 3)."""
     center = masses @ points / masses.sum()
     r = points - center
     inertia = (masses[:, None, None] * ((r * r).sum(1)[:, None, None] * np.eye(3) - r[:, :, None] * r[:, None, :])).sum(
         0
     )
-    return LinkInertial("l", float(masses.sum()), center, inertia, ())
+    return Link("l", float(masses.sum()), center, inertia, ())
 
 
 PLACED = st.tuples(
@@ -153,5 +153,5 @@ def test_masses_at_both_ends_of_something_longer_are_found(placed, longer, direc
     ends = middle + np.outer([longer * along.min() - margin, longer * along.max() + margin], axis)
     inertial = point_masses(np.ones(2), ends)
     tiny = 1e-3 * np.trace(inertial.inertia) * np.eye(3)
-    found = LinkInertial("l", inertial.mass, inertial.center_of_mass, inertial.inertia + tiny, ())
+    found = Link("l", inertial.mass, inertial.center_of_mass, inertial.inertia + tiny, ())
     assert beyond_shapes(found, points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""xacro files expanded by the installed ``xacro``, also where no ROS is installed.
+"""The XML of robot files, xacro expanded by the installed ``xacro``, also where no ROS is installed.
 
 xacro asks ament_index_python for ``$(find package)``, which stands in no package index but ROS's own. It is given a
 module of that name that knows the packages which mesh names are looked for in, too.
@@ -15,10 +15,14 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from xml.etree import ElementTree
+from xml.parsers import expat
 
 from ..base.errors import InputError
+from ..base.files import read_bounded
 from ..mesh.locate import Search, package_folder
 
+MAX_BYTES = 50_000_000
 TIMEOUT_S = 60.0
 """The largest descriptions expand in a few seconds."""
 MAX_FILES = 2000
@@ -38,6 +42,41 @@ def get_package_share_directory(name):
         raise PackageNotFoundError(f"package {{name}} was not found; --package-path DIR says where it is")
     return FOLDERS[name]
 """
+
+
+def robot_root(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()) -> ElementTree.Element:
+    """The root of a robot file, xacro expanded with arguments like ``name:=value``, packages looked for upwards from
+    the file and in ``folders``; raises InputError when the file can't be read.
+    """
+    root = parse_xml(read_bounded(path, MAX_BYTES, "robot file", "a URDF, SDF or MJCF file"), path)
+    if is_xacro(root, path):
+        return parse_xml(expand_xacro(path, Search(path.parent, folders), xacro), path)
+    if xacro:
+        raise InputError("--xacro", " ".join(xacro), "a file that xacro expands")
+    return root
+
+
+def is_xacro(root: ElementTree.Element, path: Path) -> bool:
+    """Whether the file is to be expanded by xacro before it is a robot's description."""
+    return path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter())
+
+
+def parse_xml(data: bytes, path: Path) -> ElementTree.Element:
+    """The root of a file's XML, names as they are written: SDFs use prefixes (gz:) that they don't declare.
+
+    Raises InputError for what is no XML, or has entities.
+    """
+    if b"<!ENTITY" in data:
+        raise InputError("robot file", path.name, "a file without XML entities")
+    tree = ElementTree.TreeBuilder()
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
+    try:
+        parser.Parse(data, True)
+        return tree.close()
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise InputError("robot file", path.name, f"well-formed XML ({error})") from None
 
 
 def _packages(path: Path, search: Search) -> dict[str, str]:

@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: MIT
+"""A robot as its file has it, in whichever format: links with inertials and shapes, and the joints that place them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.errors import InputError, one_of
+from ..base.rotation import matrix_from_quaternion
+from ..mass.tensor import tensor_from_six
+
+VISUAL, COLLISION = "visual", "collision"
+TURNS, SLIDES, FIXED, OTHER = "turns", "slides", "fixed", "other"
+WATER = 1000.0
+"""kg/m³ of a shape of which nothing else is said."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Rotation (3, 3) and position (3,) [m] of a frame in another."""
+
+    rotation: np.ndarray
+    position: np.ndarray
+
+    def __matmul__(self, inner: Pose) -> Pose:
+        return Pose(self.rotation @ inner.rotation, self.rotation @ inner.position + self.position)
+
+    def inverse(self) -> Pose:
+        """The other frame's pose in this one."""
+        return Pose(self.rotation.T, -(self.rotation.T @ self.position))
+
+
+HERE = Pose(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape as a link shows it or collides with it: kind "mesh" with ``file`` and scale (3,), or with ``size`` [m] a
+    "box" (sides), "cylinder" or "capsule" (radius, length along z, the capsule's without its caps), "sphere" (radius)
+    or "ellipsoid" (semi-axes); rotation (3, 3) and position (3,) [m] in the link's frame; ``problem``: why it can't be
+    taken; density [kg/m³]."""
+
+    role: str
+    kind: str
+    rotation: np.ndarray
+    position: np.ndarray
+    file: str = ""
+    scale: np.ndarray = field(default_factory=lambda: np.ones(3))
+    size: tuple[float, ...] = ()
+    problem: str = ""
+    density: float = WATER
+
+
+@dataclass(frozen=True)
+class Link:
+    """What a file says of one link: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
+    axes; ``problem`` instead when there are none. The steps are half a unit of the last digit printed, for mass, COM
+    (3,) and tensor (3, 3): what a number may be off by for its printing alone. ``element``: the <inertial> that was
+    read, or the whole link where it has none that can be, None where the file has it from elsewhere. ``computed``: a
+    simulator computes the inertial from the collision shapes, for the mass if there is one.
+    """
+
+    name: str
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+    shapes: tuple[Shape, ...]
+    problem: str = ""
+    mass_step: float = 0.0
+    center_step: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia_step: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+    element: Element | None = None
+    computed: bool = False
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A motion along or about ``axis`` (3,) in its own frame, by the joint's value [rad or m] less ``zero``. ``mimic``:
+    the joint that it follows, with factor and offset."""
+
+    name: str
+    kind: str
+    axis: np.ndarray
+    zero: float = 0.0
+    mimic: tuple[str, float, float] | None = None
+
+    def moved(self, value: float) -> Pose:
+        """The pose that ``value`` gives."""
+        if value == self.zero:
+            return HERE
+        size = float(np.linalg.norm(self.axis))
+        if not size > 0.0:
+            raise InputError("joint", self.axis.tolist(), "an axis that isn't zero")
+        if self.kind == SLIDES:
+            return Pose(np.eye(3), self.axis / size * (value - self.zero))
+        half = 0.5 * (value - self.zero)
+        return Pose(rotation_from_wxyz([math.cos(half), *(math.sin(half) * self.axis / size)]), np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Connection:
+    """What holds a link to its parent (None: to the frame of the file): poses and joints, from the parent on."""
+
+    parent: str | None
+    child: str
+    path: tuple[Pose | Joint, ...]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """``links``: those with an inertial or a shape, in the file's order. ``names``: of all links. ``connections``
+    raises InputError for joints that can't be read. ``simulated``: the links with the inertials that the format's own
+    simulator takes, where these aren't the file's."""
+
+    links: list[Link]
+    names: list[str]
+    connections: Callable[[], Iterable[Connection]]
+    simulated: Callable[[], list[Link]] | None = None
+
+    def poses(self, values: Mapping[str, float]) -> dict[str, Pose]:
+        """Poses of the links by name, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF),
+        at joint ``values`` [rad or m].
+
+        Raises InputError for joints that aren't there or have no one value, and for links that make no tree.
+        """
+        connections = list(self.connections())
+        below: dict[str | None, list[Connection]] = {}
+        children: set[str] = set()
+        for connection in connections:
+            if connection.child in children:
+                accepted = "joints that make a tree"
+                raise InputError("lump", f"link {connection.child!r} is the child of two joints; accepted: {accepted}")
+            children.add(connection.child)
+            below.setdefault(connection.parent, []).append(connection)
+        roots = [name for name in self.names if name not in children]
+        if not (None in below and not roots) and len(roots) != 1:
+            raise InputError("lump", f"{len(roots)} root links ({', '.join(roots[:4])}); accepted: one tree of links")
+        value = _values(connections, values)
+        poses: dict[str, Pose] = dict.fromkeys(roots, HERE)
+        waiting: list[str | None] = [None, *roots]
+        while waiting:
+            parent = waiting.pop()
+            for connection in below.get(parent, ()):
+                pose = HERE if parent is None else poses[parent]
+                for step in connection.path:
+                    pose = pose @ (step.moved(value(step)) if isinstance(step, Joint) else step)
+                poses[connection.child] = pose
+                waiting.append(connection.child)
+        return poses
+
+
+def _values(connections: list[Connection], given: Mapping[str, float]) -> Callable[[Joint], float]:
+    """The value of each joint; raises InputError for given ones of joints that aren't there, or have no one value."""
+    joints = {step.name: step for connection in connections for step in connection.path if isinstance(step, Joint)}
+    movable = [name for name, joint in joints.items() if joint.kind in (TURNS, SLIDES)]
+    for name in given:
+        if name not in joints:
+            raise InputError("joint", name, one_of(name, movable) if movable else "a robot with joints")
+        if name not in movable:
+            reason = "is fixed" if joints[name].kind == FIXED else "has more than one axis"
+            raise InputError("joint", f"{name} {reason}; {one_of('', movable) or 'no joint moves'}")
+
+    def value(joint: Joint, depth: int = 0) -> float:
+        if joint.name in given:
+            return given[joint.name]
+        if joint.mimic is None or joint.mimic[0] not in joints:
+            return joint.zero
+        if depth > len(joints):
+            raise InputError("lump", f"joint {joint.name!r} mimics itself")
+        followed, factor, offset = joint.mimic
+        return factor * value(joints[followed], depth + 1) + offset
+
+    return value
+
+
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Rotation (3, 3) of fixed-axes roll, pitch, yaw [rad], as URDF and SDF have them."""
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
+    """Rotation (3, 3) of a quaternion (w, x, y, z), MuJoCo's order, of any length but 0."""
+    w, x, y, z = (np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))).tolist()
+    return matrix_from_quaternion([x, y, z, w])
+
+
+def floats(text: str | None, default: str, count: int) -> np.ndarray:
+    """``count`` numbers of a text; raises ValueError for others."""
+    values = np.array([float(word) for word in (text or default).split()])
+    if len(values) != count:
+        raise ValueError(f"{text!r} instead of {count} numbers")
+    return values
+
+
+def printed_steps(words: list[str]) -> np.ndarray:
+    """Half a unit of the last digit of each number of a group, as a printer of fixed decimals or of fixed digits leaves
+    it open: 0.0005 for 0.012 alone. Trailing zeros that such a printer drops count, as the others of the group show
+    them.
+    """
+    values = [float(word) for word in words]
+    if not any(values):
+        return np.zeros(len(words))
+    decimals, digits = [], []
+    for word in words:
+        mantissa, _, exponent = word.strip().lower().partition("e")
+        decimals.append(len(mantissa.partition(".")[2]) - int(exponent or 0))
+        digits.append(len(mantissa.replace(".", "").lstrip("+-0")))
+    steps = []
+    for value, own in zip(values, decimals, strict=True):
+        leading = math.floor(math.log10(abs(value))) if value and math.isfinite(value) else -400
+        steps.append(0.5 * 10.0 ** max(-max(decimals), min(-own, leading - max(digits) + 1)))
+    return np.array(steps)
+
+
+def printed_link(
+    bare: Link, mass: str, center: list[str], six: list[str], rotation: np.ndarray, element: Element | None
+) -> Link:
+    """The link with an inertial from a file's words: mass, COM (three, or none for 0), and the six entries of the
+    tensor in axes turned by ``rotation``.
+    """
+    step = tensor_from_six(printed_steps(six).tolist())
+    return replace(
+        bare,
+        mass=float(mass),
+        center_of_mass=floats(" ".join(center), "0 0 0", 3),
+        inertia=rotation @ tensor_from_six([float(word) for word in six]) @ rotation.T,
+        problem="",
+        mass_step=float(printed_steps([mass])[0]),
+        center_step=printed_steps(center) if center else np.zeros(3),
+        inertia_step=np.abs(rotation) @ step @ np.abs(rotation).T,
+        element=element,
+    )
+
+
+def bare_link(
+    name: str, shapes: Iterable[Shape | None], element: Element | None, problem: str = "no <inertial>"
+) -> Link:
+    """A link of which the file doesn't say the mass or the tensor."""
+    present = tuple(shape for shape in shapes if shape is not None)
+    nothing = math.nan, np.full(3, math.nan), np.full((3, 3), math.nan)
+    return Link(name, *nothing, present, problem, element=element)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""Files that were misread or refused without need: MJCF as MuJoCo compiles it, SDF as Gazebo takes it."""
+
+import numpy as np
+import pytest
+from mesh_files import CUBE_VERTICES, stl
+from test_composite_inertia import as_one_body, assert_same
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.robots.composite_inertia import lump_robot
+from rigid_proto_ros.robots.diagnosis import Options, compare_robot
+
+SIX_KG = '<inertial pos="0.1 0 0" mass="6" diaginertia="0.2 0.3 0.4" euler="0 0 30"/>'
+CHILD = f"""<mujoco model="child"><compiler angle="radian"/><default><geom type="capsule" size="0.1 0.2"/></default>
+<worldbody><body name="c" pos="0 0 1" euler="0 0 0.3">{SIX_KG.replace("30", "0.7")}<joint name="turn" axis="0 1 0"/><geom/></body></worldbody>
+</mujoco>"""
+MODELS = {
+    "attach": f"""<mujoco><asset><model name="child" file="child.xml"/></asset><worldbody><body name="a">{SIX_KG}
+      <frame pos="0 1 0" euler="20 0 0"><attach model="child" body="c" prefix="x_"/></frame></body></worldbody></mujoco>""",
+    "frame": f"""<mujoco><worldbody><frame pos="0 1 0" euler="20 0 0"><body name="a">{SIX_KG}</body>
+      <frame pos="1 0 0"><body name="b" pos="0 0 2">{SIX_KG}</body></frame></frame></worldbody></mujoco>""",
+    "settotalmass": f"""<mujoco><compiler settotalmass="10"/><worldbody><body name="a">{SIX_KG}
+      <body name="b" pos="0 0 1">{SIX_KG}</body></body></worldbody></mujoco>""",
+    "boundmass": f"""<mujoco><compiler boundmass="2"/><worldbody><body name="a">{SIX_KG}<body name="b" pos="0 0 1">
+      <inertial pos="0 0 0" mass="0.5" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>""",
+    "geoms": """<mujoco><default><geom density="500"/></default><worldbody><body name="a"><geom size="0.2"/>
+      <body name="b" pos="0 0 1"><geom type="box" size="0.1 0.2 0.3" mass="3"/></body></body></worldbody></mujoco>""",
+    "replicate": f"""<mujoco><worldbody><replicate count="3" euler="0 0 30"><body name="a" pos="1 0 0">{SIX_KG}</body>
+      </replicate></worldbody></mujoco>""",
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_mjcf_weighs_what_it_weighs_in_mujoco(tmp_path, name, monkeypatch):
+    mujoco = pytest.importorskip("mujoco")
+    (tmp_path / "child.xml").write_text(CHILD)
+    path = tmp_path / "model.xml"
+    path.write_text(MODELS[name])
+    monkeypatch.chdir(tmp_path)
+    values = {"x_turn": 0.4} if name == "attach" else {}
+    assert_same(lump_robot(path, values), as_one_body(mujoco.MjModel.from_xml_path("model.xml"), values))
+
+
+def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
+    pytest.importorskip("mujoco")
+    (tmp_path / "geom.xml").write_text('<mujocoinclude><geom type="box" size="0.1 0.2 0.3"/></mujocoinclude>')
+    inertial = '<inertial pos="0 0 0" mass="12" diaginertia="0.52 0.4 0.2"/>'
+    body = f'<body name="%s">{inertial}<include file="geom.xml"/>%s</body>'
+    lost = '<geom type="mesh" mesh="m" contype="0" conaffinity="0"/>'
+    asset = '<asset><mesh name="m" file="lost.dae"/><texture name="t" type="2d" file="lost.png"/></asset>'
+    path = tmp_path / "model.xml"
+    path.write_text(f"<mujoco>{asset}<worldbody>{body % ('a', lost)}{body % ('b', '')}</worldbody></mujoco>")
+    assert {d.link: d.status for d in compare_robot(path, Options())} == {"a": "uniform", "b": "uniform"}
+    assert lump_robot(path, {}).properties.mass == 24.0
+
+
+def test_an_mjcf_with_an_inertial_that_mujoco_refuses_is_judged(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    path = tmp_path / "model.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="a"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 5"/>'
+        '<geom size="1"/></body></worldbody></mujoco>'
+    )
+    (link,) = compare_robot(path, Options())
+    assert link.status == "impossible"
+    # As one body it is what MuJoCo makes of it, which is nothing.
+    with pytest.raises(InputError, match=r"A \+ B"):
+        lump_robot(path, {})
+    assert main(["inspect", "--compare", str(path)]) == 1
+
+
+def test_without_mujoco_an_mjcf_is_refused_with_the_extra_that_reads_it(tmp_path, monkeypatch):
+    path = tmp_path / "model.xml"
+    path.write_text("<mujoco/>")
+    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
+    with pytest.raises(InputError, match=r"rigid_proto_ros\[robots\]"):
+        compare_robot(path, Options())
+
+
+def sdf(folder, links: str):
+    (folder / "cube.stl").write_bytes(stl(CUBE_VERTICES - 0.5))
+    path = folder / "model.sdf"
+    path.write_text(
+        f'<sdf version="1.11"><model name="m">{links}<plugin name="p" filename="f"><gz:system gz:on="1"/></plugin></model></sdf>'
+    )
+    return path
+
+
+BOX = (
+    '<collision name="{0}"><pose>{1} 0 0 0 0 0</pose>{2}<geometry><box><size>1 1 1</size></box></geometry></collision>'
+)
+
+
+def test_prefixes_that_an_sdf_does_not_declare_are_names_like_others(tmp_path):
+    inertia = "<inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia>"
+    path = sdf(
+        tmp_path, f'<link name="a"><inertial><mass>6.0000</mass>{inertia}</inertial>{BOX.format("c", 0, "")}</link>'
+    )
+    (link,) = compare_robot(path, Options())
+    assert link.status == "uniform"
+
+
+def test_an_inertial_that_gazebo_computes_counts_as_its_collision_shapes(tmp_path, capsys):
+    light, heavy = (f"<density>{value}</density>" for value in (100, 300))
+    shapes = BOX.format("c1", -1, light) + BOX.format("c2", 1, heavy)
+    path = sdf(tmp_path, f'<link name="a"><inertial auto="true"/>{shapes}</link>')
+    (link,) = compare_robot(path, Options())
+    assert link.status == "unknown" and "auto" in link.note
+    properties = lump_robot(path, {}).properties
+    # 100 kg at x = -1, 300 kg at x = 1; a cube of side 1 has m/6 about each axis.
+    assert properties.mass == pytest.approx(400.0, rel=1e-14)
+    assert properties.center_of_mass == pytest.approx([0.5, 0.0, 0.0], abs=1e-14)
+    across = 400.0 / 6.0 + 100.0 * 1.5**2 + 300.0 * 0.5**2
+    assert properties.inertia == pytest.approx(np.diag([400.0 / 6.0, across, across]), rel=1e-13, abs=1e-12)
+    path = sdf(tmp_path, f'<link name="a"><inertial auto="true"><mass>4</mass></inertial>{shapes}</link>')
+    assert lump_robot(path, {}).properties.inertia == pytest.approx(properties.inertia / 100.0, rel=1e-13, abs=1e-14)
+    density = "<inertial auto='true'><density>50</density></inertial>"
+    path = sdf(tmp_path, f'<link name="a">{density}{BOX.format("c", 0, "")}</link>')
+    assert lump_robot(path, {}).properties.mass == pytest.approx(50.0, rel=1e-14)
+
+
+def test_a_robot_without_shapes_is_judged_and_may_be_right(tmp_path, capsys):
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="r"><link name="a">{inertial}</link><link name="frame"/></robot>')
+    assert main(["inspect", "--compare", str(path)]) == 0
+    assert "a: unknown; no shape" in capsys.readouterr().out
