@@ -13,7 +13,6 @@ from mpmath import mp, mpf
 from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
-from rigid_proto_ros.motion import problem as of
 from rigid_proto_ros.motion.variables import LOW
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -27,7 +26,7 @@ class CommittedStep:
     integrator had reported by then that rounding, not the accuracy, sets what a step may err.
     """
 
-    problem: np.ndarray
+    problem: np.record
     before: np.ndarray
     after: np.ndarray
     begin_ns: int
@@ -76,7 +75,7 @@ def committed_steps(
 
 def local_error(step: CommittedStep, digits: int = 22) -> float:
     """Largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s) of a step."""
-    p, length = step.problem, step.problem[of.LENGTH]
+    p, length = step.problem, step.problem.length
     with mp.workdps(digits + 10):
         # Attitude and displacement have low words beside them.
         y = [mpf(float(c)) for c in step.before]
@@ -96,50 +95,50 @@ def local_error(step: CommittedStep, digits: int = 22) -> float:
     return max(angle, moved / length, spun / max(spin, 1.0), sped / max(speed, length))
 
 
-def _reference_velocity(p: np.ndarray, time: float) -> np.ndarray:
+def _reference_velocity(p: np.record, time: float) -> np.ndarray:
     """Of the closed-form part of the translation [m/s]."""
     v, a = (
-        p[of.REFERENCE_VELOCITY : of.REFERENCE_VELOCITY + 3],
-        p[of.REFERENCE_ACCELERATION : of.REFERENCE_ACCELERATION + 3],
+        p.reference_velocity,
+        p.reference_acceleration,
     )
-    c = p[of.REFERENCE_DAMPING]
+    c = p.reference_damping
     if c == 0.0:
         return v + time * a
     decay = np.exp(-c * time)
     return v * decay + a * (1.0 - decay) / c
 
 
-def reference_problem(p: np.ndarray) -> ReferenceProblem:
+def reference_problem(p: np.record) -> ReferenceProblem:
     """The same motion in principal axes for the reference; its position is the added displacement."""
-    mass = float(p[of.MASS])
+    mass = float(p.mass)
     string = None
-    if p[of.HAS_STRING]:
+    if p.has_string:
         string = ReferenceString(
-            point=_triple(p, of.ATTACH),
-            target=tuple(-c for c in _triple(p, of.STRING_START)),
-            stiffness=float(p[of.STIFFNESS]),
-            damping=float(p[of.STRING_DAMPING]),
-            rest_length=float(p[of.REST_LENGTH]),
-            bilateral=bool(p[of.BILATERAL]),
+            point=_triple(p.attach, 0),
+            target=tuple(-c for c in _triple(p.string_start)),
+            stiffness=float(p.stiffness),
+            damping=float(p.string_damping),
+            rest_length=float(p.rest_length),
+            bilateral=bool(p.bilateral),
         )
     with mp.workdps(50):
         # The problem holds accelerations; forces are exact products of them with the mass.
-        force_body = tuple(mpf(mass) * mpf(c) for c in _triple(p, of.ACCELERATION_BODY))
-        damping = mpf(mass) * mpf(float(p[of.DAMPING_LINEAR]))
+        force_body = tuple(mpf(mass) * mpf(c) for c in _triple(p.acceleration_body))
+        damping = mpf(mass) * mpf(float(p.damping_linear))
     return ReferenceProblem(
         mass=mass,
-        inertia=tuple(tuple(float(p[of.MOMENTS + i]) if i == j else 0.0 for j in range(3)) for i in range(3)),
-        gravity=_triple(p, of.ACCELERATION_ADDED),
+        inertia=tuple(tuple(float(p.moments[i]) if i == j else 0.0 for j in range(3)) for i in range(3)),
+        gravity=_triple(p.acceleration_added, 0),
         force_body=force_body,
-        torque_world=_triple(p, of.TORQUE_WORLD),
-        torque_body=_triple(p, of.TORQUE_BODY),
-        moment=tuple(_triple(p, of.MOMENT + 3 * i) for i in range(3)),
+        torque_world=_triple(p.torque_world, 0),
+        torque_body=_triple(p.torque_body, 0),
+        moment=tuple(_triple(p.moment, 3 * i) for i in range(3)),
         linear_damping=damping,
-        angular_damping=float(p[of.DAMPING_ANGULAR]),
-        gyroscopic=bool(p[of.GYROSCOPIC]),
+        angular_damping=float(p.damping_angular),
+        gyroscopic=bool(p.gyroscopic),
         string=string,
     )
 
 
-def _triple(p: np.ndarray, at: int) -> tuple[float, float, float]:
+def _triple(p: np.ndarray, at: int = 0) -> tuple[float, float, float]:
     return tuple(float(c) for c in p[at : at + 3])

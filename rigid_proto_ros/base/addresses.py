@@ -15,20 +15,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import boolean, carray, float64, int64, types
+from numba import carray, from_dtype, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 from numba.core.typing.templates import Signature
 
 from .compilation import INTERPRETED, intrinsic, njit
-
-STEPS = types.FunctionType(int64(float64[::1], float64[::1], float64, int64))
-"""A kernel (y, p, h, n)."""
-
-ADAPTIVE_STEPS = types.FunctionType(
-    int64(float64[::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], int64, boolean)
-)
-"""A kernel (y, p, control, following, workspace, span_ns, sampling)."""
 
 _kept: dict[int, Any] = {}
 """What stands at the addresses given away: code must not be collected while an array points at it."""
@@ -57,11 +49,11 @@ def entry_of(kernel: Callable, signature: Signature) -> Callable:
     return kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]  # numba's
 
 
-def _function_at(taken_as: types.FunctionType) -> Callable:
+def function_at(taken_as: types.FunctionType) -> Callable:
     """The compiled function that turns an address into a function of this signature."""
 
     @intrinsic
-    def function_at(_typing_context: Any, _address: Any) -> tuple:
+    def at(_typing_context: Any, _address: Any) -> tuple:
         def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             function = cgutils.create_struct_proxy(taken_as)(context, builder)
             nothing = cgutils.get_null_value(cgutils.voidptr_t)
@@ -71,11 +63,7 @@ def _function_at(taken_as: types.FunctionType) -> Callable:
 
         return taken_as(int64), code
 
-    return _kept.__getitem__ if INTERPRETED else function_at
-
-
-steps_at = _function_at(STEPS)
-adaptive_steps_at = _function_at(ADAPTIVE_STEPS)
+    return _kept.__getitem__ if INTERPRETED else at
 
 
 def address_of_array(array: np.ndarray) -> int:
@@ -94,19 +82,19 @@ def _pointer_to(kind: types.Type) -> Callable:
     return pointer
 
 
-def _array_at(kind: types.Type, dtype: type) -> Callable:
-    """The function (address, shape) that gives a contiguous array of this kind."""
-    pointer = _pointer_to(kind)
+def array_at(dtype: np.dtype) -> Callable:
+    """The function (address, shape) that gives a contiguous array of these."""
+    pointer = _pointer_to(from_dtype(dtype))
 
     @njit(cache=True, error_model="numpy")
     def compiled(address: int, shape: tuple[int, ...]) -> np.ndarray:
         return carray(pointer(address), shape)
 
     def interpreted(address: int, shape: tuple[int, ...]) -> np.ndarray:
-        bytes_there = (ctypes.c_char * (8 * int(np.prod(shape)))).from_address(int(address))
+        bytes_there = (ctypes.c_char * (dtype.itemsize * int(np.prod(shape)))).from_address(int(address))
         return np.frombuffer(memoryview(bytes_there), dtype).reshape(shape)
 
     return interpreted if INTERPRETED else compiled
 
 
-doubles_at, integers_at = _array_at(float64, np.float64), _array_at(int64, np.int64)
+doubles_at = array_at(np.dtype(np.float64))

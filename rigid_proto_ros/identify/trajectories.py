@@ -10,17 +10,18 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
-from numba import int64, types
+from numba import from_dtype, int64, types
 
 from ..base.compilation import njit
 from ..base.rotation import quaternion_of_axes, rotate_inverse
+from ..base.uncounted_arrays import copy_numbers
 from ..mass.tensor import principal_axes_kernel
 from ..motion import body as of_body
 from ..motion import loads as ld
-from ..motion import problem as pr
 from ..motion.integrators.auto import AUTO
-from ..motion.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
+from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
 from ..motion.integrators.taylor_adaptive import degree_for
+from ..motion.problem import begin_body
 from ..simulation import flight as fl
 
 ACCURACY = 1e-11
@@ -119,54 +120,50 @@ def _fly_all(
     times_ns: np.ndarray,
     commands: np.ndarray,
     loads: np.ndarray,
-    methods: np.ndarray,
     degree: int,
+    tables: tuple,
     samples: np.ndarray,
     good: np.ndarray,
 ) -> int:
     """Each row of flown (n, FLOWN) through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
-    came through.
+    came through. tables: methods, one flight, loads with room for all commands, events and workspace, as
+    simulation/flight.py takes them.
 
     Returns DONE, or the number of the method that must be compiled first.
     """
-    count, room = commands.shape[0], 0
-    for k in range(methods.shape[0]):
-        room = max(room, methods[k, ROWS] * methods[k, COLUMNS])
-    f, n = np.zeros(fl.ROOM + room), np.zeros(fl.INTEGERS, np.int64)
-    events = np.zeros((4 * count + 8, fl.EVENT), np.int64)
-    rows_ns, rows = np.zeros((count + 1, fl.TIMES), np.int64), np.zeros((count + 1, fl.LOAD_ROW))
+    methods, flights, rows, events, room = tables
+    count, flight = commands.shape[0], flights[0]
     body = np.zeros(of_body.BODY)
     for i in range(flown.shape[0]):
         own = flown[i]
         good[i] = 0
         if not _make_body(own, body):
             continue
-        f[: fl.ROOM] = 0.0
-        n[:] = 0
-        n[fl.METHOD], n[fl.CHOOSES] = -1, 1
-        n[fl.STEP_NS] = 1_000_000
-        row = f[fl.ROW : fl.ROW + 13]
-        row[:] = own[START : START + 13]
-        f[fl.START : fl.START + 13] = row
-        f[fl.BODY : fl.BODY + of_body.BODY] = body
-        common = f[fl.COMMON : fl.COMMON + pr.SIZE]
-        pr.begin_body(common, body, own[GRAVITY : GRAVITY + 3], own[LINEAR_DAMPING], own[ANGULAR_DAMPING], 1.0)
-        f[fl.ACCURACY], f[fl.DEGREE] = ACCURACY, degree
+        fl.begin_flight(flight)
+        flight.method, flight.chooses, flight.step_ns = -1, True, 1_000_000
+        flight.timeout_ns, flight.poke_ns = 0, 0
+        copy_numbers(own[START:], flight.row)
+        copy_numbers(flight.row, flight.start)
+        copy_numbers(body, flight.body)
+        damping = (own[LINEAR_DAMPING], own[ANGULAR_DAMPING])
+        begin_body(flight.common, body, own[GRAVITY : GRAVITY + 3], damping[0], damping[1], 1.0)
+        flight.accuracy, flight.degree = ACCURACY, degree
         for c in range(count):
-            rows_ns[c, :3] = commands[c]
-            rows[c, : ld.LOAD] = loads[c]
-        n[fl.DUE_END] = count
-        fl.begin_segment(f, n, rows, methods)
+            row = rows[c]
+            row.at_ns, row.duration_ns, row.kind, row.slot = commands[c, 0], commands[c, 1], commands[c, 2], fl.NO_SLOT
+            copy_numbers(loads[c], row.load)
+        flight.due_end = count
+        fl.begin_segment(flight, rows, methods, room)
         good[i] = 1
         for k in range(times_ns.shape[0]):
-            came = fl.fly(f, n, rows_ns, rows, events, methods, times_ns[k])
+            came = fl.fly(flight, rows, events, methods, room, times_ns[k])
             if came == fl.NO_KERNEL:
-                return n[fl.METHOD]
+                return int(flight.method)
             if came != fl.REACHED:
                 good[i] = 0
                 break
-            samples[i, k, :13] = row
-            _rates(own, body, f[fl.SUMS : fl.SUMS + ld.LOADS_SIZE], row, samples[i, k])
+            copy_numbers(flight.row, samples[i, k, :13])
+            _rates(own, body, flight.sums, flight.row, samples[i, k])
     return DONE
 
 
@@ -174,7 +171,9 @@ def _fly_all(
 def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
     """``_fly_all`` compiled, or loaded from the cache, the table of the methods, and the degree of their series."""
     flat, table, cube = types.float64[:, ::1], types.int64[:, ::1], types.float64[:, :, ::1]
-    signature = int64(flat, types.int64[::1], table, flat, table, int64, cube, types.int64[::1])
+    records = tuple(from_dtype(kind)[::1] for kind in (METHOD, fl.FLIGHT, fl.LOAD_ROW, fl.EVENT))
+    tables = types.Tuple((*records, types.float64[::1]))
+    signature = int64(flat, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
     degree = degree_for(ACCURACY)
     methods = method_table(AUTO, degree)
     return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_all), methods, degree
@@ -187,8 +186,11 @@ def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tup
     kernel, methods, degree = _compiled()
     samples = np.empty((len(flown), len(times_ns), SAMPLE))
     good = np.zeros(len(flown), np.int64)
+    count, room = len(wrenches.commands), np.zeros(max(1, workspace_size(methods)))
+    rows, events = np.zeros(count + 1, fl.LOAD_ROW), np.zeros(4 * count + 8, fl.EVENT)
+    tables = methods, np.zeros(1, fl.FLIGHT), rows, events, room
     while True:
-        wanted = kernel(flown, times_ns, wrenches.commands, wrenches.loads, methods, degree, samples, good)
+        wanted = kernel(flown, times_ns, wrenches.commands, wrenches.loads, degree, tables, samples, good)
         if wanted == DONE:
             return samples, good == 1
         provide_kernel(AUTO, methods, wanted)

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an integrator is given for one segment, as one flat array that compiled kernels read by name.
-
-Kernels import this module as ``of``: ``p[of.MASS]`` is the mass of the problem p.
+"""What an integrator is given for one segment: the problem p, a record.
 
 Within a segment all commands are constant. Everything is in principal axes (the body's, turned so that the tensor is
 diagonal): I₁ ≤ I₂ ≤ I₃, torques τ and arms r. The motion is
@@ -22,38 +20,42 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.records import record_type
 from . import body as of_body
 from . import loads as of_loads
 
-MOMENTS = 0  # (3,) principal moments [kg m²]
-TORQUE_BODY = 3  # (3,) τ_b [N m]
-TORQUE_WORLD = 6  # (3,) τ_w [N m]
-MOMENT = 9  # (9,) M row by row [N m]
-ACCELERATION_BODY = 18  # (3,) g_b [m/s²]
-ACCELERATION_ADDED = 21  # (3,) constant world acceleration of the added motion [m/s²]
-DAMPING_LINEAR = 24  # c_v [1/s]
-DAMPING_ANGULAR = 25  # c_ω [N m s]
-GYROSCOPIC = 26  # 1, or 0 to drop ω × Iω
-HAS_WORLD_TORQUE = 27  # 1 when τ_w or M isn't zero: only then is R needed
-TRANSLATES = 28  # 1 when there is an added motion, so that translation must be integrated
-START_POSITION = 29  # (3,) x at the segment's start
-REFERENCE_VELOCITY = 32  # (3,) of the reference at the segment's start [m/s]
-REFERENCE_ACCELERATION = 35  # (3,) [m/s²]
-REFERENCE_DAMPING = 38  # [1/s]
-START_VELOCITY_ADDED = 39  # (3,) added velocity at the segment's start [m/s]
-PRINCIPAL_AXES = 42  # (9,) P row by row: body = P principal
-PRINCIPAL_QUATERNION = 51  # (4,) the same as a quaternion xyzw
-MASS = 55  # [kg]
-LENGTH = 56  # ℓ, what a displacement error is measured by [m]
-HAS_STRING = 57  # 1 when a string is tied
-STIFFNESS = 58  # k [N/m]
-STRING_DAMPING = 59  # c [N s/m]
-REST_LENGTH = 60  # [m]
-BILATERAL = 61  # 1 when the string pushes too; always so for rest length 0, where it can't
-ATTACH = 62  # (3,) r of the knot [m, principal]
-STRING_START = 65  # (3,) COM minus free end at the segment's start [m, world]
-HAND_VELOCITY = 68  # (3,) of the free end [m/s, world]
-SIZE = 71
+PROBLEM = record_type(
+    [
+        ("moments", np.float64, 3),  # principal moments [kg m²]
+        ("torque_body", np.float64, 3),  # τ_b [N m]
+        ("torque_world", np.float64, 3),  # τ_w [N m]
+        ("moment", np.float64, 9),  # M row by row [N m]
+        ("acceleration_body", np.float64, 3),  # g_b [m/s²]
+        ("acceleration_added", np.float64, 3),  # constant world acceleration of the added motion [m/s²]
+        ("damping_linear", np.float64),  # c_v [1/s]
+        ("damping_angular", np.float64),  # c_ω [N m s]
+        ("gyroscopic", np.float64),  # 1, or 0 to drop ω × Iω
+        ("has_world_torque", np.bool_),  # when τ_w or M isn't zero: only then is R needed
+        ("translates", np.bool_),  # when there is an added motion, so that translation must be integrated
+        ("start_position", np.float64, 3),  # x at the segment's start
+        ("reference_velocity", np.float64, 3),  # of the reference at the segment's start [m/s]
+        ("reference_acceleration", np.float64, 3),  # [m/s²]
+        ("reference_damping", np.float64),  # [1/s]
+        ("start_velocity_added", np.float64, 3),  # added velocity at the segment's start [m/s]
+        ("principal_axes", np.float64, 9),  # P row by row: body = P principal
+        ("principal_quaternion", np.float64, 4),  # the same as a quaternion xyzw
+        ("mass", np.float64),  # [kg]
+        ("length", np.float64),  # ℓ, what a displacement error is measured by [m]
+        ("has_string", np.bool_),  # when a string is tied
+        ("stiffness", np.float64),  # k [N/m]
+        ("string_damping", np.float64),  # c [N s/m]
+        ("rest_length", np.float64),  # [m]
+        ("bilateral", np.bool_),  # when the string pushes too; always so for rest length 0, where it can't
+        ("attach", np.float64, 3),  # r of the knot [m, principal]
+        ("string_start", np.float64, 3),  # COM minus free end at the segment's start [m, world]
+        ("hand_velocity", np.float64, 3),  # of the free end [m/s, world]
+    ]
+)
 
 
 # Where the numbers of a tied string stand in its row.
@@ -66,81 +68,82 @@ STRING = 13
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def begin_body(
-    p: np.ndarray,
+    p: np.record,
     body: np.ndarray,
     gravity: np.ndarray,
     linear_damping: float,
     angular_damping: float,
     gyroscopic: float,
 ) -> None:
-    """Fill p with what is the same in every segment of a body (BODY,): all but loads, string and start."""
-    p[:] = 0.0
+    """Fill p, a record of zeros, with what is the same in every segment of a body (BODY,): all but loads, string and
+    start.
+    """
     for k in range(3):
-        p[MOMENTS + k] = body[of_body.MOMENTS + k]
-        p[REFERENCE_ACCELERATION + k] = gravity[k]
+        p.moments[k] = body[of_body.MOMENTS + k]
+        p.reference_acceleration[k] = gravity[k]
     for k in range(9):
-        p[PRINCIPAL_AXES + k] = body[of_body.AXES + k]
+        p.principal_axes[k] = body[of_body.AXES + k]
     for k in range(4):
-        p[PRINCIPAL_QUATERNION + k] = body[of_body.QUATERNION + k]
-    p[DAMPING_LINEAR] = linear_damping / body[of_body.MASS]
-    p[DAMPING_ANGULAR] = angular_damping
-    p[GYROSCOPIC] = gyroscopic
-    p[REFERENCE_DAMPING] = p[DAMPING_LINEAR]
-    p[MASS] = body[of_body.MASS]
-    p[LENGTH] = body[of_body.LENGTH]
+        p.principal_quaternion[k] = body[of_body.QUATERNION + k]
+    p.damping_linear = linear_damping / body[of_body.MASS]
+    p.damping_angular = angular_damping
+    p.gyroscopic = gyroscopic
+    p.reference_damping = p.damping_linear
+    p.mass = body[of_body.MASS]
+    p.length = body[of_body.LENGTH]
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def begin_problem(p: np.ndarray, loads: np.ndarray, row: np.ndarray) -> None:
+def begin_problem(p: np.record, loads: np.ndarray, row: np.ndarray) -> None:
     """Complete the body's part p with loads and the start, as far as they go without a string."""
-    P, mass = PRINCIPAL_AXES, p[MASS]
+    P, mass = p.principal_axes, p.mass
     turns, pushes = False, False
     for k in range(3):
         torque, force = 0.0, 0.0
         for j in range(3):
-            torque += p[P + 3 * j + k] * loads[of_loads.TORQUE_BODY + j]
-            force += p[P + 3 * j + k] * loads[of_loads.FORCE_BODY + j]
+            torque += P[3 * j + k] * loads[of_loads.TORQUE_BODY + j]
+            force += P[3 * j + k] * loads[of_loads.FORCE_BODY + j]
             moment = 0.0
             for i in range(3):
-                moment += p[P + 3 * i + k] * loads[of_loads.MOMENT + 3 * i + j]
-            p[MOMENT + 3 * k + j] = moment
+                moment += P[3 * i + k] * loads[of_loads.MOMENT + 3 * i + j]
+            p.moment[3 * k + j] = moment
             turns = turns or loads[of_loads.MOMENT + 3 * k + j] != 0.0
-        p[TORQUE_BODY + k] = torque
-        p[ACCELERATION_BODY + k] = force / mass
-        p[TORQUE_WORLD + k] = loads[of_loads.TORQUE_WORLD + k]
+        p.torque_body[k] = torque
+        p.acceleration_body[k] = force / mass
+        p.torque_world[k] = loads[of_loads.TORQUE_WORLD + k]
         turns = turns or loads[of_loads.TORQUE_WORLD + k] != 0.0
         pushes = pushes or loads[of_loads.FORCE_BODY + k] != 0.0
-        p[START_POSITION + k] = row[k]
-        p[REFERENCE_VELOCITY + k] = row[7 + k]
-        p[REFERENCE_ACCELERATION + k] += loads[of_loads.FORCE_WORLD + k] / mass
-    p[HAS_WORLD_TORQUE] = 1.0 if turns else 0.0
-    p[TRANSLATES] = 1.0 if pushes else 0.0
+        p.start_position[k] = row[k]
+        p.reference_velocity[k] = row[7 + k]
+        p.reference_acceleration[k] += loads[of_loads.FORCE_WORLD + k] / mass
+    p.has_world_torque = turns
+    p.translates = pushes
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def begin_string(
-    p: np.ndarray, body: np.ndarray, string: np.ndarray, begin_ns: int, end_ns: int, row: np.ndarray, now_ns: int
+    p: np.record, body: np.ndarray, string: np.ndarray, begin_ns: int, end_ns: int, row: np.ndarray, now_ns: int
 ) -> None:
     """Complete the problem p with a tied string (STRING,) whose free end goes from origin to target
     between these times.
     """
     seconds, ends = (end_ns - begin_ns) * 1e-9, now_ns >= end_ns
     x, y, z = of_body.arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
-    P = PRINCIPAL_AXES
+    P = p.principal_axes
     for k in range(3):
         hand = 0.0 if ends else (string[TARGET + k] - string[ORIGIN + k]) / seconds
         free_end = string[TARGET + k] if ends else string[ORIGIN + k] + ((now_ns - begin_ns) * 1e-9) * hand
-        p[REFERENCE_VELOCITY + k] = hand
-        p[START_VELOCITY_ADDED + k] = row[7 + k] - hand
-        p[ACCELERATION_ADDED + k] = p[REFERENCE_ACCELERATION + k] - p[DAMPING_LINEAR] * hand
-        p[REFERENCE_ACCELERATION + k] = 0.0
-        p[ATTACH + k] = p[P + k] * x + p[P + 3 + k] * y + p[P + 6 + k] * z
-        p[STRING_START + k] = row[k] - free_end
-        p[HAND_VELOCITY + k] = hand
-    p[REFERENCE_DAMPING] = 0.0
-    p[TRANSLATES] = 1.0
-    p[HAS_STRING] = 1.0
-    p[STIFFNESS] = string[K]
-    p[STRING_DAMPING] = string[C]
-    p[REST_LENGTH] = string[REST]
-    p[BILATERAL] = 1.0 if string[PUSHES] != 0.0 or string[REST] == 0.0 else 0.0
+        p.reference_velocity[k] = hand
+        p.start_velocity_added[k] = row[7 + k] - hand
+        p.acceleration_added[k] = p.reference_acceleration[k] - p.damping_linear * hand
+        p.reference_acceleration[k] = 0.0
+        p.attach[k] = P[k] * x + P[3 + k] * y + P[6 + k] * z
+        p.string_start[k] = row[k] - free_end
+        p.hand_velocity[k] = hand
+    p.reference_damping = 0.0
+    p.translates = True
+    p.has_string = True
+    p.stiffness = string[K]
+    p.string_damping = string[C]
+    p.rest_length = string[REST]
+    p.bilateral = string[PUSHES] != 0.0 or string[REST] == 0.0

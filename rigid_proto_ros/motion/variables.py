@@ -17,7 +17,6 @@ import numpy as np
 from ..base.compilation import njit
 from ..base.elementary import exponential_less_one
 from ..base.rotation import multiply
-from . import problem as of
 
 ATTITUDE = 0  # (4,)
 SPIN = 4  # (3,)
@@ -47,35 +46,35 @@ def damping_functions(z: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def to_variables(row: np.ndarray, p: np.ndarray, y: np.ndarray) -> None:
+def to_variables(row: np.ndarray, p: np.record, y: np.ndarray) -> None:
     """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
-    P, Q = of.PRINCIPAL_AXES, of.PRINCIPAL_QUATERNION
-    y[0], y[1], y[2], y[3] = multiply(row[3], row[4], row[5], row[6], p[Q], p[Q + 1], p[Q + 2], p[Q + 3])
+    P, Q = p.principal_axes, p.principal_quaternion
+    y[0], y[1], y[2], y[3] = multiply(row[3], row[4], row[5], row[6], Q[0], Q[1], Q[2], Q[3])
     for k in range(3):
-        y[SPIN + k] = p[P + k] * row[10] + p[P + 3 + k] * row[11] + p[P + 6 + k] * row[12]
+        y[SPIN + k] = P[k] * row[10] + P[3 + k] * row[11] + P[6 + k] * row[12]
         y[DISPLACEMENT + k] = 0.0
-        y[VELOCITY + k] = p[of.START_VELOCITY_ADDED + k]
+        y[VELOCITY + k] = p.start_velocity_added[k]
     y[HAND_WORK] = 0.0
     y[HEAT] = 0.0
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def to_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray) -> None:
+def to_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray) -> None:
     """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
-    P, Q = of.PRINCIPAL_AXES, of.PRINCIPAL_QUATERNION
-    c = p[of.REFERENCE_DAMPING]
+    P, Q = p.principal_axes, p.principal_quaternion
+    c = p.reference_damping
     phi1, phi2 = damping_functions(c * elapsed)
     for k in range(3):
-        g = p[of.REFERENCE_ACCELERATION + k]
-        v = p[of.REFERENCE_VELOCITY + k]
-        row[k] = p[of.START_POSITION + k] + (elapsed * (v * phi1 + elapsed * g * phi2) + y[DISPLACEMENT + k])
+        g = p.reference_acceleration[k]
+        v = p.reference_velocity[k]
+        row[k] = p.start_position[k] + (elapsed * (v * phi1 + elapsed * g * phi2) + y[DISPLACEMENT + k])
         row[7 + k] = v + (elapsed * phi1 * (g - c * v) + y[VELOCITY + k])
-        row[10 + k] = p[P + 3 * k] * y[4] + p[P + 3 * k + 1] * y[5] + p[P + 3 * k + 2] * y[6]
-    row[3], row[4], row[5], row[6] = multiply(y[0], y[1], y[2], y[3], -p[Q], -p[Q + 1], -p[Q + 2], p[Q + 3])
+        row[10 + k] = P[3 * k] * y[4] + P[3 * k + 1] * y[5] + P[3 * k + 2] * y[6]
+    row[3], row[4], row[5], row[6] = multiply(y[0], y[1], y[2], y[3], -Q[0], -Q[1], -Q[2], Q[3])
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def to_good_row(y: np.ndarray, p: np.ndarray, elapsed: float, row: np.ndarray, limit: float) -> bool:
+def to_good_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray, limit: float) -> bool:
     """``to_row``; returns whether no number of the row is beyond ``limit`` or no number at all."""
     to_row(y, p, elapsed, row)
     good = True

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import boolean, float64, int64, types
+from numba import boolean, float64, from_dtype, int64, types
 
 from ..base.compilation import njit
 from ..base.simd import aligned
 from ..base.uncounted_arrays import copy_numbers, uncounted
-from ..motion import problem as pr
 from ..motion.body import BODY, INERTIA, MASS
 from ..motion.integrators.integrator import Integrator
-from ..motion.integrators.stepping import COLUMNS, ROWS, method_table, provide_kernel
+from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
 from ..motion.integrators.taylor_adaptive import MAX_DEGREE
-from ..motion.loads import LOAD, is_within_magnitude
+from ..motion.loads import is_within_magnitude
+from ..motion.problem import begin_body
 from . import batch_body as b
 from . import flight as fl
 from .batch_body import GYROSCOPIC, make_body_row
@@ -80,7 +80,7 @@ _VARIANTS = (
     int64[:, ::1],  # times
     int64[:, :, ::1],  # commands
     boolean,  # the method is chosen by what a segment holds
-    int64[:, :, ::1],  # methods by degree
+    from_dtype(METHOD)[:, ::1],  # methods by degree
 )
 _Flights = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool, np.ndarray]
 """Arrays of a block, in the order of _VARIANTS."""
@@ -112,35 +112,35 @@ def _fly(
     here. tables: arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop
     held or −1; 0 samples: the simulation must say what is wrong.
     """
-    f, n, rows_ns, rows, events = tables
+    flights, rows, events, room = tables
+    flight = flights[0]
     count = commands.shape[0]
     for c in range(count):
         if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
             return 0, -1
-    n[:] = 0
-    row = f[fl.ROW : fl.ROW + 13]
-    if not b.initial_row(settings, row):
+    if not b.initial_row(settings, flight.row):
         return 0, -1
-    copy_numbers(row, states[0, :13])
+    copy_numbers(flight.row, states[0, :13])
     states[0, 13] = 0.0
     g = settings[b.GRAVITY : b.GRAVITY + 3]
     begin(body[MASS], body[INERTIA : INERTIA + 9], g, states[0], context)
-    copy_numbers(row, f[fl.START : fl.START + 13])
-    copy_numbers(body, f[fl.BODY : fl.BODY + BODY])
-    damping = (settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING])
-    pr.begin_body(f[fl.COMMON : fl.COMMON + pr.SIZE], body, g, damping[0], damping[1], gyroscopic)
-    f[fl.ACCURACY], f[fl.DEGREE] = settings[b.ACCURACY], times[b.DEGREE]
-    n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
-    n[fl.CHOOSES] = 1 if chooses else 0
+    copy_numbers(flight.row, flight.start)
+    copy_numbers(body, flight.body)
+    begin_body(flight.common, body, g, settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING], gyroscopic)
+    flight.accuracy, flight.degree, flight.chooses = settings[b.ACCURACY], times[b.DEGREE], chooses
+    flight.step_ns, flight.timeout_ns, flight.poke_ns = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
+    fl.begin_flight(flight)
     for c in range(count):
-        copy_numbers(commands[c], rows_ns[c, : fl.COMMAND])
-        copy_numbers(loads[c], rows[c, :LOAD])
-    n[fl.DUE_END] = count
-    fl.begin_segment(f, n, rows, methods)
+        row = rows[c]
+        row.at_ns, row.duration_ns = commands[c, fl.AT_NS], commands[c, fl.DURATION_NS]
+        row.kind, row.slot = commands[c, fl.KIND], commands[c, fl.SLOT]
+        copy_numbers(loads[c], row.load)
+    flight.due_end = count
+    fl.begin_segment(flight, rows, methods, room)
     for sample in range(sample_ns.shape[0]):
-        if fl.fly(f, n, rows_ns, rows, events, methods, sample_ns[sample]) != fl.REACHED:
+        if fl.fly(flight, rows, events, methods, room, sample_ns[sample]) != fl.REACHED:
             return 0, -1
-        copy_numbers(row, states[sample, :13])
+        copy_numbers(flight.row, states[sample, :13])
         states[sample, 13] = 0.0
         stop = which_is_met(stops, states[sample], context)
         if stop >= 0:
@@ -183,7 +183,7 @@ def _one(
 _ROOM = (
     float64[::1],
     float64[::1],
-    types.Tuple((float64[::1], int64[::1], int64[:, ::1], float64[:, ::1], int64[:, ::1])),
+    types.Tuple((from_dtype(fl.FLIGHT)[::1], from_dtype(fl.LOAD_ROW)[::1], from_dtype(fl.EVENT)[::1], float64[::1])),
     float64[:, ::1],
     float64[:, ::1],
 )
@@ -195,11 +195,9 @@ def _room(variants: Variants, references: Variants | None, samples: int) -> tupl
     """
     sides = (variants,) if references is None else (variants, references)
     rows = max(side.commands.shape[1] for side in sides) + 1
-    room = max(int((table[..., ROWS] * table[..., COLUMNS]).max()) for table in (_methods(s.integrator) for s in sides))
     # The workspace begins a line of the processor's cache.
-    f, n = aligned((1, fl.ROOM + room), before=fl.ROOM)[0], np.zeros(fl.INTEGERS, np.int64)
-    events = np.zeros((4 * rows + 4, fl.EVENT), np.int64)
-    flight = f, n, np.zeros((rows, fl.TIMES), np.int64), np.zeros((rows, fl.LOAD_ROW)), events
+    room = aligned((1, max(1, *(workspace_size(_methods(side.integrator)) for side in sides))))[0]
+    flight = np.zeros(1, fl.FLIGHT), np.zeros(rows, fl.LOAD_ROW), np.zeros(4 * rows + 4, fl.EVENT), room
     others = np.zeros((samples if references is not None else 1, STATE))
     return np.zeros(BODY), np.zeros(CONTEXT), flight, np.zeros((samples, STATE)), others
 

@@ -11,37 +11,56 @@ from typing import NamedTuple
 import numpy as np
 from numba import int64
 
-from ..base.addresses import address_of_array, doubles_at, entry_of, integers_at
+from ..base.addresses import address_of_array, array_at, doubles_at, entry_of
 from ..base.compilation import njit
-from ..base.simd import LINE
-from ..motion.body import BODY
+from ..base.records import place_of, record_type
+from ..base.simd import aligned
 from ..motion.integrators.integrator import Method
 from ..motion.integrators.stepping import METHOD, provide_kernel
-from ..motion.loads import LOAD, LOADS_SIZE, Load, load_of_row, share_of
-from ..motion.problem import SIZE, STRING
+from ..motion.loads import Load, load_of_row, share_of
+from ..motion.problem import PROBLEM
 from ..motion.state import State
 from ..motion.string import Tied
+from ..motion.variables import STORED
 from . import flight as fl
 from .commands import Pending
+from .flight import EVENT, FLIGHT, LOAD_ROW
 from .setup import FlightStart, Setup
 
 FIRST_ROWS = 8
 """Of the tables at first; they double as needed."""
 
-_TIMES_BYTES, _pack = 8 * fl.TIMES, struct.Struct(f"={fl.TIMES}q").pack_into
-_LOAD_BYTES = 8 * fl.LOAD_ROW
+HELD = record_type(
+    [
+        ("flight", FLIGHT),
+        # Where the tables, of loads, of events and of methods, and the workspace are, and of what size.
+        ("loads_at", np.int64),
+        ("events_at", np.int64),
+        ("rows", np.int64),
+        ("methods_at", np.int64),
+        ("methods", np.int64),
+        ("room_at", np.int64),
+        ("room", np.int64),
+    ]
+)
+"""A flight with the addresses of what it works with, so that a compiled function finds all by one number."""
 
-# Behind the integers of a flight: how many doubles there are, and where the tables are and of what size.
-DOUBLES, TABLES_AT, TABLE_ROWS, METHODS_AT, METHODS = range(fl.INTEGERS, fl.INTEGERS + 5)
-INTEGERS = fl.INTEGERS + 5
+_held_at, _loads_at, _events_at, _methods_at = map(array_at, (HELD, LOAD_ROW, EVENT, METHOD))
+
+_ROW_BYTES, _pack = LOAD_ROW.itemsize, struct.Struct("=6q").pack_into
+_LOAD_AT = place_of(LOAD_ROW, "load")
+_EVENT_NUMBERS = EVENT.itemsize // 8
+
+
+def _number(name: str) -> int:
+    """Where an integer of the flight stands among those of its memory, as Python reads single numbers fastest."""
+    return place_of(FLIGHT, name) // 8
+
 
 # Looked up at every advance.
-_REACHED, _ACTING, _DUE, _DUE_END = fl.REACHED, fl.ACTING, fl.DUE, fl.DUE_END
-
-
-def _sizes(rows: int) -> tuple[int, int, int]:
-    """Numbers in the tables of times, loads and events, which stand one behind the other."""
-    return fl.TIMES * rows, fl.LOAD_ROW * rows, fl.EVENT * (4 * rows + 4)
+_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = map(_number, ("now_ns", "acting", "due", "due_end", "events"))
+TIMEOUTS = _number("timeouts")
+_REACHED = fl.REACHED
 
 
 class ActingLoad(NamedTuple):
@@ -66,51 +85,65 @@ class ActingLoad(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _arrays(at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """f, n, times, loads, events and methods of the flight whose integers are at this address, with its
-    doubles behind them.
-    """
-    n = integers_at(at, (INTEGERS,))
-    f = doubles_at(at + 8 * INTEGERS, (n[DOUBLES],))
-    rows, times_at = n[TABLE_ROWS], n[TABLES_AT]
-    loads_at = times_at + 8 * fl.TIMES * rows
-    events_at = loads_at + 8 * fl.LOAD_ROW * rows
-    times, loads = integers_at(times_at, (rows, fl.TIMES)), doubles_at(loads_at, (rows, fl.LOAD_ROW))
-    events, methods = integers_at(events_at, (4 * rows + 4, fl.EVENT)), integers_at(n[METHODS_AT], (n[METHODS], METHOD))
-    return f, n, times, loads, events, methods
+def _arrays(at: int) -> tuple[np.record, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Flight, loads, events, methods and workspace of what is held at this address."""
+    held = _held_at(at, (1,))[0]
+    loads, events = _loads_at(held.loads_at, (held.rows,)), _events_at(held.events_at, (4 * held.rows + 4,))
+    return (
+        held.flight,
+        loads,
+        events,
+        _methods_at(held.methods_at, (held.methods,)),
+        doubles_at(held.room_at, (held.room,)),
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def _fly_at(at: int, until_ns: int) -> int:
-    f, n, times, loads, events, methods = _arrays(at)
-    return fl.fly(f, n, times, loads, events, methods, until_ns)
+    flight, loads, events, methods, room = _arrays(at)
+    return fl.fly(flight, loads, events, methods, room, until_ns)
 
 
 @njit(cache=True, error_model="numpy")
 def _begin_at(at: int) -> int:
-    f, n, _, loads, _, methods = _arrays(at)
-    fl.begin_segment(f, n, loads, methods)
+    flight, loads, _, methods, room = _arrays(at)
+    fl.begin_segment(flight, loads, methods, room)
     return 0
 
 
 @njit(cache=True, error_model="numpy")
 def _share_anew(at: int) -> int:
     """What the loads that act add to the sums, for another body."""
-    f, n, times, loads, _, _ = _arrays(at)
-    for row in range(n[fl.ACTING]):
-        share_of(loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], loads[row, fl.SHARE :])
-        if times[row, fl.KIND] == fl.HELD_WRENCH:
-            times[row, fl.END_NS] = fl.end_of_held(n, times[row, fl.AT_NS])
+    flight, loads, _, _, _ = _arrays(at)
+    for row in range(flight.acting):
+        acting = loads[row]
+        share_of(acting.load, flight.body, acting.share)
+        if acting.kind == fl.HELD_WRENCH:
+            acting.end_ns = fl.end_of_held(flight, acting.at_ns)
     return 0
 
 
 @njit(cache=True, error_model="numpy")
 def _apply_at(at: int) -> int:
-    f, n, times, loads, events, _ = _arrays(at)
-    n[fl.EVENTS], n[fl.TIMEOUTS] = 0, 0
-    while n[fl.DUE] < n[fl.DUE_END]:
-        fl.apply(f, n, times, loads, events, n[fl.DUE])
-        n[fl.DUE] += 1
+    flight, loads, events, _, _ = _arrays(at)
+    flight.events, flight.timeouts = 0, 0
+    while flight.due < flight.due_end:
+        fl.apply(flight, loads, events, flight.due)
+        flight.due += 1
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_at(at: int) -> int:
+    flight, loads, _, methods, room = _arrays(at)
+    fl.cut_segment(flight, loads, methods, room)
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def _finish_at(at: int) -> int:
+    flight, loads, _, methods, room = _arrays(at)
+    fl.finish_segment(flight, loads, methods, room)
     return 0
 
 
@@ -124,48 +157,51 @@ def _entries() -> tuple[Callable, Callable, Callable]:
 
 
 class FlightArrays:
-    """f, n, times, loads, events: as simulation/flight.py lays them out; integers: n once more, as Python reads single
-    numbers fastest. What isn't a matter of arrays is the simulation's.
+    """flight: the record (simulation/flight.py); integers: its memory as integers, as Python reads single numbers
+    fastest. What isn't a matter of arrays is the simulation's.
     """
 
     def __init__(self, setup: Setup) -> None:
         self.first_due = 0
         self._fly, self._begin, self._apply = _entries()
-        start = setup.flight_start
-        self._make_room(start.room)
+        self._memory = np.zeros(1, HELD)
+        self._at = address_of_array(self._memory)
+        self._held = self._memory[0]
+        self.flight = self._held.flight
+        self.row = self.flight.row
+        numbers = self._memory.view(np.uint8).view(np.int64)
+        self.integers = numbers.data
+        self._start = numbers[: FLIGHT.itemsize // 8]
+        self._loads = np.zeros(0, LOAD_ROW)
         self._make_tables(FIRST_ROWS)
-        self._take_methods(setup, start)
+        self._take_methods(setup, setup.flight_start)
 
     def _take_methods(self, setup: Setup, start: FlightStart) -> None:
+        held = self._held
         self.integrator, self.methods = setup.integrator, start.methods
-        if len(self.f) < fl.ROOM + start.room:
-            f, n, head = self.f[: fl.ROOM].copy(), self.n.copy(), self.integers
-            table = head[TABLES_AT], head[TABLE_ROWS]
-            self._make_room(start.room)
-            self.f[: fl.ROOM], self.n[:] = f, n
-            self.integers[TABLES_AT], self.integers[TABLE_ROWS] = table
-        self.integers[METHODS_AT], self.integers[METHODS] = start.methods_at, len(start.methods)
+        if held.room < max(start.room, 1):
+            # The workspace begins a line of the processor's cache.
+            self.room = aligned((1, max(start.room, 1)))[0]
+            held.room_at, held.room = address_of_array(self.room), len(self.room)
+        held.methods_at, held.methods = address_of_array(start.methods), len(start.methods)
 
     def take(self, setup: Setup) -> None:
         """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
-        start = setup.flight_start
+        start, flight = setup.flight_start, self.flight
         self._take_methods(setup, start)
-        f, n = self.f, self.n
-        f[fl.ROOM :] = 0.0
-        f[fl.BODY : fl.BODY + BODY] = start.f[fl.BODY : fl.BODY + BODY]
-        f[fl.COMMON : fl.COMMON + SIZE] = start.f[fl.COMMON : fl.COMMON + SIZE]
-        f[fl.ACCURACY], f[fl.DEGREE] = start.f[fl.ACCURACY], start.f[fl.DEGREE]
-        for setting in (fl.STEP_NS, fl.TIMEOUT_NS, fl.POKE_NS, fl.CHOOSES):
-            n[setting] = start.n[setting]
+        self.room[:] = 0.0
+        new = start.flight[0]
+        flight.body[:], flight.common = new.body, new.common
+        flight.accuracy, flight.degree, flight.chooses = new.accuracy, new.degree, new.chooses
+        flight.step_ns, flight.timeout_ns, flight.poke_ns = new.step_ns, new.timeout_ns, new.poke_ns
         _share_anew(self._at)
 
     def start_over(self, setup: Setup, tied: Tied | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
-        start, load_ids = setup.flight_start, self.integers[fl.LOAD_IDS]
+        start, load_ids = setup.flight_start, self.flight.load_ids
         self._take_methods(setup, start)
-        self.f[: fl.ROOM] = start.f
-        self.n[:] = start.n
-        self.integers[fl.LOAD_IDS] = load_ids
+        self._start[:] = start.numbers
+        self.flight.load_ids = load_ids
         if tied is not None:
             self.tie(tied)
         self._begin(self._at)
@@ -175,67 +211,64 @@ class FlightArrays:
         before that, flown up to time 0: then whether the motion didn't fail. What that takes isn't counted.
         """
         self.start_over(setup, tied)
-        f, n = self.f, self.n
-        if len(loads) > self.integers[TABLE_ROWS]:
+        flight = self.flight
+        if len(loads) > self._held.rows:
             self._make_tables(2 * len(loads))
-        n[fl.ACTING] = len(loads)
-        for row, acting in enumerate(loads):
-            n[fl.LOAD_IDS] += 1
-            load_id, share = n[fl.LOAD_IDS], self.loads[row, fl.SHARE :]
-            self.times[row] = acting.begin_ns, -1, acting.kind, acting.slot, acting.end_ns, load_id
-            self.loads[row, :LOAD] = acting.load.row
-            share_of(self.loads[row, :LOAD], f[fl.BODY : fl.BODY + BODY], share)
+        flight.acting = len(loads)
+        for row, acting in zip(self._loads, loads, strict=False):
+            flight.load_ids += 1
+            row.at_ns, row.duration_ns, row.kind, row.slot = acting.begin_ns, -1, acting.kind, acting.slot
+            row.end_ns, row.id = acting.end_ns, flight.load_ids
+            row.load[:] = acting.load.row
+            share_of(row.load, flight.body, row.share)
         if segment is not None:
-            f[fl.ROW : fl.ROW + 13] = f[fl.START : fl.START + 13] = segment.row
-            n[fl.NOW_NS] = n[fl.START_NS] = segment.time_ns
-        n[fl.SEGMENTS] = 0
+            flight.row[:] = flight.start[:] = segment.row
+            flight.now_ns = flight.start_ns = segment.time_ns
+        flight.segments = 0
         self._begin(self._at)
         if segment is None:
             return True
         reached = self.fly(0)
-        n[fl.STEPS_BEFORE], n[fl.EVALUATIONS_BEFORE] = -self.steps, -self.evaluations
-        f[fl.WORK_BEFORE], f[fl.LOST_BEFORE] = -f[fl.WORK], -f[fl.LOST]
+        flight.steps_before, flight.evaluations_before = -self.steps, -self.evaluations
+        flight.work_before, flight.lost_before = -flight.work, -flight.lost
         return reached
 
     def tie(self, tied: Tied | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""
-        self.n[fl.TIED] = tied is not None
+        flight = self.flight
+        flight.tied = tied is not None
         if tied is not None:
-            self.f[fl.STRING : fl.STRING + STRING] = tied.row
-            self.n[fl.STRING_BEGIN_NS], self.n[fl.STRING_END_NS] = tied.begin_ns, tied.end_ns
+            flight.string[:] = tied.row
+            flight.string_begin_ns, flight.string_end_ns = tied.begin_ns, tied.end_ns
 
     # Commands
 
     def put(self, due: list[Pending]) -> None:
-        """Put commands into the tables, behind the loads that act, as those that act next."""
-        head = self.integers
-        first = self.first_due = head[_ACTING]
-        last, rows = first + len(due), head[TABLE_ROWS]
-        if last > rows:
-            rows = 2 * last
-            self._make_tables(rows)
-        tables = self._table_bytes
-        at = _TIMES_BYTES * rows + _LOAD_BYTES * first
-        row_at = _TIMES_BYTES * first
+        """Put commands into the table, behind the loads that act, as those that act next."""
+        numbers = self.integers
+        first = self.first_due = numbers[_ACTING]
+        last = first + len(due)
+        if last > len(self._loads):
+            self._make_tables(2 * last)
+        table, at = self._table_bytes, _ROW_BYTES * first
         for pending in due:
             bytes_of_load = pending.row
-            _pack(tables, row_at, pending.time_ns, pending.duration_ns, pending.kind, pending.slot, 0, 0)
-            tables[at : at + len(bytes_of_load)] = bytes_of_load
-            row_at += _TIMES_BYTES
-            at += _LOAD_BYTES
-        head[_DUE], head[_DUE_END] = first, last
+            _pack(table, at, pending.time_ns, pending.duration_ns, pending.kind, pending.slot, 0, 0)
+            table[at + _LOAD_AT : at + _LOAD_AT + len(bytes_of_load)] = bytes_of_load
+            at += _ROW_BYTES
+        numbers[_DUE], numbers[_DUE_END] = first, last
 
     @property
     def waiting(self) -> int:
         """How many of the commands put last haven't acted yet."""
-        return self.integers[fl.DUE_END] - self.integers[fl.DUE]
+        return self.integers[_DUE_END] - self.integers[_DUE]
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
         while (came := self._fly(self._at, until_ns)) != _REACHED:
             if came == fl.FAILED:
                 return False
-            provide_kernel(self.integrator, self.methods, self.integers[fl.METHOD])
+            provide_kernel(self.integrator, self.methods, int(self.flight.method))
         return True
 
     def apply(self) -> None:
@@ -244,138 +277,108 @@ class FlightArrays:
 
     def end_due(self) -> bool:
         """End what ends at the time of the flight; whether anything did."""
-        self.n[fl.EVENTS], self.n[fl.TIMEOUTS] = 0, 0
-        return fl.end_due(self.n, self.times, self.loads, self.events)
+        self.integers[_EVENTS] = self.integers[TIMEOUTS] = 0
+        return fl.end_due(self.flight, self._loads, self._events)
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
-        self.integers[fl.EVENTS] = self.integers[fl.TIMEOUTS] = 0
-        if self.integers[fl.ACTING]:
-            fl.end_all(self.n, self.times, self.events)
+        self.integers[_EVENTS] = self.integers[TIMEOUTS] = 0
+        if self.integers[_ACTING]:
+            fl.end_all(self.flight, self._loads, self._events)
 
     def last_events(self) -> list[list[int]]:
-        """What the last call began and ended: rows (ATTITUDE,)."""
-        return self.events[: self.n[fl.EVENTS], : fl.ATTITUDE].tolist()
+        """What the last call began and ended: time_ns, what, load_id and row of each."""
+        return self._event_numbers[: self.integers[_EVENTS], :4].tolist()
 
     def attitude_at(self, number: int) -> np.ndarray:
         """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""
-        return self.events[number, fl.ATTITUDE :].view(np.float64).copy()
+        return self._events[number].attitude.copy()
 
     # Segments
 
     def cut_segment(self) -> None:
         """End the segment at the time of the flight by the step that sampling there took, and begin another."""
-        fl.cut_segment(self.f, self.n, self.loads, self.methods)
+        _cut_at(self._at)
 
     def finish_segment(self) -> None:
         """Keep the segment's counts and begin another from the present state."""
-        fl.finish_segment(self.f, self.n, self.loads, self.methods)
+        _finish_at(self._at)
 
     # Readings
 
     @property
     def time_ns(self) -> int:
         """Simulated time [ns]."""
-        return self.integers[fl.NOW_NS]
+        return self.integers[_NOW_NS]
 
     @property
     def state(self) -> State:
         """The state now."""
-        return State(self.integers[fl.NOW_NS], self.row.copy())
+        return State(self.integers[_NOW_NS], self.row.copy())
 
     def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
-        six = np.array(fl.accelerations_now(self.f, self.n))
+        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(STORED)))
         return six[:3], six[3:]
 
     @property
     def acts(self) -> bool:
         """Whether any load acts."""
-        return bool(self.integers[fl.ACTING])
+        return bool(self.integers[_ACTING])
 
     def acting(self) -> Iterator[ActingLoad]:
         """The loads that act, in the order in which they began."""
-        for row in range(self.n[fl.ACTING]):
-            begin_ns, _, kind, slot, end_ns, load_id = self.times[row].tolist()
-            yield ActingLoad(load_of_row(self.loads[row, :LOAD]), begin_ns, end_ns, load_id, kind, slot)
+        for row in self._loads[: self.integers[_ACTING]]:
+            load = load_of_row(row.load)
+            yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))
 
     @property
     def sums(self) -> np.ndarray:
         """All of them summed (LOADS_SIZE,), as motion/loads.py lays them out."""
-        return self.f[fl.SUMS : fl.SUMS + LOADS_SIZE].copy()
+        return self.flight.sums.copy()
 
     @property
     def steps(self) -> int:
         """Steps committed since time 0."""
-        return int(self.n[fl.STEPS_BEFORE] + fl.steps_of_segment(self.f, self.n))
+        return int(self.flight.steps_before + fl.steps_of_segment(self.flight))
 
     @property
     def evaluations(self) -> int:
         """Evaluations of the equations of motion in them."""
-        return int(self.n[fl.EVALUATIONS_BEFORE] + fl.evaluations_of_segment(self.f, self.n, self.methods))
+        return int(self.flight.evaluations_before + fl.evaluations_of_segment(self.flight, self.methods))
 
     @property
     def hand_work(self) -> float:
         """Of the string's hand since time 0 [J]."""
-        return float(self.f[fl.WORK_BEFORE] + self.f[fl.WORK])
+        return float(self.flight.work_before + self.flight.work)
 
     @property
     def heat(self) -> float:
         """In the string's damper since time 0 [J]."""
-        return float(self.f[fl.LOST_BEFORE] + self.f[fl.LOST])
+        return float(self.flight.lost_before + self.flight.lost)
 
     @property
     def floors(self) -> list[float]:
         """What has held the motion to less than its accuracy since time 0, by kind (flight.FLOOR_KINDS)."""
-        floors = self.f[fl.FLOORS : fl.FLOORS + fl.FLOOR_KINDS].copy()
-        fl.note_floors(self.f, self.n, self.methods, floors)
+        floors = self.flight.floors.copy()
+        fl.note_floors(self.flight, self.methods, floors)
         return floors.tolist()
 
     @property
     def method(self) -> Method:
         """How the segment is stepped."""
-        return self.integrator.methods[int(self.n[fl.METHOD])]
+        return self.integrator.methods[int(self.flight.method)]
 
     # Memory
 
-    def _make_room(self, room: int) -> None:
-        """Integers and doubles, with so much workspace that begins a line of the processor's cache."""
-        doubles = fl.ROOM + room
-        whole = np.empty(INTEGERS + doubles + LINE)
-        at = address_of_array(whole)
-        first = -(at // 8 + INTEGERS + fl.ROOM) % LINE
-        self._at = at + 8 * first
-        own = whole[first : first + INTEGERS].view(np.int64)
-        self.integers = own.data
-        self.integers[DOUBLES], self.integers[fl.ACTING], self.integers[fl.LOAD_IDS] = doubles, 0, 0
-        self.n = own[: fl.INTEGERS]
-        self.f = whole[first + INTEGERS : first + INTEGERS + doubles]
-        self.row = self.f[fl.ROW : fl.ROW + 13]
-
     def _make_tables(self, rows: int) -> None:
         """Tables of so many rows; what acts goes on."""
-        kept = self.integers[fl.ACTING]
-        before = (self.times[:kept], self.loads[:kept]) if kept else None
-        self._tables = np.zeros(sum(_sizes(rows)), np.int64)
-        self._table_bytes = self._tables.data.cast("B")
-        self.integers[TABLES_AT], self.integers[TABLE_ROWS] = address_of_array(self._tables), rows
-        if before is not None:
-            self.times[:kept], self.loads[:kept] = before
-
-    @property
-    def times(self) -> np.ndarray:
-        """(rows, TIMES)"""
-        times, _, _ = _sizes(self.integers[TABLE_ROWS])
-        return self._tables[:times].reshape(-1, fl.TIMES)
-
-    @property
-    def loads(self) -> np.ndarray:
-        """(rows, LOAD_ROW)"""
-        times, loads, _ = _sizes(self.integers[TABLE_ROWS])
-        return self._tables[times : times + loads].view(np.float64).reshape(-1, fl.LOAD_ROW)
-
-    @property
-    def events(self) -> np.ndarray:
-        """(4 rows + 4, EVENT)"""
-        times, loads, _ = _sizes(self.integers[TABLE_ROWS])
-        return self._tables[times + loads :].reshape(-1, fl.EVENT)
+        held, kept = self._held, self.integers[_ACTING]
+        loads = np.zeros(rows, LOAD_ROW)
+        if kept:
+            loads[:kept] = self._loads[:kept]
+        self._loads, self._events = loads, np.zeros(4 * rows + 4, EVENT)
+        self._table_bytes = loads.view(np.uint8).data
+        self._event_numbers = self._events.view(np.uint8).view(np.int64).reshape(-1, _EVENT_NUMBERS)
+        held.loads_at, held.events_at = address_of_array(self._loads), address_of_array(self._events)
+        held.rows = rows

@@ -11,19 +11,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.rotation import length
-from ..motion.integrators import control as ctl
 from ..motion.integrators.auto import fastest_swing
 from ..motion.integrators.equations import stretch
 from ..motion.integrators.integrator import FIXED_STEPS
-from ..motion.problem import SIZE
 from ..motion.state import State
-from ..motion.variables import STORED
 from . import flight as fl
 from .flight_arrays import FlightArrays
 
 
 class Segment:
-    """The segment that a flight is in: views of its arrays, so what is read is what is so now.
+    """The segment that a flight is in: views of its record, which read current values.
 
     number: of segments begun before it and itself. start: state at the segment's start. committed_ns: where the last
     full step ended. problem: motion/problem.py. variables: motion/variables.py, at the last committed step.
@@ -35,49 +32,49 @@ class Segment:
     @property
     def number(self) -> int:
         """Which segment of the flight it is, counted from 1."""
-        return int(self._arrays.n[fl.SEGMENTS])
+        return int(self._arrays.flight.segments)
 
     @property
     def start(self) -> State:
         """State at the segment's start."""
-        return State(int(self._arrays.n[fl.START_NS]), self._arrays.f[fl.START : fl.START + 13].copy())
+        return State(int(self._arrays.flight.start_ns), self._arrays.flight.start.copy())
 
     @property
     def committed_ns(self) -> int:
         """Where its last full step ended [ns]."""
-        return int(self._arrays.n[fl.COMMITTED_NS])
+        return int(self._arrays.flight.committed_ns)
 
     @property
-    def problem(self) -> np.ndarray:
+    def problem(self) -> np.record:
         """Its problem (motion/problem.py)."""
-        return self._arrays.f[fl.PROBLEM : fl.PROBLEM + SIZE]
+        return self._arrays.flight.problem
 
     @property
     def variables(self) -> np.ndarray:
         """Its variables at the last committed step (motion/variables.py)."""
-        return self._arrays.f[fl.VARIABLES : fl.VARIABLES + STORED]
+        return self._arrays.flight.variables
 
     @property
     def sampled(self) -> np.ndarray:
         """The variables at the time last advanced to."""
-        f, n = self._arrays.f, self._arrays.n
-        return f[fl.TRIAL : fl.TRIAL + STORED] if n[fl.NOW_NS] > n[fl.COMMITTED_NS] else self.variables
+        flight = self._arrays.flight
+        return flight.trial if flight.now_ns > flight.committed_ns else flight.variables
 
     @property
     def steps(self) -> int:
         """Steps committed so far."""
-        return int(fl.steps_of_segment(self._arrays.f, self._arrays.n))
+        return int(fl.steps_of_segment(self._arrays.flight))
 
     @property
     def evaluations(self) -> int:
         """Evaluations of the equations of motion in them."""
-        return int(fl.evaluations_of_segment(self._arrays.f, self._arrays.n, self._arrays.methods))
+        return int(fl.evaluations_of_segment(self._arrays.flight, self._arrays.methods))
 
     def expected_effort(self, now: State) -> tuple[float, float]:
         """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
         method = self._arrays.method
         if method.way == FIXED_STEPS:
-            steps = 1e9 / int(self._arrays.n[fl.STEP_NS])
+            steps = 1e9 / int(self._arrays.flight.step_ns)
             return steps, steps * method.evaluations
         if method.radians == 0.0:
             return 0.0, 0.0
@@ -89,10 +86,10 @@ class Segment:
     @property
     def choice(self) -> str:
         """Which method, and why."""
-        step_s = int(self._arrays.n[fl.STEP_NS]) * 1e-9
-        return self._arrays.method.choice(self.problem, step_s, float(self._arrays.f[fl.ACCURACY]))
+        step_s = int(self._arrays.flight.step_ns) * 1e-9
+        return self._arrays.method.choice(self.problem, step_s, float(self._arrays.flight.accuracy))
 
     @property
     def floor_binds(self) -> bool:
         """Some step's error allowance was set by rounding and not by the accuracy asked for."""
-        return bool(self._arrays.f[fl.CONTROL + ctl.FLOOR_RATE])
+        return bool(self._arrays.flight.control.floor_rate)

@@ -10,31 +10,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.addresses import address_of_array
+from ..base.records import new_record
 from ..base.rotation import length
-from ..motion.body import BODY, LENGTH, Body
+from ..motion.body import LENGTH, Body
 from ..motion.integrators.integrator import Integrator
-from ..motion.integrators.stepping import COLUMNS, ROWS, method_table
+from ..motion.integrators.stepping import method_table, workspace_size
 from ..motion.integrators.taylor_adaptive import degree_for
 from ..motion.loads import light_amount
-from ..motion.problem import SIZE, begin_body
+from ..motion.problem import PROBLEM, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
-from . import flight as fl
+from .flight import FLIGHT
 from .in_flight import InFlight
 from .thrusters import Thruster
 
 
 class FlightStart(NamedTuple):
-    """f (ROOM,) and n (INTEGERS,) as simulation/flight.py lays them out; methods: the integrator's table, and its
-    address. room: of the largest workspace [doubles].
+    """flight (1,): a record FLIGHT (simulation/flight.py). methods: the integrator's table. room: of the largest
+    workspace [doubles].
     """
 
-    f: np.ndarray
-    n: np.ndarray
+    flight: np.ndarray
     methods: np.ndarray
-    methods_at: int
     room: int
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The record's memory as integers."""
+        return self.flight.view(np.uint8).view(np.int64)
 
 
 @dataclass(frozen=True)
@@ -89,18 +92,18 @@ class Setup:
     @cached_property
     def flight_start(self) -> FlightStart:
         """What flights under this setup begin with."""
-        f, n, degree = np.zeros(fl.ROOM), np.zeros(fl.INTEGERS, np.int64), degree_for(self.accuracy)
-        f[fl.ROW : fl.ROW + 13] = f[fl.START : fl.START + 13] = self.initial
-        f[fl.BODY : fl.BODY + BODY] = self.body_row
-        f[fl.COMMON : fl.COMMON + SIZE] = self.problem
-        f[fl.ACCURACY], f[fl.DEGREE] = self.accuracy, degree
-        n[fl.STEP_NS], n[fl.TIMEOUT_NS], n[fl.POKE_NS] = self.step_ns, self.wrench_timeout_ns, self.poke_duration_ns
-        n[fl.CHOOSES] = self.integrator.chooses
+        start, degree = np.zeros(1, FLIGHT), degree_for(self.accuracy)
+        flight = start[0]
+        flight.row[:] = flight.start[:] = self.initial
+        flight.body[:] = self.body_row
+        flight.common = self.problem
+        flight.accuracy, flight.degree, flight.step_ns = self.accuracy, degree, self.step_ns
+        flight.timeout_ns, flight.poke_ns = self.wrench_timeout_ns, self.poke_duration_ns
+        flight.chooses = self.integrator.chooses
         # None yet: the first that adapts its steps gets a clean workspace, as every other does.
-        n[fl.METHOD] = -1
+        flight.method = -1
         methods = method_table(self.integrator, degree)
-        room = int((methods[:, ROWS] * methods[:, COLUMNS]).max())
-        return FlightStart(f, n, methods, address_of_array(methods), room)
+        return FlightStart(start, methods, workspace_size(methods))
 
     @cached_property
     def light_amount(self) -> float:
@@ -108,9 +111,9 @@ class Setup:
         return light_amount(self.body)
 
     @cached_property
-    def problem(self) -> np.ndarray:
+    def problem(self) -> np.record:
         """What all segments under this setup have in common (motion/problem.py)."""
-        p, gravity = np.zeros(SIZE), np.asarray(self.gravity, dtype=float)
+        problem, gravity = new_record(PROBLEM), np.asarray(self.gravity, dtype=float)
         damping = (float(self.linear_damping), float(self.angular_damping))
-        begin_body(p, self.body_row, gravity, damping[0], damping[1], float(self.gyroscopic))
-        return p
+        begin_body(problem, self.body_row, gravity, damping[0], damping[1], float(self.gyroscopic))
+        return problem

@@ -39,7 +39,7 @@ from .commands import (
     slot_name,
 )
 from .event_log import EventLog, OtherEvent
-from .flight_arrays import ActingLoad, FlightArrays
+from .flight_arrays import TIMEOUTS, ActingLoad, FlightArrays
 from .in_flight import GoingLoad, InFlight, initial_row_of
 from .notifier import EventNotifier, snapshot
 from .observer import Applied, BodySnapshot, LoadEnded, Logged, MeshChanged, Observer, Refused, Reset
@@ -49,7 +49,6 @@ from .string_control import StringControl
 from .thrusters import ThrusterControl
 
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
-_TIMEOUTS = fl.TIMEOUTS  # looked up at every advance
 
 
 class Follower(Protocol):
@@ -190,7 +189,7 @@ class Simulation(Readings):
             # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
             if not arrays.fly(event_ns):
                 return self._stop_in_last_good_state(due)
-            if due or self._notifier.wants_loads or arrays.integers[_TIMEOUTS]:
+            if due or self._notifier.wants_loads or arrays.integers[TIMEOUTS]:
                 self._notify(due)
             self.time_ns = event_ns
             self.state = state = State(event_ns, arrays.row.copy())
@@ -240,7 +239,7 @@ class Simulation(Readings):
         """Log the commands that acted, and tell the observer what began and ended."""
         observer, notifier, arrays = self.observer, self._notifier, self._arrays
         ignored = notifier.ignores_commands or not (notifier.wants_loads or observer.wants(Logged))
-        if ignored and not arrays.integers[_TIMEOUTS]:
+        if ignored and not arrays.integers[TIMEOUTS]:
             self.events.note_all(due)
             return
         first = arrays.first_due

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from one_segment import new_control
 
+from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.base.rotation import multiply
-from rigid_proto_ros.motion import problem as of
 from rigid_proto_ros.motion.integrators import INTEGRATORS, series_steps
-from rigid_proto_ros.motion.integrators import control as ctl
 from rigid_proto_ros.motion.integrators.taylor_adaptive import MAX_DEGREE
+from rigid_proto_ros.motion.problem import PROBLEM
 from rigid_proto_ros.motion.variables import STORED
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
@@ -17,11 +17,11 @@ AXIS = np.array((0.3, 1.0, -0.2)) / np.linalg.norm((0.3, 1.0, -0.2))
 
 
 def segment(spin, torque_world, moments=MOMENTS):
-    p, y = np.zeros(of.SIZE), np.zeros(STORED)
-    p[of.MOMENTS : of.MOMENTS + 3] = moments
-    p[of.MASS] = p[of.LENGTH] = p[of.GYROSCOPIC] = 1.0
-    p[of.TORQUE_WORLD : of.TORQUE_WORLD + 3] = torque_world
-    p[of.HAS_WORLD_TORQUE] = float(any(torque_world))
+    p, y = new_record(PROBLEM), np.zeros(STORED)
+    p.moments = moments
+    p.mass = p.length = p.gyroscopic = 1.0
+    p.torque_world = torque_world
+    p.has_world_torque = float(any(torque_world))
     y[3], y[4:7] = 1.0, spin * AXIS
     return p, y
 
@@ -37,7 +37,7 @@ def exact_flow(y, p, accuracy, h_ns):
     control = new_control(1e-3 * accuracy, MAX_DEGREE)
     room, following, y = series_steps.workspace(MAX_DEGREE), np.zeros(STORED), y.copy()
     far = series_steps.steps(y, p, control, following, room, h_ns, False)
-    assert not control[ctl.FAILED]
+    assert not control.failed
     if far < h_ns:
         assert series_steps.steps(y, p, control, following, room, h_ns - far, True) == h_ns - far
     return y

@@ -12,8 +12,9 @@ from random_scenes import log_uniform
 from reference_double_double import attitude_angle, free_step
 from reference_motion import angle_between, free_motion
 
+from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.problem import GYROSCOPIC, MOMENTS, SIZE
+from rigid_proto_ros.motion.problem import PROBLEM
 from rigid_proto_ros.motion.variables import VARIABLES
 
 EPSILON = 2.0**-52
@@ -122,13 +123,13 @@ def cases(draw, count):
 
 
 @njit
-def worst_errors(kernel, moments, spins, steps):
+def worst_errors(kernel, p, moments, spins, steps):
     """Largest attitude error/(ε (1 + |ω|h)) [rad], rate error/(ε |ω| (1 + |ω|h)), and the first case that went wrong."""
     attitude, rate = 0.0, 0.0
-    p, y = np.zeros(SIZE), np.zeros(VARIABLES)
-    p[GYROSCOPIC] = 1.0
+    y = np.zeros(VARIABLES)
+    p.gyroscopic = 1.0
     for k in range(len(steps)):
-        p[MOMENTS : MOMENTS + 3] = moments[k]
+        p.moments[:] = moments[k]
         y[:] = 0.0
         y[3] = 1.0
         y[4:7] = spins[k]
@@ -169,8 +170,8 @@ def test_exact_step_is_exact_a_hundred_thousand_times(draw):
 
 
 def long_step(moments, spin, time):
-    p, y = np.zeros(SIZE), np.zeros(VARIABLES)
-    p[MOMENTS : MOMENTS + 3], p[GYROSCOPIC] = moments, 1.0
+    p, y = new_record(PROBLEM), np.zeros(VARIABLES)
+    p.moments[:], p.gyroscopic = moments, 1.0
     y[3], y[4:7] = 1.0, spin
     assert INTEGRATORS["free_body"].kernel(y, p, time, 1) == 1
     assert np.isfinite(y).all()

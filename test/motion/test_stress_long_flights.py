@@ -9,7 +9,6 @@ from numba import njit
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.problem import MOMENTS
 
 STEPS = 1_000_000
 STRESS_STEPS = 100_000_000
@@ -32,7 +31,7 @@ def drifts(name: str, steps: int) -> tuple[np.ndarray, np.ndarray, float]:
     simulation = flight(make_body(2.0, np.zeros(3), TENSOR), integrator=name, initial=spinning(SPIN))
     segment = simulation._segment
     p, y = segment.problem, segment.variables.copy()
-    moments, kernel = p[MOMENTS : MOMENTS + 3].copy(), INTEGRATORS[name].kernel_for(p)
+    moments, kernel = p.moments.copy(), INTEGRATORS[name].kernel_for(p)
     start = invariants(y, moments)
     L = np.linalg.norm(start[1:4])
     counts = np.unique(np.round(10.0 ** np.arange(2.0, np.log10(steps) + 0.01, 0.25)).astype(int))

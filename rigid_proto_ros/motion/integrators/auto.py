@@ -23,7 +23,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
-from .. import problem as of
 from ..string import most_yielding
 from ..variables import damping_functions
 from . import series_steps, taylor_adaptive
@@ -54,15 +53,15 @@ RADIANS_A_STEP = 1.5
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def steady_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def steady_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Closed form for a body that doesn't spin, or whose spin nothing changes for want of the gyroscopic term."""
     for done in range(n):
-        B, c = of.ACCELERATION_BODY, p[of.DAMPING_LINEAR]
-        push = rotate(y[0], y[1], y[2], y[3], p[B], p[B + 1], p[B + 2])
+        own, c = p.acceleration_body, p.damping_linear
+        push = rotate(y[0], y[1], y[2], y[3], own[0], own[1], own[2])
         phi1, phi2 = damping_functions(c * h)
-        if p[of.TRANSLATES] != 0.0:
+        if p.translates:
             for k in range(3):
-                a, u = push[k] + p[of.ACCELERATION_ADDED + k], y[10 + k]
+                a, u = push[k] + p.acceleration_added[k], y[10 + k]
                 y[7 + k] += h * (phi1 * u + h * phi2 * a)
                 y[10 + k] += h * phi1 * (a - c * u)
         rx, ry, rz, rw = exponential(h * y[4], h * y[5], h * y[6])
@@ -78,45 +77,45 @@ ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRI
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _vector(p: np.ndarray, at: int) -> bool:
+def _any(v: np.ndarray, at: int = 0) -> bool:
     """Whether any of three numbers isn't zero."""
-    return p[at] != 0.0 or p[at + 1] != 0.0 or p[at + 2] != 0.0
+    return v[at] != 0.0 or v[at + 1] != 0.0 or v[at + 2] != 0.0
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def fastest_swing(p: np.ndarray) -> float:
+def fastest_swing(p: np.record) -> float:
     """The fastest that the string can swing the body [rad/s], whatever its direction."""
-    A, I = of.ATTACH, of.MOMENTS
-    yields = most_yielding(p[of.MASS], p[I], p[I + 1], p[I + 2], p[A], p[A + 1], p[A + 2])
-    return math.sqrt(p[of.STIFFNESS] * yields)
+    arm, I = p.attach, p.moments
+    yields = most_yielding(p.mass, I[0], I[1], I[2], arm[0], arm[1], arm[2])
+    return math.sqrt(p.stiffness * yields)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _kind_on_string(p: np.ndarray, y: np.ndarray) -> int:
-    turns = _vector(y, 4) or _vector(p, of.TORQUE_BODY) or p[of.HAS_WORLD_TORQUE] != 0.0
-    accelerated = _vector(p, of.ACCELERATION_ADDED) or _vector(p, of.ACCELERATION_BODY)
-    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _vector(y, 10) or _vector(p, of.HAND_VELOCITY)):
+def _kind_on_string(p: np.record, y: np.ndarray) -> int:
+    turns = _any(y, 4) or _any(p.torque_body) or p.has_world_torque
+    accelerated = _any(p.acceleration_added) or _any(p.acceleration_body)
+    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _any(y, 10) or _any(p.hand_velocity)):
         return SLACK_AT_REST
     return ON_STRING
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def kind_of_segment(p: np.ndarray, y: np.ndarray) -> int:
+def kind_of_segment(p: np.record, y: np.ndarray) -> int:
     """Which of the kinds a segment with problem p from variables y on is."""
-    spins = _vector(y, 4)
-    turned = _vector(p, of.TORQUE_BODY) or p[of.HAS_WORLD_TORQUE] != 0.0 or (spins and p[of.DAMPING_ANGULAR] != 0.0)
-    translates = p[of.TRANSLATES] != 0.0
-    if p[of.HAS_STRING] != 0.0:
+    spins = _any(y, 4)
+    turned = _any(p.torque_body) or p.has_world_torque or (spins and p.damping_angular != 0.0)
+    translates = p.translates
+    if p.has_string:
         return _kind_on_string(p, y)
     if not turned:
         if not spins and not translates:
-            moves = _vector(p, of.REFERENCE_VELOCITY) or _vector(p, of.REFERENCE_ACCELERATION)
+            moves = _any(p.reference_velocity) or _any(p.reference_acceleration)
             return COASTING if moves else ASLEEP
-        if not spins or (p[of.GYROSCOPIC] == 0.0 and not translates):
+        if not spins or (p.gyroscopic == 0.0 and not translates):
             return STEADY
         if not translates:
             return FREE
-    return ANY_LOADS if p[of.HAS_WORLD_TORQUE] != 0.0 else TURNING_LOADS
+    return ANY_LOADS if p.has_world_torque else TURNING_LOADS
 
 
 def _constant(choice: str) -> Callable[..., str]:
@@ -126,7 +125,7 @@ def _constant(choice: str) -> Callable[..., str]:
 def _series(why: str, degree: Callable[[int], int] = int) -> Callable[..., str]:
     """degree: that of the method's series, from the one that the accuracy asks for."""
 
-    def choice(p: np.ndarray, _step_s: float, accuracy: float) -> str:
+    def choice(p: np.record, _step_s: float, accuracy: float) -> str:
         return f"auto: taylor of degree {degree(degree_for(accuracy))}, {why.format(fastest_swing(p))}"
 
     return choice

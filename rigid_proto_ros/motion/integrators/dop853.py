@@ -17,7 +17,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def dop853_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def dop853_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     k, z, new = np.zeros((12, 15)), np.empty(15), y.copy()
     for done in range(n):
@@ -31,7 +31,7 @@ def dop853_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def dop853_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def dop853_string_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
     return tableau_steps_on_string(y, p, h, n, STAGES, WEIGHTS)
 

@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from .. import problem as of
 from ..variables import damping_functions
 
 WEIGHINGS = 4
@@ -26,7 +25,7 @@ _Three = tuple[float, float, float]
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
+def scales(y: np.ndarray, p: np.record, elapsed: float) -> tuple[float, float, float, float]:
     """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into
     the segment.
     """
@@ -34,19 +33,19 @@ def scales(y: np.ndarray, p: np.ndarray, elapsed: float) -> tuple[float, float, 
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def scales_of(w: _Three, u: _Three, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
+def scales_of(w: _Three, u: _Three, p: np.record, elapsed: float) -> tuple[float, float, float, float]:
     """The same at ω = w and the added velocity u."""
     spin = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    if p[of.TRANSLATES] == 0.0:
+    if not p.translates:
         return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
-    c = p[of.REFERENCE_DAMPING]
+    c = p.reference_damping
     push = elapsed * damping_functions(c * elapsed)[0]
     speed = 0.0
     for k in range(3):
-        v = p[of.REFERENCE_VELOCITY + k]
-        v += push * (p[of.REFERENCE_ACCELERATION + k] - c * v) + u[k]
+        v = p.reference_velocity[k]
+        v += push * (p.reference_acceleration[k] - c * v) + u[k]
         speed += v * v
-    length = p[of.LENGTH]
+    length = p.length
     return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
 
 
@@ -62,13 +61,13 @@ def heavier(
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def jump_of_displacement(p: np.ndarray, spin: float, speed: float) -> float:
+def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
     """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
     much too early or late.
     """
-    if p[of.HAS_STRING] == 0.0:
+    if not p.has_string:
         return 0.0
-    arm = math.sqrt(p[of.ATTACH] ** 2 + p[of.ATTACH + 1] ** 2 + p[of.ATTACH + 2] ** 2)
+    arm = math.sqrt(p.attach[0] ** 2 + p.attach[1] ** 2 + p.attach[2] ** 2)
     # What a force at the knot does to the measured velocities, per newton and second.
-    response = max(speed / p[of.MASS], spin * arm / p[of.MOMENTS])
-    return p[of.STRING_DAMPING] * p[of.LENGTH] * response
+    response = max(speed / p.mass, spin * arm / p.moments[0])
+    return p.string_damping * p.length * response

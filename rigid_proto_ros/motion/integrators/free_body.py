@@ -13,16 +13,15 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ..problem import MOMENTS
 from .free_body_step import free_step
 from .integrator import MAX_SPEED, ONE_STEP, Integrator, Method
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def free_body_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def free_body_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     q0, q1, q2, q3, w1, w2, w3 = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
-    a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    a, b, c = p.moments[0], p.moments[1], p.moments[2]
     for done in range(n):
         q0, q1, q2, q3, w1, w2, w3 = free_step(q0, q1, q2, q3, w1, w2, w3, a, b, c, h)
         if not (abs(w1) + abs(w2) + abs(w3) <= MAX_SPEED and math.isfinite(q0 + q1 + q2 + q3)):

@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ..problem import MOMENTS, TRANSLATES
 from .free_body_step import free_step
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 from .kick import drift_freely, kick, push
@@ -22,9 +21,9 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def free_body_strang_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def free_body_strang_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    a, b, c = p.moments[0], p.moments[1], p.moments[2]
     new = y.copy()
     pushed = push(new, p)
     for done in range(n):
@@ -32,7 +31,7 @@ def free_body_strang_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> in
         new[0], new[1], new[2], new[3], new[4], new[5], new[6] = free_step(
             new[0], new[1], new[2], new[3], new[4], new[5], new[6], a, b, c, h
         )
-        if p[TRANSLATES] != 0.0:
+        if p.translates:
             drift_freely(new, h)
         # The next step's first half kick sees the same attitude.
         pushed = push(new, p)

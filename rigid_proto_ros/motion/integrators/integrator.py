@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from ..loads import Load
-from ..problem import HAS_STRING
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
@@ -53,7 +52,7 @@ class Method:
 
     way: int
     kernel: Callable | None
-    choice: Callable[[np.ndarray, float, float], str]
+    choice: Callable[[np.record, float, float], str]
     evaluations: int = 0
     workspace: Callable[[int], np.ndarray] | None = None
     sleeps: bool = False
@@ -79,9 +78,9 @@ class Integrator:
     limits: str
     stability_limit: float
     supports: frozenset[str]
-    kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None
+    kernel: Callable[[np.ndarray, np.record, float, int], int] | None
     make_methods: Callable[[Integrator], tuple[Method, ...]]
-    string_kernel: Callable[[np.ndarray, np.ndarray, float, int], int] | None = None
+    string_kernel: Callable[[np.ndarray, np.record, float, int], int] | None = None
     chooses: bool = False
 
     @cached_property
@@ -94,9 +93,9 @@ class Integrator:
         """Whether it supports every wrench and poke."""
         return self.supports >= LOADS
 
-    def kernel_for(self, problem: np.ndarray) -> Callable[[np.ndarray, np.ndarray, float, int], int] | None:
+    def kernel_for(self, problem: np.record) -> Callable[[np.ndarray, np.record, float, int], int] | None:
         """The kernel that steps this problem; only the ones used are ever compiled."""
-        return self.string_kernel if problem[HAS_STRING] != 0.0 and self.string_kernel else self.kernel
+        return self.string_kernel if problem.has_string and self.string_kernel else self.kernel
 
     def lacks(self, needs: frozenset[str]) -> frozenset[str]:
         """What of a scene's needs it doesn't support; empty when it fits."""

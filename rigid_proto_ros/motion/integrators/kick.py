@@ -7,35 +7,34 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate
-from .. import problem as of
 from ..variables import damping_functions
 from .equations import undamped_torque
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def push(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
+def push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
-    if p[of.TRANSLATES] == 0.0:
+    if not p.translates:
         return tx, ty, tz, 0.0, 0.0, 0.0
-    B, G = of.ACCELERATION_BODY, of.ACCELERATION_ADDED
-    ax, ay, az = rotate(y[0], y[1], y[2], y[3], p[B], p[B + 1], p[B + 2])
-    return tx, ty, tz, ax + p[G], ay + p[G + 1], az + p[G + 2]
+    own, added = p.acceleration_body, p.acceleration_added
+    ax, ay, az = rotate(y[0], y[1], y[2], y[3], own[0], own[1], own[2])
+    return tx, ty, tz, ax + added[0], ay + added[1], az + added[2]
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def kick(y: np.ndarray, p: np.ndarray, h: float, pushed: tuple[float, ...]) -> None:
+def kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> None:
     """Let ``push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
-    angular, linear = p[of.DAMPING_ANGULAR], p[of.DAMPING_LINEAR]
+    angular, linear = p.damping_angular, p.damping_linear
     for k in range(3):
-        rate = pushed[k] / p[of.MOMENTS + k]
+        rate = pushed[k] / p.moments[k]
         if angular == 0.0:
             y[4 + k] += h * rate
         else:
             # ω' = rate − z ω: ω + h φ₁(zh)(rate − z ω).
-            z = angular / p[of.MOMENTS + k]
+            z = angular / p.moments[k]
             y[4 + k] += h * damping_functions(z * h)[0] * (rate - z * y[4 + k])
-        if p[of.TRANSLATES] != 0.0:
+        if p.translates:
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 

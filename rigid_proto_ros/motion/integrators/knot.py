@@ -15,7 +15,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.exact_arithmetic import fast_two_sum, two_product, two_sum
-from ..problem import ATTACH, REST_LENGTH, STRING_START
 from ..variables import LOW
 
 
@@ -33,11 +32,11 @@ Knot = tuple[float, float, float, float, float]
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float, float, float, float]:
+def knot_and_stretch(y: np.ndarray, p: np.record) -> tuple[float, float, float, float, float]:
     """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m
     and not of 1e-16 m.
     """
-    r1, r2, r3 = p[ATTACH], p[ATTACH + 1], p[ATTACH + 2]
+    r1, r2, r3 = p.attach[0], p.attach[1], p.attach[2]
     qx, qy, qz, qw = y[0], y[1], y[2], y[3]
     lx, ly, lz, lw = y[LOW], y[LOW + 1], y[LOW + 2], y[LOW + 3]
     # t = u × r, R r = r + 2 (w t + u × t) with q = (u, w).
@@ -55,16 +54,16 @@ def knot_and_stretch(y: np.ndarray, p: np.ndarray) -> tuple[float, float, float,
     rest = 2.0 * (a1 * b1 + a2 * b2 + a3 * b3) + (e1 + e2 + e3) + (e + g)
     length = math.sqrt(s)
     if length == 0.0:
-        return a1, a2, a3, 0.0, -p[REST_LENGTH]
+        return a1, a2, a3, 0.0, -p.rest_length
     square, f = two_product(length, length)
     low = ((s - square) - f + rest) / (2.0 * length)
-    return a1, a2, a3, length + low, (length - p[REST_LENGTH]) + low
+    return a1, a2, a3, length + low, (length - p.rest_length) + low
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _moved(
     y: np.ndarray,
-    p: np.ndarray,
+    p: np.record,
     k: int,
     r: float,
     w: float,
@@ -90,7 +89,7 @@ def _moved(
     low = 2.0 * (low + g1 + g2)
     s, g1 = two_sum(2.0 * s, r)
     s, g2 = two_sum(s, y[7 + k])
-    s, g3 = two_sum(s, p[STRING_START + k])
+    s, g3 = two_sum(s, p.string_start[k])
     return fast_two_sum(s, low + y[LOW + 4 + k] + (g1 + g2 + g3))
 
 

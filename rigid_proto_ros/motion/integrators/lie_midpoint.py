@@ -12,7 +12,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate
-from .. import problem as of
 from .equations import torque
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 from .midpoint_spin import (
@@ -30,7 +29,7 @@ from .stepping import fixed_steps
 
 @njit(cache=True, error_model="numpy")
 def _change_of_momentum(
-    y: np.ndarray, ox: float, oy: float, oz: float, p: np.ndarray, h: float
+    y: np.ndarray, ox: float, oy: float, oz: float, p: np.record, h: float
 ) -> tuple[float, float, float]:
     """I(ω⁺ − ω) that follows from the mean spin."""
     mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
@@ -41,9 +40,9 @@ def _change_of_momentum(
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> bool:
+def _step(y: np.ndarray, p: np.record, h: float, out: np.ndarray) -> bool:
     """One step from y into out; returns whether the iteration converged."""
-    A, B, C = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
+    A, B, C = p.moments[0], p.moments[1], p.moments[2]
     wx, wy, wz = y[4], y[5], y[6]
     ox, oy, oz = wx, wy, wz
     change = 0.0
@@ -62,20 +61,20 @@ def _step(y: np.ndarray, p: np.ndarray, h: float, out: np.ndarray) -> bool:
     kx, ky, kz = _change_of_momentum(y, ox, oy, oz, p, h)
     out[4], out[5], out[6] = wx + kx / A, wy + ky / B, wz + kz / C
     out[0], out[1], out[2], out[3] = cayley_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
-    if p[of.TRANSLATES] != 0.0:
-        F, G, c = of.ACCELERATION_BODY, of.ACCELERATION_ADDED, p[of.DAMPING_LINEAR]
+    if p.translates:
+        own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
         mx, my, mz, mw = half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
-        push = rotate(mx, my, mz, mw, p[F], p[F + 1], p[F + 2])
+        push = rotate(mx, my, mz, mw, own[0], own[1], own[2])
         for k in range(3):
             # v⁺ = v + h(a − c ½(v + v⁺)), solved.
-            mean = (y[10 + k] + 0.5 * h * (push[k] + p[G + k])) / (1.0 + 0.5 * h * c)
+            mean = (y[10 + k] + 0.5 * h * (push[k] + added[k])) / (1.0 + 0.5 * h * c)
             out[7 + k] = y[7 + k] + h * mean
-            out[10 + k] = y[10 + k] + h * (push[k] + p[G + k] - c * mean)
+            out[10 + k] = y[10 + k] + h * (push[k] + added[k] - c * mean)
     return converged
 
 
 @njit(cache=True, error_model="numpy")
-def lie_midpoint_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def lie_midpoint_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
     for done in range(n):

@@ -20,7 +20,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize
-from ..problem import DAMPING_ANGULAR, MOMENTS
 
 MAX_ITERATIONS = 60
 """Newton's method needs 3 to 6; far more only where the step is too long for a solution to be found."""
@@ -59,9 +58,9 @@ def mean_torque(
 
 
 @njit(cache=True, error_model="numpy")
-def gyroscopic_torque(ox: float, oy: float, oz: float, p: np.ndarray) -> tuple[float, float, float]:
+def gyroscopic_torque(ox: float, oy: float, oz: float, p: np.record) -> tuple[float, float, float]:
     """−ω̄ × Iω̄."""
-    a, b, c = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    a, b, c = p.moments[0], p.moments[1], p.moments[2]
     return (b - c) * oy * oz, (c - a) * oz * ox, (a - b) * ox * oy
 
 
@@ -74,7 +73,7 @@ def newton_correction(
     ry: float,
     rz: float,
     h: float,
-    p: np.ndarray,
+    p: np.record,
     extra: float,
     ax: float,
     ay: float,
@@ -85,8 +84,8 @@ def newton_correction(
     J = 2I + h([ω̄]× I − [Iω̄]× + c) + ``extra`` (|a|² 1 − a aᵀ): gyroscopic term and damping exactly (its torque is −c
     ω̄ in the axes of the start too), a string at arm a as a spring.
     """
-    damping = h * p[DAMPING_ANGULAR]
-    A, B, C = p[MOMENTS], p[MOMENTS + 1], p[MOMENTS + 2]
+    damping = h * p.damping_angular
+    A, B, C = p.moments[0], p.moments[1], p.moments[2]
     size = ax * ax + ay * ay + az * az
     j00 = 2.0 * A + damping + extra * (size - ax * ax)
     j11 = 2.0 * B + damping + extra * (size - ay * ay)

@@ -16,7 +16,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import Packed, arranged, component, filled, joined, load, mixed, number, store
-from .. import problem as of
 from ..string import NO_DIRECTION
 from ..variables import LOW
 from .knot import Knot, moved_pair, unit_attitude
@@ -135,10 +134,10 @@ def _heat_at_the_end(c: np.ndarray, k: int) -> float:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _turned_by_the_world(p: np.ndarray, x: Packed, y: Packed, z: Packed) -> Packed:
+def _turned_by_the_world(p: np.record, x: Packed, y: Packed, z: Packed) -> Packed:
     """Rᵀ τ_w + vee(M R) from R's columns."""
-    torque = _triple(p, of.TORQUE_WORLD)
-    m1, m2, m3 = _triple(p, of.MOMENT), _triple(p, of.MOMENT + 3), _triple(p, of.MOMENT + 6)
+    torque = _triple(p.torque_world, 0)
+    m1, m2, m3 = _triple(p.moment, 0), _triple(p.moment, 3), _triple(p.moment, 6)
     # (M R)ᵢⱼ = Σ Mᵢₙ Rₙⱼ; vee takes (M R)₁₂ − (M R)₂₁ and so on.
     return _vector(
         _dot(x, torque) + (_dot(m2, z) - _dot(m3, y)),
@@ -167,18 +166,18 @@ def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def motion_series(  # noqa: C901 - the recurrences of one order, in their order; a call in between costs more than they do
-    y: np.ndarray, p: np.ndarray, knot: Knot, degree: int, taut: bool, c: np.ndarray
+    y: np.ndarray, p: np.record, knot: Knot, degree: int, taut: bool, c: np.ndarray
 ) -> None:
     """Fill c with the coefficients of the motion from variables y up to ``degree``; knot: where a string is tied,
     its knot; taut: its law.
     """
-    tied, turned = p[of.HAS_STRING] != 0.0, p[of.HAS_WORLD_TORQUE] != 0.0
-    moments = _vector(p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2], 1.0)
+    tied, turned = p.has_string, p.has_world_torque
+    moments = _vector(p.moments[0], p.moments[1], p.moments[2], 1.0)
     inverse_moments = _four(1.0) / moments
-    gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) * p[of.GYROSCOPIC]
-    cw, cv, inverse_mass = p[of.DAMPING_ANGULAR], p[of.DAMPING_LINEAR], 1.0 / p[of.MASS]
-    body_acceleration, arm, hand = _triple(p, of.ACCELERATION_BODY), _triple(p, of.ATTACH), _triple(p, of.HAND_VELOCITY)
-    stiffness, damping, to_the_end = p[of.STIFFNESS], p[of.STRING_DAMPING], p[of.REST_LENGTH] == 0.0
+    gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) * p.gyroscopic
+    cw, cv, inverse_mass = p.damping_angular, p.damping_linear, 1.0 / p.mass
+    body_acceleration, arm, hand = _triple(p.acceleration_body, 0), _triple(p.attach, 0), _triple(p.hand_velocity, 0)
+    stiffness, damping, to_the_end = p.stiffness, p.string_damping, p.rest_length == 0.0
     zeros, many, last = _four(0.0), filled(0.0, 16), _vector(0.0, 0.0, 0.0, 1.0)
 
     q, w, d, u = load(y, 0, zeros), _triple(y, 4), _triple(y, 7), _triple(y, 10)
@@ -186,7 +185,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
     if tied:
         ax, ay, az, length, c[0, STRETCH] = knot
         a = _vector(ax, ay, az, 0.0)
-        pulls = to_the_end or (taut and length >= NO_DIRECTION * p[of.REST_LENGTH])
+        pulls = to_the_end or (taut and length >= NO_DIRECTION * p.rest_length)
         if pulls and not to_the_end:
             inverse = 1.0 / length
             along = a * inverse
@@ -225,7 +224,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
         torque = gyroscopic * component(products, 0) - w * cw
         push = _weighed(r1, r2, r3, body_acceleration) - u * cv
         if k == 0:
-            torque, push = torque + _triple(p, of.TORQUE_BODY), push + _triple(p, of.ACCELERATION_ADDED)
+            torque, push = torque + _triple(p.torque_body, 0), push + _triple(p.acceleration_added, 0)
         if turned:
             torque = torque + _turned_by_the_world(p, r1, r2, r3)
         next_d, next_a, next_length, work = u * f, zeros, 0.0, 0.0
@@ -281,9 +280,9 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def motion_at(c: np.ndarray, p: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
+def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray) -> None:
     """Take the variables y, those that c is the series of, h seconds on."""
-    columns = 15 if p[of.HAS_STRING] != 0.0 else 13 if p[of.TRANSLATES] != 0.0 else 7
+    columns = 15 if p.has_string else 13 if p.translates else 7
     sums = power_sum(c, COLUMNS, COLUMNS, degree - 1, h, filled(0.0, 16))
     # The row past the last coefficient's is spare.
     changes = c[degree + 1]
@@ -300,7 +299,7 @@ def motion_at(c: np.ndarray, p: np.ndarray, degree: int, h: float, y: np.ndarray
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def stretch_at(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> tuple[float, float]:
+def stretch_at(c: np.ndarray, p: np.record, degree: int, h: float) -> tuple[float, float]:
     """x = l − rest length, and its rate, h seconds on."""
     a, b = filled(0.0, 4), filled(0.0, 4)
     at = degree * COLUMNS + A_KNOT
@@ -314,7 +313,7 @@ def stretch_at(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> tuple[flo
     ax, ay, az = c[0, A_KNOT] + dx, c[0, A_KNOT + 1] + dy, c[0, A_KNOT + 2] + dz
     length = math.sqrt(ax * ax + ay * ay + az * az)
     if length == 0.0:
-        return -p[of.REST_LENGTH], 0.0
+        return -p.rest_length, 0.0
     # The change of length without cancellation: l⁺² − l² = (a⁺ − a)·(a⁺ + a).
     change = (dx * (ax + c[0, A_KNOT]) + dy * (ay + c[0, A_KNOT + 1]) + dz * (az + c[0, A_KNOT + 2])) / (
         length + c[0, DISTANCE]

@@ -14,7 +14,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import normalize
-from .. import problem as of
 from .equations import added_acceleration, angular_acceleration, torque
 from .integrator import (
     ANGULAR_DAMPING,
@@ -47,12 +46,12 @@ def _rates(
     ux: float,
     uy: float,
     uz: float,
-    p: np.ndarray,
+    p: np.record,
     translate: bool,
 ) -> _Ten:
     """Time derivatives of q, ω and the added velocity u."""
     nx, ny, nz, nw = qx, qy, qz, qw
-    if translate or p[of.HAS_WORLD_TORQUE] != 0.0:
+    if translate or p.has_world_torque:
         # Stages leave the unit sphere by O(h²); directions of loads must not grow with them.
         nx, ny, nz, nw = normalize(qx, qy, qz, qw)
     tx, ty, tz = torque(nx, ny, nz, nw, wx, wy, wz, p)
@@ -85,11 +84,11 @@ def _sum(y: _Ten, k: _Ten, c: float) -> _Ten:
 
 
 @njit(cache=True, error_model="numpy")
-def rk4_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def rk4_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    if p[of.TRANSLATES] == 0.0 and p[of.HAS_WORLD_TORQUE] == 0.0:
+    if not p.translates and not p.has_world_torque:
         return _turning_steps(y, p, h, n)
-    translate = p[of.TRANSLATES] != 0.0
+    translate = p.translates
     half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
     # Variables stay out of the array, so that what p holds is read once and not in every step.
     u0: _Ten = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[10], y[11], y[12])
@@ -152,12 +151,12 @@ def _moved(u: _Seven, k: _Seven, c: float) -> _Seven:
 
 
 @njit(cache=True, error_model="numpy")
-def _turning_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def _turning_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """The same where translation is closed form and no load hangs on the attitude: a fifth of the time."""
-    a, b, c = p[of.MOMENTS], p[of.MOMENTS + 1], p[of.MOMENTS + 2]
-    T, g, d = of.TORQUE_BODY, p[of.GYROSCOPIC], p[of.DAMPING_ANGULAR]
+    a, b, c = p.moments[0], p.moments[1], p.moments[2]
+    torque_body, g, d = p.torque_body, p.gyroscopic, p.damping_angular
     k = (
-        *(p[T] / a, p[T + 1] / b, p[T + 2] / c),
+        *(torque_body[0] / a, torque_body[1] / b, torque_body[2] / c),
         *(d / a, d / b, d / c),
         *(g * (b - c) / a, g * (c - a) / b, g * (a - b) / c),
     )
@@ -181,7 +180,7 @@ def _turning_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def rk4_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def rk4_string_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """The same by the tableau, each step cut where the string turns slack or taut."""
     return tableau_steps_on_string(y, p, h, n, TABLEAU, WEIGHTS)
 

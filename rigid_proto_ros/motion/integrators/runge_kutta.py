@@ -15,28 +15,27 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import normalize
-from ..problem import HAS_STRING, HAS_WORLD_TORQUE, TRANSLATES
 from ..variables import VARIABLES
 from . import slack
 from .equations import accelerations
 from .integrator import MAX_SPEED
 
-_Step = Callable[[np.ndarray, np.ndarray, float, bool, np.ndarray], None]
+_Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray], None]
 """One step: (y, p, h, taut, out)."""
 
 
 @njit(cache=True, error_model="numpy")
-def integrated(p: np.ndarray) -> int:
+def integrated(p: np.record) -> int:
     """How many of the variables change: attitude and spin; with added motion also that; with a string
     also its energies.
     """
-    if p[HAS_STRING] != 0.0:
+    if p.has_string:
         return VARIABLES
-    return 13 if p[TRANSLATES] != 0.0 else 7
+    return 13 if p.translates else 7
 
 
 @njit(cache=True, error_model="numpy")
-def rates(z: np.ndarray, p: np.ndarray, taut: bool, k: np.ndarray) -> None:
+def rates(z: np.ndarray, p: np.record, taut: bool, k: np.ndarray) -> None:
     """Time derivatives k of variables z, both (15,)."""
     qx, qy, qz, qw = z[0], z[1], z[2], z[3]
     wx, wy, wz = z[4], z[5], z[6]
@@ -44,7 +43,7 @@ def rates(z: np.ndarray, p: np.ndarray, taut: bool, k: np.ndarray) -> None:
     k[1] = 0.5 * (qw * wy - qx * wz + qz * wx)
     k[2] = 0.5 * (qw * wz + qx * wy - qy * wx)
     k[3] = -0.5 * (qx * wx + qy * wy + qz * wz)
-    if p[TRANSLATES] != 0.0 or p[HAS_WORLD_TORQUE] != 0.0:
+    if p.translates or p.has_world_torque:
         qx, qy, qz, qw = normalize(qx, qy, qz, qw)
     k[4], k[5], k[6], k[10], k[11], k[12], k[13], k[14] = accelerations(
         qx, qy, qz, qw, wx, wy, wz, z[7], z[8], z[9], z[10], z[11], z[12], p, taut
@@ -54,7 +53,7 @@ def rates(z: np.ndarray, p: np.ndarray, taut: bool, k: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def stages(
-    y: np.ndarray, p: np.ndarray, h: float, taut: bool, A: np.ndarray, count: int, k: np.ndarray, z: np.ndarray
+    y: np.ndarray, p: np.record, h: float, taut: bool, A: np.ndarray, count: int, k: np.ndarray, z: np.ndarray
 ) -> None:
     """Fill the stage derivatives k (count, 15); k[0] must hold the rates at y. z (15,) is scratch."""
     size = integrated(p)
@@ -72,7 +71,7 @@ def stages(
 
 
 @njit(cache=True, error_model="numpy")
-def advance(y: np.ndarray, p: np.ndarray, h: float, B: np.ndarray, count: int, k: np.ndarray, out: np.ndarray) -> None:
+def advance(y: np.ndarray, p: np.record, h: float, B: np.ndarray, count: int, k: np.ndarray, out: np.ndarray) -> None:
     """The new variables from the stages: out = y + h Σ bᵢ kᵢ with a unit quaternion."""
     size = integrated(p)
     for j in range(size):
@@ -96,7 +95,7 @@ def is_good(y: np.ndarray) -> bool:
 
 
 @njit(inline="always", error_model="numpy")
-def repeated(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def repeated(step: _Step, y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones. step: a kernel.
 
     Put into the kernel that calls it, since numba keeps no compiled code that was handed a function.
@@ -111,7 +110,7 @@ def repeated(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: int) -> int
 
 
 @njit(inline="always", error_model="numpy")
-def repeated_on_string(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def repeated_on_string(step: _Step, y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """``repeated``, each step cut where the string turns slack or taut."""
     new, trial = y.copy(), y.copy()
     search = slack.new_search()
@@ -129,7 +128,7 @@ def repeated_on_string(step: _Step, y: np.ndarray, p: np.ndarray, h: float, n: i
 
 
 @njit(cache=True, error_model="numpy")
-def tableau_steps_on_string(y: np.ndarray, p: np.ndarray, h: float, n: int, A: np.ndarray, B: np.ndarray) -> int:
+def tableau_steps_on_string(y: np.ndarray, p: np.record, h: float, n: int, A: np.ndarray, B: np.ndarray) -> int:
     """The same for the method of stages A (s, s) and weights B (s,)."""
     count = len(B)
     k, z, new, trial = np.zeros((count, VARIABLES)), np.empty(VARIABLES), y.copy(), y.copy()

@@ -19,7 +19,7 @@ from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, out: np.ndarray) -> None:
+def _step(y: np.ndarray, p: np.record, h: float, taut: bool, out: np.ndarray) -> None:
     """One step of h seconds from y into out, the string's law given."""
     qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     ex, ey, ez, ax, ay, az, work, heat = accelerations(
@@ -36,13 +36,13 @@ def _step(y: np.ndarray, p: np.ndarray, h: float, taut: bool, out: np.ndarray) -
 
 
 @njit(cache=True, error_model="numpy")
-def semi_implicit_euler_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def semi_implicit_euler_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return repeated(_step, y, p, h, n)
 
 
 @njit(cache=True, error_model="numpy")
-def semi_implicit_euler_string_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def semi_implicit_euler_string_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """The same, each step cut where the string turns slack or taut."""
     return repeated_on_string(_step, y, p, h, n)
 

@@ -18,7 +18,6 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.simd import aligned, filled, joined
 from ...base.uncounted_arrays import copy_numbers
-from ..problem import HAS_STRING, STIFFNESS
 from ..variables import ATTITUDE, HEAT, STORED
 from . import control as ctl
 from .error_measure import (
@@ -89,26 +88,26 @@ def known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _lay_out(
-    y: np.ndarray, p: np.ndarray, control: np.ndarray, weights: tuple[float, float, float, float], c: np.ndarray
+    y: np.ndarray, p: np.record, control: np.record, weights: tuple[float, float, float, float], c: np.ndarray
 ) -> int:
     """Series of one step from y into c and control; returns its length [ns], 0 when there is none.
     weights: of errors.
     """
-    degree, accuracy = degree_of_motion(int(control[ctl.DEGREE])), control[ctl.ACCURACY]
+    degree, accuracy = degree_of_motion(control.degree), control.accuracy
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
-    part = PART_ON_A_STRING if p[HAS_STRING] != 0.0 else PART
+    part = PART_ON_A_STRING if p.has_string else PART
     series, last = c, c[2 * (degree + 2)]
     start = y
     knot = knot_at(y, p)
     law = law_of(y, p, knot)
-    control[ctl.LAW], control[ctl.SWITCH] = law, math.inf
+    control.law, control.switch = law, math.inf
     gone = 0.0
     parts = 0
     while True:
-        if control[ctl.SERIES] == 0.0 or parts > 0:
+        if not control.series or parts > 0:
             motion_series(start, p, knot, degree, law == PULLS, series)
-            control[ctl.PENDING] += 1.0
-        control[ctl.SERIES] = 1.0
+            control.pending += 1
+        control.series = True
         parts += 1
         # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much
         # better.
@@ -121,8 +120,8 @@ def _lay_out(
             h, length_ns = before_passage(series, p, degree, knot, h)
             if length_ns > 0:
                 motion_series(y, p, knot, degree, False, c)
-                control[ctl.LAW], control[ctl.SERIES] = PASSES, 0.0
-                control[ctl.PASSAGES] += 1.0
+                control.law, control.series = PASSES, 0.0
+                control.passages += 1
                 return length_ns if length_ns * 1e-9 <= allowed_length(c, degree, weights, accuracy, part) else 0
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
             return 0
@@ -137,41 +136,41 @@ def _lay_out(
             return before_ns
         if parts == 1:
             copy_numbers(y, last[:STORED])
-            control[ctl.SWITCH] = switch
+            control.switch = switch
         _move(series, p, degree, switch, law, last)
         start, series = last, c[degree + 2 : 2 * (degree + 2)]
         knot = knot_at(start, p)
         gone, law = gone + switch, after
-        control[ctl.LAST_START], control[ctl.LAST_LAW] = gone, law
+        control.last_start, control.last_law = gone, law
     length_ns = int(math.floor((gone + h) * 1e9))
     # The last series must be of some use.
     return length_ns if length_ns * 1e-9 > gone else length_ns + 1
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _reach(p: np.ndarray, control: np.ndarray, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
+def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
     """Take the variables at the beginning of the step that is laid out ``time_ns`` into it."""
-    degree, t = degree_of_motion(int(control[ctl.DEGREE])), time_ns * 1e-9
-    if t <= control[ctl.SWITCH]:
-        _move(c, p, degree, t, control[ctl.LAW], out)
+    degree, t = degree_of_motion(control.degree), time_ns * 1e-9
+    if t <= control.switch:
+        _move(c, p, degree, t, control.law, out)
     else:
         copy_numbers(c[2 * (degree + 2)], out)
-        _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control[ctl.LAST_START], control[ctl.LAST_LAW], out)
+        _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control.last_start, control.last_law, out)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _move(c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, out: np.ndarray) -> None:
+def _move(c: np.ndarray, p: np.record, degree: int, h: float, law: float, out: np.ndarray) -> None:
     motion_at(c, p, degree, h, out)
     if law == SHORTENS:
         # Stretched but not pulling: the damper takes what is left of ½ k x².
         before, after = max(stretch_at(c, p, degree, 0.0)[0], 0.0), max(stretch_at(c, p, degree, h)[0], 0.0)
-        out[HEAT] += 0.5 * p[STIFFNESS] * (before - after) * (before + after)
+        out[HEAT] += 0.5 * p.stiffness * (before - after) * (before + after)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.ndarray, c: np.ndarray) -> bool:
+def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarray, c: np.ndarray) -> bool:
     """Lay out the next step and take it into ``following``; returns whether there is one."""
-    elapsed = control[ctl.ELAPSED_NS]
+    elapsed = control.elapsed_ns
     weights = scales(y, p, elapsed * 1e-9)
     length, good = 0, False
     for _ in range(WEIGHINGS):
@@ -192,8 +191,8 @@ def _accept(y: np.ndarray, p: np.ndarray, control: np.ndarray, following: np.nda
 @njit(cache=True, error_model="numpy", allocates=False)
 def steps(
     y: np.ndarray,
-    p: np.ndarray,
-    control: np.ndarray,
+    p: np.record,
+    control: np.record,
     following: np.ndarray,
     c: np.ndarray,
     span_ns: int,
@@ -206,8 +205,8 @@ def steps(
     """
     advanced = 0
     while True:
-        if control[ctl.ACCEPTED_NS] == 0.0 and not _accept(y, p, control, following, c):
-            control[ctl.FAILED] = 1.0
+        if control.accepted_ns == 0 and not _accept(y, p, control, following, c):
+            control.failed = True
             return advanced
         if sampling:
             _reach(p, control, c, span_ns, y)

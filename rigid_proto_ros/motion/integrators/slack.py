@@ -16,7 +16,6 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ..problem import BILATERAL, REST_LENGTH, STIFFNESS
 from ..variables import HEAT
 from .equations import knot, stretch, tension_margin
 from .first_root import NONE, first_rise
@@ -50,7 +49,7 @@ def new_search() -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def begin(s: np.ndarray, y: np.ndarray, p: np.ndarray, h: float) -> None:
+def begin(s: np.ndarray, y: np.ndarray, p: np.record, h: float) -> None:
     """Start a step of h seconds from variables y."""
     x, rate = stretch(y, p)
     margin = tension_margin(x, rate, p)
@@ -63,7 +62,7 @@ def begin(s: np.ndarray, y: np.ndarray, p: np.ndarray, h: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _begin_part(s: np.ndarray, x: float, margin: float, y: np.ndarray, p: np.ndarray) -> None:
+def _begin_part(s: np.ndarray, x: float, margin: float, y: np.ndarray, p: np.record) -> None:
     s[_PHASE] = _WHOLE
     s[TRIAL] = s[REMAINING]
     s[_X], s[_MARGIN_LOW] = x, margin
@@ -75,7 +74,7 @@ def _begin_part(s: np.ndarray, x: float, margin: float, y: np.ndarray, p: np.nda
 
 
 @njit(cache=True, error_model="numpy")
-def check_trial(s: np.ndarray, trial: np.ndarray, p: np.ndarray) -> bool:
+def check_trial(s: np.ndarray, trial: np.ndarray, p: np.record) -> bool:
     """Whether the trial step is accepted (its heat then completed); s says what is to be done next until
     nothing remains.
     """
@@ -144,11 +143,11 @@ def _next_trial(s: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _accept(s: np.ndarray, trial: np.ndarray, p: np.ndarray, x: float, margin: float, switches: bool) -> bool:
+def _accept(s: np.ndarray, trial: np.ndarray, p: np.record, x: float, margin: float, switches: bool) -> bool:
     if s[TAUT] == 0.0:
         # Stretched but not pulling, because it shortens faster than its damper lets it: the damper takes all of ½ k x².
         before, after = max(s[_X], 0.0), max(x, 0.0)
-        trial[HEAT] += 0.5 * p[STIFFNESS] * (before - after) * (before + after)
+        trial[HEAT] += 0.5 * p.stiffness * (before - after) * (before + after)
     s[REMAINING] -= s[TRIAL]
     if s[REMAINING] <= s[_RESOLUTION]:
         s[REMAINING] = 0.0
@@ -163,21 +162,21 @@ def _accept(s: np.ndarray, trial: np.ndarray, p: np.ndarray, x: float, margin: f
 
 
 @njit(cache=True, error_model="numpy")
-def knot_of(y: np.ndarray, p: np.ndarray) -> tuple[float, ...]:
+def knot_of(y: np.ndarray, p: np.record) -> tuple[float, ...]:
     """From the free end to the knot, and its rate, at variables y: six numbers."""
     return knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
 
 
 @njit(cache=True, error_model="numpy")
 def first_interval(
-    start: np.ndarray | tuple[float, ...], end: tuple[float, ...], h: float, x0: float, p: np.ndarray, taut: bool
+    start: np.ndarray | tuple[float, ...], end: tuple[float, ...], h: float, x0: float, p: np.record, taut: bool
 ) -> tuple[float, bool]:
     """Middle of the first interval within h seconds, 0 for none, that the string is stretched (slack for a taut one) on
     the cubic through the knot's place and velocity at both ends (6,), and whether it ends before h. x0: stretch at the
     start.
     """
-    rest = p[REST_LENGTH]
-    if p[BILATERAL] != 0.0 or rest == 0.0 or (x0 > 0.0) != taut:
+    rest = p.rest_length
+    if p.bilateral or rest == 0.0 or (x0 > 0.0) != taut:
         return 0.0, False
     sign = -1.0 if taut else 1.0
     g = np.zeros(7)

@@ -11,65 +11,84 @@ import functools
 from dataclasses import replace
 
 import numpy as np
+from numba import boolean, float64, from_dtype, int64, types
 
-from ...base.addresses import (
-    ADAPTIVE_STEPS,
-    STEPS,
-    adaptive_steps_at,
-    address_of,
-    steps_at,
-)
+from ...base.addresses import address_of, function_at
 from ...base.compilation import njit
-from . import control as ctl
+from ...base.records import record_type
+from ..problem import PROBLEM
+from .control import CONTROL
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Integrator, Method
+
+STEPS = types.FunctionType(int64(float64[::1], from_dtype(PROBLEM), float64, int64))
+"""A kernel (y, p, h, n)."""
+
+ADAPTIVE_STEPS = types.FunctionType(
+    int64(float64[::1], from_dtype(PROBLEM), from_dtype(CONTROL), float64[::1], float64[:, ::1], int64, boolean)
+)
+"""A kernel (y, p, control, following, workspace, span_ns, sampling)."""
+
+steps_at, adaptive_steps_at = function_at(STEPS), function_at(ADAPTIVE_STEPS)
 
 
 def fixed_steps(integrator: Integrator) -> tuple[Method, ...]:
     """Steps of one length, counted from the segment's start; the second method is for a segment with a string."""
 
-    def choice(_p: np.ndarray, step_s: float, _accuracy: float) -> str:
+    def choice(_p: np.record, step_s: float, _accuracy: float) -> str:
         return f"{integrator.name}: fixed steps of {step_s:g} s"
 
     without = Method(FIXED_STEPS, integrator.kernel, choice, integrator.evaluations)
     return without, replace(without, kernel=integrator.string_kernel or integrator.kernel, on_string=True)
 
 
-# A row of a table of methods.
-WAY, ADDRESS, EVALUATIONS, SLEEPS, ROWS, COLUMNS, METHOD = range(7)
-"""ADDRESS 0: not compiled yet. ROWS and COLUMNS of the workspace."""
+METHOD = record_type(
+    [
+        ("way", np.int64),
+        ("address", np.int64),  # of the kernel; 0: not compiled yet
+        ("evaluations", np.int64),
+        ("sleeps", np.bool_),
+        ("rows", np.int64),  # of the workspace
+        ("columns", np.int64),
+    ]
+)
 
 
 @functools.lru_cache(maxsize=256)
 def method_table(integrator: Integrator, degree: int) -> np.ndarray:
-    """The integrator's methods as compiled loops read them (n, METHOD); kernels have no address until
-    they are wanted.
+    """The integrator's methods as compiled loops read them (n,) METHOD; kernels have no address until they are
+    wanted.
     """
-    table = np.zeros((len(integrator.methods), METHOD), np.int64)
-    for row, method in zip(table, integrator.methods, strict=True):
+    table = np.zeros(len(integrator.methods), METHOD)
+    for number, method in enumerate(integrator.methods):
         rows, columns = method.workspace(degree).shape if method.workspace else (0, 0)
-        row[:] = method.way, 0, method.evaluations, method.sleeps, rows, columns
+        table[number] = method.way, 0, method.evaluations, method.sleeps, rows, columns
     return table
+
+
+def workspace_size(table: np.ndarray) -> int:
+    """Of the method that needs most [doubles]; of one table or several."""
+    return int((table["rows"] * table["columns"]).max())
 
 
 def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> None:
     """Compile a method's kernel, or load it from the cache, and put its address into the table."""
-    kernel, way = integrator.methods[number].kernel, table[number, WAY]
-    if kernel is not None and table[number, ADDRESS] == 0:
-        table[number, ADDRESS] = address_of(kernel, ADAPTIVE_STEPS if way == ADAPTIVE else STEPS)
+    kernel, method = integrator.methods[number].kernel, table[number]
+    if kernel is not None and method["address"] == 0:
+        method["address"] = address_of(kernel, ADAPTIVE_STEPS if method["way"] == ADAPTIVE else STEPS)
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
-def is_provided(table: np.ndarray, number: int) -> bool:
+def is_provided(method: np.record) -> bool:
     """Whether the method's kernel can be called."""
-    return table[number, WAY] == NOTHING or table[number, ADDRESS] != 0
+    return method.way == NOTHING or method.address != 0
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def commit(
-    method: np.ndarray,
+    method: np.record,
     y: np.ndarray,
-    p: np.ndarray,
-    control: np.ndarray,
+    p: np.record,
+    control: np.record,
     following: np.ndarray,
     room: np.ndarray,
     step_ns: int,
@@ -78,34 +97,34 @@ def commit(
     """Commit steps in y that fit into ``span_ns``; returns how far it came [ns], how many were counted here, and
     whether all were good. room: for the workspace, of any size that is enough.
     """
-    if method[WAY] == FIXED_STEPS:
+    if method.way == FIXED_STEPS:
         wanted = span_ns // step_ns
         if wanted <= 0:
             return 0, 0, True
-        done = steps_at(method[ADDRESS])(y, p, step_ns * 1e-9, wanted)
+        done = steps_at(method.address)(y, p, step_ns * 1e-9, wanted)
         return done * step_ns, done, done == wanted
-    if method[WAY] == ADAPTIVE:
-        workspace = room[: method[ROWS] * method[COLUMNS]].reshape((method[ROWS], method[COLUMNS]))
-        advanced = adaptive_steps_at(method[ADDRESS])(y, p, control, following, workspace, span_ns, False)
-        return advanced, 0, control[ctl.FAILED] == 0.0
+    if method.way == ADAPTIVE:
+        workspace = room[: method.rows * method.columns].reshape((method.rows, method.columns))
+        advanced = adaptive_steps_at(method.address)(y, p, control, following, workspace, span_ns, False)
+        return advanced, 0, not control.failed
     return 0, 0, True
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def reach(
-    method: np.ndarray,
+    method: np.record,
     y: np.ndarray,
-    p: np.ndarray,
-    control: np.ndarray,
+    p: np.record,
+    control: np.record,
     following: np.ndarray,
     room: np.ndarray,
     rest_ns: int,
 ) -> bool:
     """One step of ``rest_ns`` in y, a copy; whether it was good."""
-    if method[WAY] == NOTHING:
+    if method.way == NOTHING:
         return True
-    if method[WAY] == ADAPTIVE:
-        workspace = room[: method[ROWS] * method[COLUMNS]].reshape((method[ROWS], method[COLUMNS]))
-        steps = adaptive_steps_at(method[ADDRESS])
+    if method.way == ADAPTIVE:
+        workspace = room[: method.rows * method.columns].reshape((method.rows, method.columns))
+        steps = adaptive_steps_at(method.address)
         return steps(y, p, control, following, workspace, rest_ns, True) == rest_ns
-    return steps_at(method[ADDRESS])(y, p, rest_ns * 1e-9, 1) == 1
+    return steps_at(method.address)(y, p, rest_ns * 1e-9, 1) == 1

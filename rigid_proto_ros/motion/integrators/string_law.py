@@ -23,7 +23,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import filled, load, number
-from .. import problem as of
 from ..string import NO_DIRECTION
 from .equations import knot as moving_knot
 from .first_root import NONE, first_rise
@@ -68,21 +67,21 @@ _BEFORE = 0.75
 
 
 @njit(cache=True, error_model="numpy")
-def is_one_sided(p: np.ndarray) -> bool:
+def is_one_sided(p: np.record) -> bool:
     """Whether the string's law may change at all."""
-    return p[of.HAS_STRING] != 0.0 and p[of.BILATERAL] == 0.0
+    return p.has_string and not p.bilateral
 
 
 @njit(cache=True, error_model="numpy")
-def knot_at(y: np.ndarray, p: np.ndarray) -> Knot:
+def knot_at(y: np.ndarray, p: np.record) -> Knot:
     """The knot of a string at variables y; zeros where none is tied."""
-    if p[of.HAS_STRING] == 0.0:
+    if not p.has_string:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     return knot_and_stretch(y, p)
 
 
 @njit(cache=True, error_model="numpy")
-def law_of(y: np.ndarray, p: np.ndarray, knot: Knot) -> float:
+def law_of(y: np.ndarray, p: np.record, knot: Knot) -> float:
     """The law at variables y with the knot there."""
     if not is_one_sided(p):
         return PULLS
@@ -93,12 +92,12 @@ def law_of(y: np.ndarray, p: np.ndarray, knot: Knot) -> float:
         y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p
     )
     rate = (ax * vx + ay * vy + az * vz) / length
-    return PULLS if p[of.STIFFNESS] * x + p[of.STRING_DAMPING] * rate > 0.0 else SHORTENS
+    return PULLS if p.stiffness * x + p.string_damping * rate > 0.0 else SHORTENS
 
 
 @njit(cache=True, error_model="numpy")
 def next_law(
-    c: np.ndarray, p: np.ndarray, degree: int, h: float, law: float, accuracy: float
+    c: np.ndarray, p: np.record, degree: int, h: float, law: float, accuracy: float
 ) -> tuple[float, float, float]:
     """When within h seconds the law first changes, NONE for never; the one that follows; and how far of h
     that is known.
@@ -116,7 +115,7 @@ def next_law(
                 g[k] = -c[k, TENSION] * power
                 power *= h
             g[0] = min(g[0], 0.0)
-            time, after = first_rise(g, degree - 1), SHORTENS if p[of.STRING_DAMPING] > 0.0 else SLACK
+            time, after = first_rise(g, degree - 1), SHORTENS if p.string_damping > 0.0 else SLACK
             told = time if time == NONE else time * h
         else:
             time, after = _stops_shortening(c, p, degree, h, g)
@@ -127,9 +126,9 @@ def next_law(
 
 
 @njit(cache=True, error_model="numpy")
-def _tautens(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> float:
+def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
     """When |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
-    rest = p[of.REST_LENGTH]
+    rest = p.rest_length
     reach, power, last = c[0, DISTANCE], 1.0, 0
     for k in range(1, degree + 1):
         power *= h
@@ -164,7 +163,7 @@ def _tautens(c: np.ndarray, p: np.ndarray, degree: int, h: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _stops_shortening(c: np.ndarray, p: np.ndarray, degree: int, h: float, g: np.ndarray) -> tuple[float, float]:
+def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.ndarray) -> tuple[float, float]:
     """At which part of h the string's stretch is gone or it begins to pull, whichever is first, and the
     law after that.
     """
@@ -179,7 +178,7 @@ def _stops_shortening(c: np.ndarray, p: np.ndarray, degree: int, h: float, g: np
     power = 1.0
     for k in range(degree):
         x = c[k, DISTANCE] if k > 0 else c[0, STRETCH]
-        g[k] = (p[of.STIFFNESS] * x + p[of.STRING_DAMPING] * (k + 1) * c[k + 1, DISTANCE]) * power
+        g[k] = (p.stiffness * x + p.string_damping * (k + 1) * c[k + 1, DISTANCE]) * power
         power *= end
     g[0] = min(g[0], 0.0)
     pulls = first_rise(g, degree - 1)
@@ -189,9 +188,9 @@ def _stops_shortening(c: np.ndarray, p: np.ndarray, degree: int, h: float, g: np
 
 
 @njit(cache=True, error_model="numpy")
-def _converges(c: np.ndarray, p: np.ndarray, degree: int, t: float, tolerance: float) -> bool:
+def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: float) -> bool:
     """Whether the series of the knot's distance gives the tension that the motion's series give."""
-    stiffness, damping = p[of.STIFFNESS], p[of.STRING_DAMPING]
+    stiffness, damping = p.stiffness, p.string_damping
     tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0
     for k in range(1, degree + 1):
         slope = damping * k * c[k, DISTANCE] * power
@@ -206,20 +205,20 @@ def _converges(c: np.ndarray, p: np.ndarray, degree: int, t: float, tolerance: f
 
 
 @njit(cache=True, error_model="numpy")
-def may_pass(p: np.ndarray) -> bool:
+def may_pass(p: np.record) -> bool:
     """Whether the string is one that pushes at no length."""
-    return p[of.HAS_STRING] != 0.0 and p[of.BILATERAL] != 0.0 and p[of.REST_LENGTH] != 0.0
+    return p.has_string and p.bilateral and p.rest_length != 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def before_passage(c: np.ndarray, p: np.ndarray, degree: int, knot: Knot, h: float) -> tuple[float, int]:
+def before_passage(c: np.ndarray, p: np.record, degree: int, knot: Knot, h: float) -> tuple[float, int]:
     """h cut down so that a step along the series c ends before the knot passes its free end; or, where that is at hand,
     the length [ns] of the step that passes it, else 0. knot: at the series' start.
     """
     ax, ay, az, length, _ = knot
     vx, vy, vz = c[1, A_KNOT], c[1, A_KNOT + 1], c[1, A_KNOT + 2]
     square = vx * vx + vy * vy + vz * vz
-    speed, shortest = math.sqrt(square), NO_DIRECTION * p[of.REST_LENGTH]
+    speed, shortest = math.sqrt(square), NO_DIRECTION * p.rest_length
     if speed > 0.0 and length <= FARTHEST * speed:
         nearest = -(ax * vx + ay * vy + az * vz) / square
         bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest

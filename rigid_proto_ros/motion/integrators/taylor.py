@@ -15,7 +15,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.simd import Packed, arranged, component, filled, half, joined, largest, load, number, paired, store
-from .. import problem as of
 from .error_measure import scales_of
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, MAX_SPEED, Integrator
 from .stepping import fixed_steps
@@ -78,25 +77,25 @@ def put_variables(variables: Packed, y: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def scales_at(variables: Packed, p: np.ndarray, elapsed: float) -> tuple[float, float, float, float]:
+def scales_at(variables: Packed, p: np.record, elapsed: float) -> tuple[float, float, float, float]:
     """Weights of errors at the variables, ``elapsed`` seconds into the segment (integrators/error_measure.py)."""
     w = number(variables, 4), number(variables, 5), number(variables, 6)
     return scales_of(w, (number(variables, 12), number(variables, 13), number(variables, 14)), p, elapsed)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def series(variables: Packed, p: np.ndarray, degree: int, c: np.ndarray) -> None:
+def series(variables: Packed, p: np.record, degree: int, c: np.ndarray) -> None:
     """Coefficients c (degree + 1, COLUMNS) of the motion from these variables: q, ω, d, u."""
-    translates = p[of.TRANSLATES] != 0.0
-    moments = _triple(p, of.MOMENTS, 1.0)
+    translates = p.translates
+    moments = _triple(p.moments, 0, 1.0)
     gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) / moments
-    gyroscopic = gyroscopic * p[of.GYROSCOPIC]
-    cw, cv = p[of.DAMPING_ANGULAR] / moments, p[of.DAMPING_LINEAR]
-    bx, by, bz = _spread(_triple(p, of.ACCELERATION_BODY, 0.0))
+    gyroscopic = gyroscopic * p.gyroscopic
+    cw, cv = p.damping_angular / moments, p.damping_linear
+    bx, by, bz = _spread(_triple(p.acceleration_body, 0, 0.0))
     zeros, eight = _four(0.0), filled(0.0, 8)
     q, w, d, u = (component(variables, 0), component(variables, 1), component(variables, 2), component(variables, 3))
     # What is constant counts in the first order alone.
-    turning, pushing = _triple(p, of.TORQUE_BODY, 0.0) / moments, _triple(p, of.ACCELERATION_ADDED, 0.0)
+    turning, pushing = _triple(p.torque_body, 0, 0.0) / moments, _triple(p.acceleration_added, 0, 0.0)
     q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
     yzx0, zxy0 = gyroscopic * arranged(w, (1, 2, 0, 3)), gyroscopic * arranged(w, (2, 0, 1, 3))
     row = 0
@@ -211,7 +210,7 @@ def are_good(variables: Packed) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def taylor_steps_of_degree(y: np.ndarray, p: np.ndarray, h: float, n: int, degree: int) -> int:
+def taylor_steps_of_degree(y: np.ndarray, p: np.record, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
     c, here = np.zeros((degree + 1, COLUMNS)), variables_of(y)
     for done in range(n):
@@ -226,7 +225,7 @@ def taylor_steps_of_degree(y: np.ndarray, p: np.ndarray, h: float, n: int, degre
 
 
 @njit(cache=True, error_model="numpy")
-def taylor_steps(y: np.ndarray, p: np.ndarray, h: float, n: int) -> int:
+def taylor_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return taylor_steps_of_degree(y, p, h, n, DEGREE)
 

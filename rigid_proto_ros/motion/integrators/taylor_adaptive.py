@@ -82,8 +82,8 @@ def _weights_of_row(weights: tuple[float, float, float, float]) -> Packed:
 @njit(cache=True, error_model="numpy", allocates=False)
 def steps(
     y: np.ndarray,
-    p: np.ndarray,
-    control: np.ndarray,
+    p: np.record,
+    control: np.record,
     following: np.ndarray,
     c: np.ndarray,
     span_ns: int,
@@ -95,31 +95,31 @@ def steps(
     sampling: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
     failed.
     """
-    degree, accuracy = int(control[ctl.DEGREE]), control[ctl.ACCURACY]
+    degree, accuracy = control.degree, control.accuracy
     here = variables_of(y)
     if sampling:
-        if control[ctl.SERIES] == 0.0:
+        if not control.series:
             series(here, p, degree, c)
-            control[ctl.SERIES] = 1.0
+            control.series = True
         there = sum_series(c, degree, span_ns * 1e-9)
         put_variables(there, y)
         return span_ns if are_good(there) else 0
-    advanced, elapsed = 0, control[ctl.ELAPSED_NS]
-    length, there = int(control[ctl.ACCEPTED_NS]), variables_of(following)
+    advanced, elapsed = 0, control.elapsed_ns
+    length, there = control.accepted_ns, variables_of(following)
     # A step begins with the scales with which the one before it has ended.
     weights = scales_at(here, p, elapsed * 1e-9)
     ending = weights
     while True:
         if length == 0:
-            if control[ctl.SERIES] == 0.0:
+            if not control.series:
                 series(here, p, degree, c)
-                control[ctl.SERIES] = 1.0
+                control.series = True
             for _ in range(WEIGHINGS):
                 growth = log2_growth(c, VARIABLES_AT, COLUMNS, degree, _weights_of_row(weights))
                 length = int(length_for(growth, accuracy, degree, PART) * 1e9)
                 there = sum_series(c, degree, length * 1e-9)
                 if length < 1 or not are_good(there):
-                    control[ctl.FAILED] = 1.0
+                    control.failed = True
                     put_variables(here, y)
                     return advanced
                 # The error of a spin is measured by the spin at the end: where it falls within the step, that counts.
@@ -128,7 +128,7 @@ def steps(
                 if not more:
                     break
             ctl.accept(control, length)
-            control[ctl.PENDING] = 1.0
+            control.pending = 1
         else:
             ending = scales_at(there, p, (elapsed + length) * 1e-9)
         if length > span_ns - advanced:
