@@ -85,12 +85,13 @@ class ActingLoad(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _arrays(at: int) -> tuple[np.record, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Flight, loads, events, methods and workspace of what is held at this address."""
-    held = _held_at(at, (1,))[0]
+def _arrays(at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What is held (1,) at this address, and its loads, events, methods and workspace."""
+    whole = _held_at(at, (1,))
+    held = whole[0]
     loads, events = _loads_at(held.loads_at, (held.rows,)), _events_at(held.events_at, (4 * held.rows + 4,))
     return (
-        held.flight,
+        whole,
         loads,
         events,
         _methods_at(held.methods_at, (held.methods,)),
@@ -100,13 +101,15 @@ def _arrays(at: int) -> tuple[np.record, np.ndarray, np.ndarray, np.ndarray, np.
 
 @njit(cache=True, error_model="numpy")
 def _fly_at(at: int, until_ns: int) -> int:
-    flight, loads, events, methods, room = _arrays(at)
+    held, loads, events, methods, room = _arrays(at)
+    flight = held[0].flight
     return fl.fly(flight, loads, events, methods, room, until_ns)
 
 
 @njit(cache=True, error_model="numpy")
 def _begin_at(at: int) -> int:
-    flight, loads, _, methods, room = _arrays(at)
+    held, loads, _, methods, room = _arrays(at)
+    flight = held[0].flight
     fl.begin_segment(flight, loads, methods, room)
     return 0
 
@@ -114,7 +117,8 @@ def _begin_at(at: int) -> int:
 @njit(cache=True, error_model="numpy")
 def _share_anew(at: int) -> int:
     """What the loads that act add to the sums, for another body."""
-    flight, loads, _, _, _ = _arrays(at)
+    held, loads, _, _, _ = _arrays(at)
+    flight = held[0].flight
     for row in range(flight.acting):
         acting = loads[row]
         share_of(acting.load, flight.body, acting.share)
@@ -125,7 +129,8 @@ def _share_anew(at: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _apply_at(at: int) -> int:
-    flight, loads, events, _, _ = _arrays(at)
+    held, loads, events, _, _ = _arrays(at)
+    flight = held[0].flight
     flight.events, flight.timeouts = 0, 0
     while flight.due < flight.due_end:
         fl.apply(flight, loads, events, flight.due)
@@ -135,14 +140,16 @@ def _apply_at(at: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _cut_at(at: int) -> int:
-    flight, loads, _, methods, room = _arrays(at)
+    held, loads, _, methods, room = _arrays(at)
+    flight = held[0].flight
     fl.cut_segment(flight, loads, methods, room)
     return 0
 
 
 @njit(cache=True, error_model="numpy")
 def _finish_at(at: int) -> int:
-    flight, loads, _, methods, room = _arrays(at)
+    held, loads, _, methods, room = _arrays(at)
+    flight = held[0].flight
     fl.finish_segment(flight, loads, methods, room)
     return 0
 
