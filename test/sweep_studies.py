@@ -101,13 +101,35 @@ def study(spec: dict, **changes) -> Study:
     return make_study({**spec, **changes})
 
 
+HUNG = {
+    "scene": "t_handle",
+    "script": [{"t": 0.1, "at": "tip", "force": [0.02, 0.0, 0.05], "duration": 0.2}],
+    "duration": 1.0,
+    "samples": 12,
+    "watch": 20,
+    "set": {
+        "gravity": [0, 0, -9.81],
+        "string": {"attached": True, "attach": [0.0, 0.0, 0.07], "target": [0.0, 0.0, 0.4], "rest_length": 0.3},
+    },
+    "vary": {
+        "mass": {"uniform": [0.1, 0.3]},
+        "string.frequency": {"uniform": [5.0, 60.0]},
+        "string.damping_ratio": {"uniform": [0.0, 0.3]},
+        "string.target.x": {"uniform": [-0.2, 0.2]},
+        "string.bilateral": {"list": [True, False, False, False, True, False, True, False, False, True, False, True]},
+        "initial.angular_velocity": {"direction": 4.0},
+    },
+    "measure": {"final": ["position", "orientation", "energy"], "max": ["potential_energy"], "min": ["energy"]},
+}
+"""A string from the start, slack and taut."""
+
 HONEY = {
     **POKES,
     "samples": 6,
     "vary": {
-        "angular_damping": {"log_uniform": [1e-3, 1e6]},
-        "linear_damping": {"log_uniform": [1.0, 1e9]},
+        "angular_damping": {"log_uniform": [1e-3, 30.0]},
+        "linear_damping": {"log_uniform": [1.0, 3e4]},
         "script.4.duration": {"uniform": [0.05, 0.3]},
     },
 }
-"""Damping from soft to as stiff as it can be."""
+"""Damping from soft to as fast as it can be."""

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import Numbers, cross, dot, times, transposed_times, vector
-from .body import Body
+from ..base.rotation import Numbers, Vector, matrix_elements, vector
+from .body import MASS, Body, angular_acceleration
 from .state import State
 
 RAMP_NS = 100_000_000
@@ -43,6 +43,76 @@ def most_yielding(mass: float, i1: float, i2: float, i3: float, x: float, y: flo
     xx, yy, zz = x * x, y * y, z * z
     trace = (yy + zz) / i1 + (zz + xx) / i2 + (xx + yy) / i3
     return 1.0 / mass + min(trace, (xx + yy + zz) / i1)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def length_of(x: float, y: float, z: float) -> float:
+    """|v| of a vector of any size."""
+    largest = max(abs(x), abs(y), abs(z))
+    if largest == 0.0:
+        return 0.0
+    x, y, z = x / largest, y / largest, z / largest
+    return largest * math.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: float, ez: float) -> Vector:
+    """From the free end at e [m, world] to the knot at r [m from the COM, body axes] at a state row (13,): three
+    numbers [m, world].
+    """
+    a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
+    return (
+        (row[0] + (a * rx + b * ry + c * rz)) - ex,
+        (row[1] + (d * rx + e * ry + f * rz)) - ey,
+        (row[2] + (g * rx + h * ry + i * rz)) - ez,
+    )
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _turning(body: np.ndarray, rx: float, ry: float, rz: float, x: float, y: float, z: float) -> float:
+    """(r × n)ᵀ I⁻¹ (r × n) for a unit vector n, body axes."""
+    lx, ly, lz = ry * z - rz * y, rz * x - rx * z, rx * y - ry * x
+    ax, ay, az = angular_acceleration(body, lx, ly, lz)
+    return lx * ax + ly * ay + lz * az
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def effective_mass(
+    body: np.ndarray, rx: float, ry: float, rz: float, row: np.ndarray, span: Vector, rest_length: float
+) -> float:
+    """m_eff [kg] of the point r [m, body axes] of a body (BODY,) along ``span`` [world]; over all directions when the
+    span is none: shorter than NO_DIRECTION rest lengths or what rounding of the places that it lies between makes of
+    zero.
+    """
+    x, y, z = span
+    length = length_of(x, y, z)
+    size = length_of(row[0], row[1], row[2]) + length_of(rx, ry, rz)
+    if length > max(NO_DIRECTION * rest_length, ROUNDINGS * 2.0**-52 * size):
+        a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
+        nx, ny, nz = a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
+        turning = _turning(body, rx, ry, rz, nx / length, ny / length, nz / length)
+    else:
+        third = 1.0 / 3.0
+        turning = third * _turning(body, rx, ry, rz, 1.0, 0.0, 0.0)
+        turning += third * _turning(body, rx, ry, rz, 0.0, 1.0, 0.0)
+        turning += third * _turning(body, rx, ry, rz, 0.0, 0.0, 1.0)
+    return 1.0 / (1.0 / body[MASS] + turning)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def spring_of(mass: float, stiffness: float, frequency: float, damping_ratio: float) -> tuple[float, float]:
+    """k [N/m] and c [N s/m] for this effective mass; a frequency [rad/s] > 0 wins over the stiffness."""
+    k = mass * (frequency * frequency) if frequency > 0.0 else stiffness
+    return k, 2.0 * damping_ratio * math.sqrt(k * mass)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def energy_of(span: Vector, stiffness: float, rest_length: float, bilateral: bool) -> float:
+    """½ k x² while it pulls [J]."""
+    stretch = length_of(*span) - rest_length
+    if stretch < 0.0 and not bilateral:
+        return 0.0
+    return 0.5 * stiffness * stretch * stretch
 
 
 @dataclass(frozen=True)
@@ -109,19 +179,20 @@ class Tied:
 
     def span(self, body: Body, state: State) -> np.ndarray:
         """From the free end to the knot (3,) [m, world]."""
-        knot = state.position + times(state.rotation, self.arm(body))
-        return knot - self.free_end(state.time_ns)
+        return np.array(self._span(body, state))
+
+    def _span(self, body: Body, state: State) -> Vector:
+        rx, ry, rz = self.arm(body)
+        ex, ey, ez = self.free_end(state.time_ns)
+        return span_of(rx, ry, rz, state.row, ex, ey, ez)
 
     def stretch(self, body: Body, state: State) -> float:
         """x = l − rest length [m]; negative when slack."""
-        return _length(self.span(body, state)) - self.rest_length
+        return length_of(*self._span(body, state)) - self.rest_length
 
     def potential_energy(self, body: Body, state: State) -> float:
         """½ k x² while it pulls [J]."""
-        stretch = self.stretch(body, state)
-        if stretch < 0.0 and not self.bilateral:
-            return 0.0
-        return 0.5 * self.stiffness * stretch * stretch
+        return energy_of(self._span(body, state), self.stiffness, self.rest_length, self.bilateral)
 
     def moved(self, target: Numbers, time_ns: int, timeout_ns: int) -> Tied:
         """The hand goes to a new target: over the time since the last one, at most RAMP_NS."""
@@ -140,14 +211,17 @@ class Tied:
         """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the
         effective mass of the body as it is.
         """
-        least = NO_DIRECTION * settings.rest_length
-        mass = mass or effective_mass(body, self.arm(body), state, self.span(body, state), least)
-        stiffness = mass * (settings.frequency * settings.frequency) if settings.frequency > 0.0 else settings.stiffness
+        if not mass:
+            rx, ry, rz = self.arm(body)
+            mass = effective_mass(body.row, rx, ry, rz, state.row, self._span(body, state), settings.rest_length)
+        stiffness, damping = spring_of(
+            mass, float(settings.stiffness), float(settings.frequency), float(settings.damping_ratio)
+        )
         return replace(
             self,
             effective_mass=mass,
             stiffness=stiffness,
-            damping=2.0 * settings.damping_ratio * math.sqrt(stiffness * mass),
+            damping=damping,
             frequency=math.sqrt(stiffness / mass),
             rest_length=settings.rest_length,
             bilateral=settings.bilateral,
@@ -185,29 +259,3 @@ def tie(
         bilateral=settings.bilateral,
     )
     return tied.with_spring(settings, body, state, mass)
-
-
-def effective_mass(body: Body, arm: np.ndarray, state: State, span: np.ndarray, least: float) -> float:
-    """m_eff [kg] of the point ``arm`` (3,) [m, body] along ``span`` (3,) [world]; over all directions when the span is
-    none: shorter than ``least`` [m] or what rounding of the places that it lies between makes of zero.
-    """
-    length = _length(span)
-    if length > max(least, ROUNDINGS * 2.0**-52 * (_length(state.position) + _length(np.asarray(arm)))):
-        R = state.rotation
-        direction = transposed_times(R, span)
-        directions, weight = [direction / length], 1.0
-    else:
-        directions, weight = list(np.eye(3)), 1.0 / 3.0
-    turning = 0.0
-    for direction in directions:
-        lever = cross(arm, direction)
-        turning += weight * dot(lever, body.angular_acceleration(lever))
-    return 1.0 / (1.0 / body.mass + turning)
-
-
-def _length(vector: np.ndarray) -> float:
-    largest = float(np.abs(vector).max())
-    if largest == 0.0:
-        return 0.0
-    scaled = vector / largest
-    return largest * math.sqrt(dot(scaled, scaled))

@@ -21,7 +21,7 @@ from ..motion.loads import is_within_magnitude
 from ..motion.problem import begin_body
 from . import batch_body as b
 from . import flight as fl
-from .batch_body import GYROSCOPIC, make_body_row
+from .batch_body import make_body_row
 from .flight_measures import measure_flight
 from .quantities import CONTEXT, STATE, begin, which_is_met
 
@@ -45,11 +45,20 @@ class Variants:
         return len(self.settings)
 
     @property
+    def is_tied(self) -> bool:
+        """Whether a string is tied at time 0."""
+        return bool(self.constants[b.TIED])
+
+    @property
     def arrays(self) -> tuple:
         """What the compiled call takes of it."""
         ints = (self.times, self.commands)
         floats = (self.settings, self.ballast, self.constants, self.loads)
-        return (*map(np.ascontiguousarray, (*floats, *ints)), self.integrator.chooses, _methods(self.integrator))
+        return (
+            *map(np.ascontiguousarray, (*floats, *ints)),
+            self.integrator.chooses,
+            _methods(self.integrator, self.is_tied),
+        )
 
 
 @dataclass
@@ -92,8 +101,8 @@ _RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1]
 def _fly(
     settings: np.ndarray,
     times: np.ndarray,
+    constants: np.ndarray,
     body: np.ndarray,
-    gyroscopic: float,
     chooses: bool,
     methods: np.ndarray,
     commands: np.ndarray,
@@ -106,7 +115,7 @@ def _fly(
 ) -> tuple[int, int]:
     """One flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
 
-    settings (SETTINGS,), times (TIMES,), body (BODY,): simulation/batch_body.py. methods:
+    settings (SETTINGS,), times (TIMES,), constants (CONSTANTS,), body (BODY,): simulation/batch_body.py. methods:
     motion/integrators/stepping.py. commands (c, COMMAND) in the order in which they act and loads (c, LOAD).
     stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
     here. tables: arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop
@@ -118,18 +127,21 @@ def _fly(
     for c in range(count):
         if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
             return 0, -1
-    if not b.initial_row(settings, flight.row):
+    if not b.initial_row(settings, flight.row) or (chooses and not b.is_followed(settings, constants, body)):
         return 0, -1
+    fl.begin_flight(flight)
+    copy_numbers(body, flight.body)
+    if constants[b.TIED] != 0.0:
+        flight.tied, flight.string_begin_ns, flight.string_end_ns = True, 0, 0
+        b.tie_string(settings, constants, body, flight.row, flight.string)
     copy_numbers(flight.row, states[0, :13])
-    states[0, 13] = 0.0
+    states[0, 13] = b.string_energy(flight)
     g = settings[b.GRAVITY : b.GRAVITY + 3]
     begin(body[MASS], body[INERTIA : INERTIA + 9], g, states[0], context)
     copy_numbers(flight.row, flight.start)
-    copy_numbers(body, flight.body)
-    begin_body(flight.common, body, g, settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING], gyroscopic)
+    begin_body(flight.common, body, g, settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING], constants[b.GYROSCOPIC])
     flight.accuracy, flight.degree, flight.chooses = settings[b.ACCURACY], times[b.DEGREE], chooses
     flight.step_ns, flight.timeout_ns, flight.poke_ns = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
-    fl.begin_flight(flight)
     for c in range(count):
         row = rows[c]
         row.at_ns, row.duration_ns = commands[c, fl.AT_NS], commands[c, fl.DURATION_NS]
@@ -141,7 +153,7 @@ def _fly(
         if fl.fly(flight, rows, events, methods, room, sample_ns[sample]) != fl.REACHED:
             return 0, -1
         copy_numbers(flight.row, states[sample, :13])
-        states[sample, 13] = 0.0
+        states[sample, 13] = b.string_energy(flight)
         stop = which_is_met(stops, states[sample], context)
         if stop >= 0:
             return sample + 1, stop
@@ -174,9 +186,8 @@ def _one(
     load = loads[i if loads.shape[0] > 1 else 0]
     own_times = times[i if times.shape[0] > 1 else 0]
     method = methods[own_times[b.DEGREE]]
-    gyroscopic = constants[GYROSCOPIC]
     return _fly(
-        own, own_times, body, gyroscopic, chooses, method, command, load, sample_ns, stops, context, tables, states
+        own, own_times, constants, body, chooses, method, command, load, sample_ns, stops, context, tables, states
     )
 
 
@@ -196,7 +207,7 @@ def _room(variants: Variants, references: Variants | None, samples: int) -> tupl
     sides = (variants,) if references is None else (variants, references)
     rows = max(side.commands.shape[1] for side in sides) + 1
     # The workspace begins a line of the processor's cache.
-    room = aligned((1, max(1, *(workspace_size(_methods(side.integrator)) for side in sides))))[0]
+    room = aligned((1, max(1, *(workspace_size(_methods(side.integrator, side.is_tied)) for side in sides))))[0]
     flight = np.zeros(1, fl.FLIGHT), np.zeros(rows, fl.LOAD_ROW), np.zeros(4 * rows + 4, fl.EVENT), room
     others = np.zeros((samples if references is not None else 1, STATE))
     return np.zeros(BODY), np.zeros(CONTEXT), flight, np.zeros((samples, STATE)), others
@@ -253,12 +264,12 @@ def _compiled() -> Callable:
 
 
 @cache
-def _methods(integrator: Integrator) -> np.ndarray:
-    """Tables of the integrator's methods by degree, with the kernels that a flight without a string calls."""
+def _methods(integrator: Integrator, tied: bool) -> np.ndarray:
+    """Tables of the integrator's methods by degree, with the kernels that a flight with or without a string calls."""
     tables = [method_table(integrator, degree) for degree in range(MAX_DEGREE + 1)]
     for table in tables:
         for number, method in enumerate(integrator.methods):
-            if not method.on_string:
+            if method.on_string == tied:
                 provide_kernel(integrator, table, number)
     return np.array(tables)
 

@@ -13,11 +13,15 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
+from ..base.rotation import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
-from ..motion.body import COM, LENGTH, MASS, fill_body
+from ..motion.body import AXES, COM, LENGTH, MASS, MOMENTS, arm, fill_body
+from ..motion.integrators.auto import FASTEST
+from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K
 from ..motion.state import fill_initial_row
+from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 
 # A row of settings.
 SCALE = 0  # (3,)
@@ -34,7 +38,14 @@ ORIENTATION = 23  # (4,) at time 0, xyzw, of any length
 VELOCITY = 27  # (3,) at time 0 [m/s, world]
 ANGULAR_VELOCITY = 30  # (3,) at time 0 [rad/s, world]
 ACCURACY = 33  # local error rate
-SETTINGS = 34
+# Of a string that is tied at time 0:
+STRING_ATTACH = 34  # (3,) [mesh coordinates]
+STRING_TARGET = 37  # (3,) [m, world]
+STRING_STIFFNESS = 40  # [N/m]
+STRING_FREQUENCY = 41  # [rad/s], > 0 wins over the stiffness
+STRING_DAMPING_RATIO = 42
+STRING_REST_LENGTH = 43  # [m]
+SETTINGS = 44
 
 # A row of times.
 STEP_NS, TIMEOUT_NS, POKE_NS, DEGREE = range(4)
@@ -51,7 +62,9 @@ EXTENT = 17  # (3,) of the bounding box
 HAS_SURFACE = 20
 MODEL = 21  # EXPLICIT, ORDINARY or SHELL
 GYROSCOPIC = 22
-CONSTANTS = 23
+TIED = 23  # whether a string is tied at time 0
+BILATERAL = 24
+CONSTANTS = 25
 
 EXPLICIT, ORDINARY, SHELL = 0, 1, 2
 
@@ -160,3 +173,54 @@ def initial_row(settings: np.ndarray, row: np.ndarray) -> bool:
         settings[ANGULAR_VELOCITY : ANGULAR_VELOCITY + 3],
         row,
     )
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def is_followed(settings: np.ndarray, constants: np.ndarray, body: np.ndarray) -> bool:
+    """Whether an integrator that chooses its own steps can follow damping and string (simulation/checks.py)."""
+    mass, smallest = body[MASS], body[MOMENTS]
+    if settings[LINEAR_DAMPING] > FASTEST * mass or settings[ANGULAR_DAMPING] > FASTEST * smallest:
+        return False
+    if constants[TIED] == 0.0:
+        return True
+    A, S, P, M = STRING_ATTACH, settings, AXES, MOMENTS
+    rx, ry, rz = arm(body, S[A], S[A + 1], S[A + 2])
+    x = body[P] * rx + body[P + 3] * ry + body[P + 6] * rz
+    y = body[P + 1] * rx + body[P + 4] * ry + body[P + 7] * rz
+    z = body[P + 2] * rx + body[P + 5] * ry + body[P + 8] * rz
+    yields = most_yielding(mass, body[M], body[M + 1], body[M + 2], x, y, z)
+    stiffness, damping = spring_of(mass, S[STRING_STIFFNESS], S[STRING_FREQUENCY], S[STRING_DAMPING_RATIO])
+    # Near the limit the simulation decides.
+    return math.sqrt(stiffness * yields) <= 0.999 * FASTEST and damping * yields <= 0.999 * FASTEST
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def tie_string(
+    settings: np.ndarray, constants: np.ndarray, body: np.ndarray, row: np.ndarray, string: np.ndarray
+) -> None:
+    """Fill ``string`` (motion/problem.STRING,) as it is tied at the state row (13,)."""
+    for k in range(3):
+        string[KNOT + k] = settings[STRING_ATTACH + k]
+        string[ORIGIN + k] = string[TARGET + k] = settings[STRING_TARGET + k]
+    span, rest = string_span(body, string, row), settings[STRING_REST_LENGTH]
+    rx, ry, rz = arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+    mass = effective_mass(body, rx, ry, rz, row, span, rest)
+    stiffness, frequency = settings[STRING_STIFFNESS], settings[STRING_FREQUENCY]
+    string[K], string[C] = spring_of(mass, stiffness, frequency, settings[STRING_DAMPING_RATIO])
+    string[REST], string[PUSHES] = rest, constants[BILATERAL]
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def string_span(body: np.ndarray, string: np.ndarray, row: np.ndarray) -> Vector:
+    """From the free end, which rests at its target, to the knot: three numbers [m, world]."""
+    rx, ry, rz = arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+    return span_of(rx, ry, rz, row, string[TARGET], string[TARGET + 1], string[TARGET + 2])
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def string_energy(flight: np.record) -> float:
+    """Of the string of a flight now [J]; 0 where none is tied."""
+    if not flight.tied:
+        return 0.0
+    string = flight.string
+    return energy_of(string_span(flight.body, string, flight.row), string[K], string[REST], string[PUSHES] != 0.0)

@@ -15,6 +15,7 @@ from ..motion.integrators import check_supported, integrator_named
 from ..motion.integrators.integrator import (
     ANGULAR_DAMPING,
     NO_GYROSCOPIC_TERM,
+    STRING,
     Integrator,
     needs_of_load,
 )
@@ -42,6 +43,12 @@ FAST = {
     "initial.linear_velocity": (bb.VELOCITY, 3),
     "initial.angular_velocity": (bb.ANGULAR_VELOCITY, 3),
     "accuracy": (bb.ACCURACY, 1),
+    "string.attach": (bb.STRING_ATTACH, 3),
+    "string.target": (bb.STRING_TARGET, 3),
+    "string.stiffness": (bb.STRING_STIFFNESS, 1),
+    "string.frequency": (bb.STRING_FREQUENCY, 1),
+    "string.damping_ratio": (bb.STRING_DAMPING_RATIO, 1),
+    "string.rest_length": (bb.STRING_REST_LENGTH, 1),
 }
 """Parameters that are numbers of a row of settings: where they stand, how many they are."""
 
@@ -92,6 +99,7 @@ def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarr
     row = np.zeros(bb.CONSTANTS)
     model = parameters.inertia_model
     row[bb.GYROSCOPIC] = float(parameters.gyroscopic)
+    row[bb.TIED], row[bb.BILATERAL] = float(parameters.string.attached), float(parameters.string.bilateral)
     if body_mesh is not None:
         row[bb.HAS_SURFACE] = 1.0
         row[bb.EXTENT : bb.EXTENT + 3] = body_mesh.surface.extent
@@ -117,7 +125,7 @@ def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarr
 
 def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
     """The integrator, if it supports these loads; raises NotBatchable."""
-    if parameters.string.attached or parameters.initial.flight:
+    if parameters.initial.flight or (parameters.string.attached and parameters.initial.string_mass):
         raise NotBatchable
     integrator = integrator_named(parameters.integrator)
     needs = set().union(*map(needs_of_load, loads))
@@ -125,6 +133,8 @@ def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
         needs.add(NO_GYROSCOPIC_TERM)
     if parameters.angular_damping:
         needs.add(ANGULAR_DAMPING)
+    if parameters.string.attached:
+        needs.add(STRING)
     try:
         check_supported(integrator, frozenset(needs))
     except InputError:

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from sweep_studies import HONEY, POKES, PULLED, STRUCTURE, study
+from sweep_studies import HONEY, HUNG, POKES, PULLED, STRUCTURE, study
 
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.sweep.chunk import Chunk, run_chunk
@@ -29,7 +29,9 @@ def differing_rows(own, chunk: Chunk) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("spec", [POKES, STRUCTURE, PULLED, HONEY], ids=["pokes", "structure", "string", "stiff"])
+@pytest.mark.parametrize(
+    "spec", [POKES, STRUCTURE, PULLED, HUNG, HONEY], ids=["pokes", "structure", "string", "hung", "damped"]
+)
 def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
     own = study(spec)
     chunk = run_chunk(own, 0, own.rows)
@@ -37,7 +39,7 @@ def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
     failed = sum(reason is not None for reason in chunk.columns["failure"])
     if spec is PULLED:
         assert chunk.simulated == own.rows and failed == 0
-    elif spec in (POKES, HONEY):
+    elif spec in (POKES, HUNG, HONEY):
         assert chunk.simulated == 0
     else:
         # A ballast below zero is a row with its reason, and the others go through the batch.
@@ -86,6 +88,13 @@ def test_loads_that_start_together_act_in_the_order_of_the_script() -> None:
     vary = {"script.1.force.x": {"uniform": [-1.0, 1.0]}, "mass": {"uniform": [0.1, 1.0]}}
     own = study({"scene": "t_handle", "script": script, "duration": 0.2, "samples": 12, "vary": vary})
     assert differing_rows(own, run_chunk(own, 0, own.rows)) == []
+
+
+def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -> None:
+    for vary in ({"angular_damping": {"list": [1e-3, 1e6]}}, {"string.frequency": {"list": [10.0, 1e7]}}):
+        own = study({**HUNG, "samples": 1, "vary": vary})
+        reasons = run_chunk(own, 0, own.rows).columns["failure"].tolist()
+        assert reasons[0] is None and "for this body: auto follows rates up to" in reasons[1]
 
 
 def test_what_the_batch_refuses_is_the_simulations_to_explain() -> None:
