@@ -53,8 +53,8 @@ COLUMNS = ("problem", "what", "error_rad", "us", "heyoka_us", "ratio")
 @njit(error_model="numpy")
 def carry_from_start(at, until_ns):
     """One segment of the flight whose arrays are at this address: its steps, and the look at the end."""
-    f, n, _, _, _, methods = _arrays(at)
-    return fl.advance_segment(f, n, methods, until_ns)
+    held, _, _, methods, room = _arrays(at)
+    return fl.advance_segment(held[0].flight, methods, room, until_ns)
 
 
 def kernel_runs(problem: Problem, accuracy: float):
@@ -68,14 +68,14 @@ def kernel_runs(problem: Problem, accuracy: float):
     if arrays.method.way != ADAPTIVE:
         return None
     kernel, end_ns = entry_of(carry_from_start, int64(int64, int64)), round(problem.duration * 1e9)
-    f, n = arrays.f, arrays.n
-    start = f[fl.START : fl.START + 13].copy()
+    flight = arrays.flight
+    start = flight.start.copy()
 
     def restart():
-        f[fl.ROW : fl.ROW + 13] = start
-        fl.begin_variables(f, n, arrays.methods)
+        flight.row[:] = start
+        fl.begin_variables(flight, arrays.methods, arrays.room)
 
-    return lambda: kernel(arrays._at, end_ns), lambda: f[fl.ROW : fl.ROW + 13].copy(), restart
+    return lambda: kernel(arrays._at, end_ns), lambda: flight.row.copy(), restart
 
 
 def whole(prepare):

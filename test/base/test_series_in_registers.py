@@ -6,8 +6,8 @@ import pytest
 from numba import njit
 
 from rigid_proto_ros.base.simd import aligned, filled, largest, load
-from rigid_proto_ros.motion.integrators.rough_logarithm import rough_exp2, rough_log2
 from rigid_proto_ros.motion.integrators.taylor import COLUMNS, power_sum
+from rigid_proto_ros.motion.integrators.taylor_adaptive import rough_exp2, rough_log2
 
 
 @njit

@@ -8,15 +8,15 @@ after degree N is (σh)^(N+1)/(1 − σh); h is where that is the accuracy times
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.elementary import logarithm
+from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.simd import Packed, aligned, filled, joined, largest, load
 from . import control as ctl
 from .error_measure import FLOOR, WEIGHINGS, heavier
-from .rough_logarithm import rough_exp2, rough_log2
 from .taylor import COLUMNS, VARIABLES_AT, are_good, put_variables, scales_at, series, sum_series, variables_of
 
 PART = 0.5
@@ -32,6 +32,28 @@ _LOG2_MOST = -0.15200309344504997
 """log₂ of 0.9"""
 
 MAX_DEGREE = 26
+
+
+# log₂ and 2ˣ to two digits from a double's own exponent: a tenth of the time of libm's, and everywhere the same bits.
+
+
+@njit(cache=True, error_model="numpy")
+def rough_log2(x: float) -> float:
+    """log₂ x for x > 0 with an error below 0.006; −1023 for subnormal x."""
+    bits = bits_of(x)
+    # m − 1 with x = 2ⁿ m: exact where x is normal. log₂ m − (m − 1) vanishes at m = 1 and 2; the line has its slopes
+    # there.
+    f = double_of((bits & MANTISSA) | (BIAS << MANTISSA_BITS)) - 1.0
+    return float((bits >> MANTISSA_BITS) - BIAS) + f + f * (1.0 - f) * (0.4427 - 0.164 * f)
+
+
+@njit(cache=True, error_model="numpy")
+def rough_exp2(x: float) -> float:
+    """2ˣ with a relative error below 0.001, for x cut to ±1000."""
+    whole = math.floor(min(max(x, -1000.0), 1000.0))
+    f = min(max(x, -1000.0), 1000.0) - whole
+    power = double_of((int(whole) + BIAS) << MANTISSA_BITS)
+    return power * (1.0 + f - f * (1.0 - f) * (0.3069 + 0.0794 * f))
 
 
 @functools.cache
