@@ -23,7 +23,7 @@ ROS = [
     'ros-rclpy[fastrtps]==9.1.2; python_version >= "3.14"',
     'ros-kilted-common-interfaces==5.5.1; python_version >= "3.14"',
 ]
-MCAP = ["mcap>=1.2,<2"]
+MCAP = ["mcap>=1.6,<2"]
 # Reads MJCF files.
 ROBOTS = ["mujoco>=3.3"]
 SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]

@@ -68,8 +68,8 @@ ALLOWED = {
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser
-    "mcap": ("session.mcap_reading", "session.mcap_writing"),
-    "zstandard": ("session.mcap_reading", "session.mcap_writing"),  # comes with mcap
+    "mcap": ("session.mcap_reading", "session.mcap_observer"),
+    "zstandard": ("session.bag",),  # comes with mcap
 }
 
 

@@ -15,7 +15,7 @@ from ..messages.measured_messages import MEASURED_TYPES, Stamped, read_measured
 from ..motion.frames import parse_frame
 from ..motion.loads import Load
 from ..session.bag import read_bag
-from ..session.mcap_reading import McapContent
+from ..session.mcap_reading import BagContent
 from . import measurements as ms
 from .session_reading import load_history
 
@@ -86,7 +86,7 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     return ms.MeasuredFlight(str(path), tuple(series), loads, choice.gravity or EARTH, gravity_from=where)
 
 
-def _chosen(content: McapContent, given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
+def _chosen(content: BagContent, given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
     """(topic, frame) by option: those given, else the only one of its types."""
     found = {kind: _split(text, content, kind) for kind, text in given.items()}
     if found:
@@ -103,7 +103,7 @@ def _chosen(content: McapContent, given: dict[str, str], path: str) -> dict[str,
     return found
 
 
-def _split(text: str, content: McapContent, kind: str) -> tuple[str, str]:
+def _split(text: str, content: BagContent, kind: str) -> tuple[str, str]:
     topic, _, frame = text.partition("@")
     if topic not in content.types:
         fitting = sorted(t for t, its_type in content.types.items() if its_type in KINDS[kind])
@@ -115,7 +115,7 @@ def _split(text: str, content: McapContent, kind: str) -> tuple[str, str]:
     return topic, frame
 
 
-def _read(content: McapContent, topic: str, frame: str) -> _Topic:
+def _read(content: BagContent, topic: str, frame: str) -> _Topic:
     message_type = content.types[topic]
     assert message_type in MEASURED_TYPES
     messages: list[Stamped] = []

@@ -6,30 +6,30 @@
 from __future__ import annotations
 
 import re
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
+
+import zstandard
 
 from ..base.errors import InputError
 from ..scene.yaml_text import load_plain_yaml, read_text
-from .mcap_reading import (
-    ZSTD_MAGIC,
-    McapContent,
-    decompressed,
-    read_mcap,
-    repair_mcap,
-)
-from .sqlite_reading import is_sqlite, read_sqlite
+from .mcap_reading import BagContent, read_mcap, repair_mcap
 
 __all__ = ["bag_bytes", "bag_files", "read_bag", "repair_mcap"]
 
 METADATA = "metadata.yaml"
 
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+SQLITE_MAGIC = b"SQLite format 3\0"
 
-def read_bag(path: Path, wanted: Callable[[str], bool]) -> McapContent:
+
+def read_bag(path: Path, wanted: Callable[[str], bool]) -> BagContent:
     """All that is whole in a bag, of the topics that are ``wanted``; raises InputError."""
-    whole = McapContent(complete=True)
+    whole = BagContent(complete=True)
     for file in bag_files(path):
-        part = read_sqlite(file, wanted) if is_sqlite(file) else read_mcap(bag_bytes(file), str(file), wanted)
+        part = _read_sqlite(file, wanted) if is_sqlite(file) else read_mcap(bag_bytes(file), str(file), wanted)
         for topic, messages in part.messages.items():
             plain = [(log_time, _plain(data, topic)) for log_time, data in messages]
             whole.messages.setdefault(topic, []).extend(plain)
@@ -68,7 +68,7 @@ def bag_bytes(file: Path) -> bytes:
     if not data.startswith(ZSTD_MAGIC):
         return data
     try:
-        return decompressed(data)
+        return _decompressed(data)
     except ValueError as error:
         raise InputError("session", str(file), f"a file that zstd can decompress ({error})") from None
 
@@ -96,6 +96,48 @@ def _plain(data: bytes, topic: str) -> bytes:
     if not data.startswith(ZSTD_MAGIC):
         return data
     try:
-        return decompressed(data)
+        return _decompressed(data)
     except ValueError as error:
         raise InputError(topic, f"a message can't be decompressed by zstd ({error}); the bag is damaged") from None
+
+
+def _decompressed(data: bytes) -> bytes:
+    """What zstd compressed; raises ValueError. The end may be missing: what lies before it comes."""
+    try:
+        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from None
+
+
+def is_sqlite(file: Path) -> bool:
+    """Whether a file begins as an SQLite database does."""
+    try:
+        with open(file, "rb") as stream:
+            return stream.read(len(SQLITE_MAGIC)) == SQLITE_MAGIC
+    except OSError:
+        return False
+
+
+def _read_sqlite(file: Path, wanted: Callable[[str], bool]) -> BagContent:
+    """Messages in the order of their times, of the topics that are ``wanted(topic)``; raises InputError.
+
+    A journal that lies beside the file is read with it; what a killed recorder hadn't committed is lost.
+    """
+    size = file.stat().st_size
+    content = BagContent(complete=True, readable_bytes=size, file_bytes=size)
+    try:
+        # Read only: a journal beside it is read, and nothing is written.
+        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as bag:
+            topics = bag.execute("SELECT id, name, type, serialization_format FROM topics").fetchall()
+            for number, name, message_type, serialization in topics:
+                if serialization != "cdr":
+                    raise InputError(str(file), f"messages of {name} as {serialization}; only cdr is supported")
+                content.types[name] = message_type
+                if wanted(name):
+                    query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
+                    messages = [(int(time_ns), bytes(data)) for time_ns, data in bag.execute(query, (number,))]
+                    if messages:
+                        content.messages[name] = messages
+    except (sqlite3.Error, TypeError) as error:
+        raise InputError("session", str(file), f"a bag of rosbag2's sqlite3 storage ({error})") from None
+    return content

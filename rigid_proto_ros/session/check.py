@@ -57,9 +57,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
     Returns the first difference, or None. Raises InputError for a session that can't be decoded, or lacks what a check
     needs: the topics named, or its beginning.
     """
-    if session.missing:
-        accepted = "a recording that holds them from a start or reset on"
-        raise InputError("--verify", f"a recording without {', '.join(session.missing)}", accepted)
+    _check_verifiable(session)
     recorded = session.lines
     events = [decode_event(line, number) for number, line in enumerate(recorded, 1)]
     broken = broken_link(recorded)
@@ -98,6 +96,17 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         if count % 1000 == 0:
             progress(count / len(states))
     return _what_follows(again, lines, recorded, events)
+
+
+def _check_verifiable(session: RecordedSession) -> None:
+    """Raises InputError where there is nothing to compare, or nothing to compute it from."""
+    if next(_states_in_order(session), None) is None:
+        lacks = ", ".join(session.missing) or "states"
+        accepted = "states from a start or reset on; without them there is nothing to verify"
+        raise NotVerifiableError("--verify", f"a recording without {lacks}", accepted)
+    if session.missing:
+        accepted = "a recording that holds them from a start or reset on"
+        raise InputError("--verify", f"a recording without {', '.join(session.missing)}", accepted)
 
 
 def made_with_table(session: RecordedSession) -> list[tuple[str, str, str]]:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The observer that records a flight as an MCAP file: the node's topics as a bag has them, and the mesh's file inside.
 
-The stepping thread only copies into a mailbox; a thread of our own empties it and writes whole chunks. All runs go into
-one file: a reset begins the next one, as in a bag of the topics.
+The stepping thread only copies into a mailbox; a thread of our own empties it, and ends a chunk each time, which is on
+disk then. All runs go into one file: a reset begins the next one, as in a bag of the topics.
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ..base.errors import InputError
 from ..base.files import output_file
@@ -30,7 +29,7 @@ from .recorded_session import file_sha256, scene_sha256
 from .runs import MADE_WITH
 
 if TYPE_CHECKING:
-    from .mcap_writing import McapFile
+    from mcap.writer import Writer
 
 FLUSH_PERIOD_S = 0.4
 """What a kill -9 loses at most."""
@@ -62,34 +61,22 @@ class McapObserver(Observer):
         on_error: Callable[[str], None] | None = None,
         simulated_log: bool = False,
     ) -> None:
-        from .mcap_writing import McapFile  # mcap is needed by who records
-
         self.error = ""
         self._path = path
         self._on_error = on_error or _logger.error
         self._simulated_log = simulated_log
-        self._run_begins_ns = self._latest_log_ns = 0
+        self._run_begins_ns = self._latest_log_ns = self._chunk = 0
         world, self._body_frame = frame_names(parameters or Parameters(), node_name)
-        self._templates = {
-            name: np.frombuffer(bytes(cdr.StampedTemplate(world, count).buffer), np.uint8)
-            for name, count in (("pose", 7), ("twist", 6))
-        }
+        self._templates = {name: cdr.StampedTemplate(world, count) for name, count in (("pose", 7), ("twist", 6))}
         self._scene = ""
         self._attached: set[str] = set()
         self._closed = False
-        self._file: McapFile | None = None
+        self._writer: Writer | None = None
         try:
-            self._file = McapFile(output_file("record", path))
-            self._file.add_metadata(MADE_WITH, _made_with())
-            self._channels = {
-                name: self._file.add_channel(
-                    f"/{node_name.strip('/')}/{name}",
-                    message_type,
-                    session_messages.DEFINITIONS[message_type],
-                    {"offered_qos_profiles": _offered(name in session_messages.LATCHED)},
-                )
-                for name, message_type in session_messages.TOPICS.items()
-            }
+            self._file = output_file("record", path)
+            self._stream = open(self._file, "wb")  # noqa: SIM115 (closed by the thread)
+            self._inode = self._file.stat().st_ino
+            self._writer = self._begin(node_name)
         except OSError as error:
             accepted = f"a file that can be written ({error.strerror})"
             raise InputError("record", str(path), accepted) from None
@@ -100,8 +87,7 @@ class McapObserver(Observer):
     @property
     def recording(self) -> str:
         """Path of the file that is being written, or ""."""
-        file = self._file
-        return str(file.path) if file is not None and not self._closed else ""
+        return str(self._file) if self._writer is not None and not self._closed else ""
 
     def on(self, event: Event) -> None:
         """Take an event from the stepping thread: a state is copied, others wait to be written."""
@@ -122,6 +108,30 @@ class McapObserver(Observer):
         if self._thread.is_alive():
             self._stopped("the last states could not be written")
 
+    def _begin(self, node_name: str) -> Writer:
+        """The file with its topics declared; raises OSError."""
+        from mcap.writer import Writer  # needed by who records
+
+        writer = Writer(self._stream)
+        writer.start(profile="ros2")
+        writer.add_metadata(MADE_WITH, _made_with())
+        schemas = {
+            message_type: writer.register_schema(message_type, "ros2msg", definition.encode())
+            for message_type, definition in session_messages.DEFINITIONS.items()
+            if message_type in session_messages.TOPICS.values()
+        }
+        self._channels = {
+            name: writer.register_channel(
+                f"/{node_name.strip('/')}/{name}",
+                "cdr",
+                schemas[message_type],
+                {"offered_qos_profiles": _offered(name in session_messages.LATCHED)},
+            )
+            for name, message_type in session_messages.TOPICS.items()
+        }
+        self._stream.flush()
+        return writer
+
     # The writing thread
 
     def _write_until_closed(self) -> None:
@@ -130,8 +140,9 @@ class McapObserver(Observer):
             closing = mailbox.closed
             try:
                 self._write_waiting()
-                if closing and self._file is not None:
-                    self._file.close()
+                if closing and self._writer is not None:
+                    self._writer.finish()
+                    self._stream.close()
             except Exception as error:
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
                 self._lost(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
@@ -146,28 +157,36 @@ class McapObserver(Observer):
             if block is None:
                 break
             more = block.handed_over
-            file = self._file
-            if file is not None:
-                self._write(file, block)
-                file.flush()
+            writer = self._writer
+            if writer is not None:
+                self._write(writer, block)
             self._mailbox.give_back(block)
-        if self._file is not None:
-            self._file.flush()
+        if self._writer is not None:
+            self._end_chunk(self._writer)
 
-    def _write(self, file: McapFile, block: Block) -> None:
+    def _end_chunk(self, writer: Writer) -> None:
+        """Put on disk what was written; raises OSError also where the file is no longer at its place."""
+        if self._file.stat().st_ino != self._inode:
+            raise OSError(None, "another file took its place")
+        writer.flush()
+
+    def _write(self, writer: Writer, block: Block) -> None:
         sent = 0
         for note in block.notes:
-            self._write_rows(file, block, sent, note.after_rows)
+            self._write_rows(writer, block, sent, note.after_rows)
             sent = note.after_rows
-            self._write_note(file, note)
-        self._write_rows(file, block, sent, block.count)
+            self._write_note(writer, note)
+        self._write_rows(writer, block, sent, block.count)
+
+    def _write_message(self, writer: Writer, name: str, log_time: int, data: bytes) -> None:
+        writer.add_message(self._channels[name], log_time, data, log_time)
 
     def _log_time(self, simulated_ns: int, wall_ns: int) -> int:
         log_time = self._run_begins_ns + simulated_ns if self._simulated_log else wall_ns
         self._latest_log_ns = max(self._latest_log_ns, log_time)
         return log_time
 
-    def _write_note(self, file: McapFile, note: Note) -> None:
+    def _write_note(self, writer: Writer, note: Note) -> None:
         event = note.event
         if isinstance(event, Reset):
             self._run_begins_ns = self._latest_log_ns + 1
@@ -175,27 +194,27 @@ class McapObserver(Observer):
         log_time = self._log_time(event.time_ns, note.wall_ns)
         match event:
             case Logged(_, line):
-                file.add_message(self._channels["events"], log_time, cdr.string(line))
+                self._write_message(writer, "events", log_time, cdr.string(line))
             case Applied(time_ns, _, load, body, attitude):
                 data = session_messages.applied_bytes(time_ns, self._body_frame, load, body, attitude)
-                file.add_message(self._channels["applied"], log_time, data)
+                self._write_message(writer, "applied", log_time, data)
             case BodyChanged(time_ns, body):
                 I = body.inertia
                 tensor = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
                 frame, com = f"{self._body_frame}/mesh", body.center_of_mass.tolist()
                 data = session_messages.inertia_bytes(time_ns, frame, body.mass, com, tensor)
-                file.add_message(self._channels["inertia"], log_time, data)
+                self._write_message(writer, "inertia", log_time, data)
             case Started(scene=scene) | SceneChanged(scene=scene):
-                self._write_scene(file, log_time, scene)
+                self._write_scene(writer, log_time, scene)
 
-    def _write_scene(self, file: McapFile, log_time: int, scene: str) -> None:
+    def _write_scene(self, writer: Writer, log_time: int, scene: str) -> None:
         """Unless it is the one written last; with the mesh's file, once."""
         if scene != self._scene:
             self._scene = scene
-            self._attach_mesh(file, scene, log_time)
-            file.add_message(self._channels["scene"], log_time, cdr.string(scene))
+            self._write_message(writer, "scene", log_time, cdr.string(scene))
+            self._attach_mesh(writer, scene, log_time)
 
-    def _attach_mesh(self, file: McapFile, scene: str, log_time: int) -> None:
+    def _attach_mesh(self, writer: Writer, scene: str, log_time: int) -> None:
         sha256 = scene_sha256(scene)
         if not sha256 or sha256 in self._attached:
             return
@@ -207,47 +226,31 @@ class McapObserver(Observer):
             return
         # A file that was changed since it was loaded isn't the one that flies.
         if file_sha256(data) == sha256:
-            file.flush()
-            file.add_attachment(path.name, "application/octet-stream", data, log_time)
+            # The chunk before it declares the topics: from there on a cut file can be read.
+            self._end_chunk(writer)
+            writer.add_attachment(0, log_time, path.name, "application/octet-stream", data)
 
-    def _write_rows(self, file: McapFile, block: Block, begin: int, end: int) -> None:
-        if begin == end:
-            return
-        chunk_of_row = block.times[begin:end] // CHUNK_NS
-        cuts = (begin + 1 + np.flatnonzero(np.diff(chunk_of_row))).tolist()
-        for first, last in zip([begin, *cuts], [*cuts, end], strict=True):
-            if first > begin:
-                file.flush()
-            self._add_rows(file, block.times[first:last], block.walls[first:last], block.rows[first:last])
-
-    def _add_rows(self, file: McapFile, times: np.ndarray, walls: np.ndarray, rows: np.ndarray) -> None:
-        log_times = self._run_begins_ns + times if self._simulated_log else walls.copy()
-        self._latest_log_ns = max(self._latest_log_ns, int(log_times.max()))
-        listed = rows.tolist()
-        for name in ("pose", "twist"):
-            project = session_messages.PROJECTIONS[name]
-            doubles = rows[:, :7] if name == "pose" else np.array([project(row) for row in listed])
-            file.add_rows(self._channels[name], log_times, _stamped(self._templates[name], times, doubles))
+    def _write_rows(self, writer: Writer, block: Block, begin: int, end: int) -> None:
+        times, walls = block.times[begin:end].tolist(), block.walls[begin:end].tolist()
+        for time_ns, wall_ns, row in zip(times, walls, block.rows[begin:end].tolist(), strict=True):
+            if time_ns // CHUNK_NS != self._chunk:
+                self._chunk = time_ns // CHUNK_NS
+                self._end_chunk(writer)
+            log_time = self._log_time(time_ns, wall_ns)
+            for name, template in self._templates.items():
+                data = template.pack(time_ns, session_messages.PROJECTIONS[name](row))
+                self._write_message(writer, name, log_time, bytes(data))
 
     def _lost(self, reason: str) -> None:
-        file, self._file = self._file, None
-        if file is not None:
-            file.abandon()
+        if self._writer is not None:
+            self._writer = None
+            with suppress(OSError):
+                self._stream.close()
             self._stopped(reason)
 
     def _stopped(self, reason: str) -> None:
         self.error = f"recording stopped: {self._path}: {reason}"
         self._on_error(self.error)
-
-
-def _stamped(template: np.ndarray, times: np.ndarray, doubles: np.ndarray) -> np.ndarray:
-    """Messages (n, length) uint8 of stamps (n,) and doubles (n, k) that end them."""
-    messages = np.tile(template, (len(times), 1))
-    stamps = np.stack(np.divmod(times, 1_000_000_000), axis=1).astype("<i4")
-    messages[:, 4:12] = stamps.view(np.uint8).reshape(len(times), 8)
-    data = np.ascontiguousarray(doubles, dtype="<f8").view(np.uint8)
-    messages[:, -data.shape[1] :] = data
-    return messages
 
 
 def _offered(latched: bool) -> str:

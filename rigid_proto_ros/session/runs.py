@@ -17,7 +17,7 @@ from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_sta
 from .recorded_session import RecordedSession, scene_sha256
 
 if TYPE_CHECKING:
-    from .mcap_reading import McapContent  # .rrd files are read without the package mcap
+    from .mcap_reading import BagContent  # .rrd files are read without the package mcap
 
 MADE_WITH = "rigid_proto_ros"
 """Name of the metadata that say which versions recorded."""
@@ -31,7 +31,7 @@ def is_session_topic(topic: str) -> bool:
     return topic.rpartition("/")[2] in READ
 
 
-def session_runs(content: McapContent, path: Path, node: str = "") -> list[RecordedSession]:
+def session_runs(content: BagContent, path: Path, node: str = "") -> list[RecordedSession]:
     """The runs of one body in a bag, in their order; ``node`` chooses the body where there are several.
 
     Raises InputError for a bag without states, and for messages that can't be decoded.
@@ -100,7 +100,7 @@ def decode_event(line: str, number: int) -> tuple[int, str, dict]:
     raise InputError(f"event {number}", line[:80], "a JSON line with time_ns, kind and content")
 
 
-def _prefix(content: McapContent, path: str, node: str) -> str:
+def _prefix(content: BagContent, path: str, node: str) -> str:
     """What stands before the topics' names: the node's name with a slash before it."""
     kinds: dict[str, set[str]] = {}
     for topic, message_type in content.types.items():
@@ -120,13 +120,13 @@ def _prefix(content: McapContent, path: str, node: str) -> str:
     return flown[0]
 
 
-def _messages(content: McapContent, prefix: str, name: str) -> list[tuple[int, bytes]]:
+def _messages(content: BagContent, prefix: str, name: str) -> list[tuple[int, bytes]]:
     """A topic's messages in the order they were logged."""
     return sorted(content.messages.get(f"{prefix}/{name}", []), key=lambda message: message[0])
 
 
 def _states(
-    content: McapContent, prefix: str, name: str, clocks: list[tuple[int, int, int]]
+    content: BagContent, prefix: str, name: str, clocks: list[tuple[int, int, int]]
 ) -> tuple[np.ndarray, StampedRows]:
     """When a topic's states were logged, and they; clocks: as ``_simulated`` takes them."""
     messages = _messages(content, prefix, name)

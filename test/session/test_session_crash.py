@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import random
+import struct
 import subprocess
 import time
 from pathlib import Path
@@ -23,9 +24,9 @@ from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
-from rigid_proto_ros.session.mcap_writing import RECORD_HEAD
 
 SECOND = 10**9
+RECORD_HEAD = struct.Struct("<BQ")
 MAGIC_BYTES = 8
 
 

@@ -252,12 +252,12 @@ def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_read
     observer = McapObserver(path, on_error=said.append, simulated_log=True)
 
     def fill_up() -> None:
-        def write(self, data):
+        def flush(self):
             # As a disk does: a part of it, then no more.
-            self._stream.write(data[: len(data) // 2])
+            path.open("ab").write(b"\x06half a chunk")
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        monkeypatch.setattr("rigid_proto_ros.session.mcap_writing.McapFile._write", write)
+        monkeypatch.setattr("mcap.writer.Writer.flush", flush)
 
     _fly_with_trouble(observer, fill_up)
     assert said == [f"recording stopped: {path}: No space left on device"]

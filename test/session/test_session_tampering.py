@@ -163,7 +163,7 @@ def test_one_bit_of_a_state_is_found(session, topic):
 def test_both_motions_are_in_the_recording_of_one_that_differs(session, tmp_path, capsys, monkeypatch):
     from rerun.chunk import RrdReader
 
-    from rigid_proto_ros.rerun_view.entities import GHOST
+    from rigid_proto_ros.picture.style import GHOST
 
     path, both = tmp_path / "flown.mcap", tmp_path / "both.rrd"
     assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(path)]) == 0
