@@ -52,14 +52,16 @@ _LOAD_AT = place_of(LOAD_ROW, "load")
 _EVENT_NUMBERS = EVENT.itemsize // 8
 
 
-def _number(name: str) -> int:
-    """Where an integer of the flight stands among those of its memory, as Python reads single numbers fastest."""
-    return place_of(FLIGHT, name) // 8
+# Where integers that are looked up at every advance or reset stand in the memory of what is held: Python reads single
+# numbers fastest so.
+def _numbers(kind: np.dtype, *names: str) -> list[int]:
+    return [place_of(kind, name) // 8 for name in names]
 
 
-# Looked up at every advance.
-_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = map(_number, ("now_ns", "acting", "due", "due_end", "events"))
-TIMEOUTS = _number("timeouts")
+_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(FLIGHT, "now_ns", "acting", "due", "due_end", "events")
+TIMEOUTS, _LOAD_IDS = _numbers(FLIGHT, "timeouts", "load_ids")
+_METHODS_AT, _METHODS, _ROOM = _numbers(HELD, "methods_at", "methods", "room")
+_NUMBERS = FLIGHT.itemsize // 8
 _REACHED = fl.REACHED
 
 
@@ -176,21 +178,19 @@ class FlightArrays:
         self._held = self._memory[0]
         self.flight = self._held.flight
         self.row = self.flight.row
-        numbers = self._memory.view(np.uint8).view(np.int64)
-        self.integers = numbers.data
-        self._start = numbers[: FLIGHT.itemsize // 8]
+        self.integers = self._memory.view(np.uint8).view(np.int64).data
         self._loads = np.zeros(0, LOAD_ROW)
         self._make_tables(FIRST_ROWS)
         self._take_methods(setup, setup.flight_start)
 
     def _take_methods(self, setup: Setup, start: FlightStart) -> None:
-        held = self._held
         self.integrator, self.methods = setup.integrator, start.methods
-        if held.room < max(start.room, 1):
+        numbers = self.integers
+        if numbers[_ROOM] < max(start.room, 1):
             # The workspace begins a line of the processor's cache.
             self.room = aligned((1, max(start.room, 1)))[0]
-            held.room_at, held.room = address_of_array(self.room), len(self.room)
-        held.methods_at, held.methods = address_of_array(start.methods), len(start.methods)
+            self._held.room_at, self._held.room = address_of_array(self.room), len(self.room)
+        numbers[_METHODS_AT], numbers[_METHODS] = start.methods_at, len(start.methods)
 
     def take(self, setup: Setup) -> None:
         """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
@@ -205,10 +205,11 @@ class FlightArrays:
 
     def start_over(self, setup: Setup, tied: Tied | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
-        start, load_ids = setup.flight_start, self.flight.load_ids
+        start, numbers = setup.flight_start, self.integers
+        load_ids = numbers[_LOAD_IDS]
         self._take_methods(setup, start)
-        self._start[:] = start.numbers
-        self.flight.load_ids = load_ids
+        numbers[:_NUMBERS] = start.integers
+        numbers[_LOAD_IDS] = load_ids
         if tied is not None:
             self.tie(tied)
         self._begin(self._at)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.addresses import address_of_array
 from ..base.records import new_record
 from ..base.rotation import length
 from ..motion.body import LENGTH, Body
@@ -26,18 +27,15 @@ from .thrusters import Thruster
 
 
 class FlightStart(NamedTuple):
-    """flight (1,): a record FLIGHT (simulation/flight.py). methods: the integrator's table. room: of the largest
-    workspace [doubles].
+    """flight (1,): a record FLIGHT (simulation/flight.py), and its memory as integers. methods: the integrator's table,
+    and its address. room: of the largest workspace [doubles].
     """
 
     flight: np.ndarray
+    integers: memoryview
     methods: np.ndarray
+    methods_at: int
     room: int
-
-    @property
-    def numbers(self) -> np.ndarray:
-        """The record's memory as integers."""
-        return self.flight.view(np.uint8).view(np.int64)
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,8 @@ class Setup:
         # None yet: the first that adapts its steps gets a clean workspace, as every other does.
         flight.method = -1
         methods = method_table(self.integrator, degree)
-        return FlightStart(start, methods, workspace_size(methods))
+        integers = start.view(np.uint8).view(np.int64).data
+        return FlightStart(start, integers, methods, address_of_array(methods), workspace_size(methods))
 
     @cached_property
     def light_amount(self) -> float:
