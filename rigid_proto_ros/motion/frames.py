@@ -7,6 +7,7 @@ only reads the text; where the point lies on the body is resolved by motion/load
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Collection, Iterable
@@ -77,6 +78,12 @@ def parse_frame(text: str, contacts: Collection[str] = (), world: str = "world",
     contacts: the names of the body's contacts. world, body: names of this node's world and body frame, accepted beside
     the words. Raises CommandRefused with reason ``frame``.
     """
+    return _parsed(text, frozenset(contacts), world, body)
+
+
+@functools.lru_cache(maxsize=1024)
+def _parsed(text: str, contacts: frozenset[str], world: str, body: str) -> Frame:
+    # Frames come again and again.
     if len(text) > MAX_FRAME_LENGTH:
         raise CommandRefused("frame", "frame_id", text[:40] + "...", f"at most {MAX_FRAME_LENGTH} characters")
     place, *options = text.split(";")

@@ -156,6 +156,19 @@ def _finish_at(at: int) -> int:
     return 0
 
 
+@njit(cache=True, error_model="numpy")
+def _end_due_at(at: int) -> bool:
+    held, loads, events, _, _ = _arrays(at)
+    return fl.end_due(held[0].flight, loads, events)
+
+
+@njit(cache=True, error_model="numpy")
+def _end_all_at(at: int) -> int:
+    held, loads, events, _, _ = _arrays(at)
+    fl.end_all(held[0].flight, loads, events)
+    return 0
+
+
 @functools.cache
 def _entries() -> tuple[Callable, Callable, Callable]:
     return (
@@ -286,13 +299,13 @@ class FlightArrays:
     def end_due(self) -> bool:
         """End what ends at the time of the flight; whether anything did."""
         self.integers[_EVENTS] = self.integers[TIMEOUTS] = 0
-        return fl.end_due(self.flight, self._loads, self._events)
+        return bool(_end_due_at(self._at))
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
         self.integers[_EVENTS] = self.integers[TIMEOUTS] = 0
         if self.integers[_ACTING]:
-            fl.end_all(self.flight, self._loads, self._events)
+            _end_all_at(self._at)
 
     def last_events(self) -> list[list[int]]:
         """What the last call began and ended: time_ns, what, load_id and row of each."""
