@@ -20,6 +20,11 @@ BROKEN = (
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
 
+def own_cache(folder: Path) -> dict[str, str]:
+    """An environment in which no kernel of an earlier run is found."""
+    return {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
+
+
 def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tmp_path):
     base = tmp_path / "package" / "base"
     base.mkdir(parents=True)
@@ -31,7 +36,12 @@ def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tm
         (base / "inner.py").write_text(INNER.format(added))
         # -B: Python takes bytecode of a source of the same length and second for this one's.
         ran = subprocess.run(
-            [sys.executable, "-B", "-c", CALL], cwd=tmp_path, capture_output=True, text=True, check=True
+            [sys.executable, "-B", "-c", CALL],
+            cwd=tmp_path,
+            env=own_cache(tmp_path),
+            capture_output=True,
+            text=True,
+            check=True,
         )
         said.append(ran.stdout.split())
     # Value, and whether it came from the disk.
@@ -61,7 +71,12 @@ def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_h
     for text in (arithmetic, arithmetic, changed):
         (base / "exact_arithmetic.py").write_text(text)
         ran = subprocess.run(
-            [sys.executable, "-B", "-c", SUMS], cwd=tmp_path, capture_output=True, text=True, check=True
+            [sys.executable, "-B", "-c", SUMS],
+            cwd=tmp_path,
+            env=own_cache(tmp_path),
+            capture_output=True,
+            text=True,
+            check=True,
         )
         said.append(ran.stdout.split())
     assert said == [["0.0", "0"], ["0.0", "1"], ["42.0", "0"]]

@@ -151,7 +151,7 @@ def worst_errors(kernel, p, moments, spins, steps):
 
 
 def check(draw, count):
-    attitude, rate, wrong = worst_errors(INTEGRATORS["free_body"].kernel, *cases(draw, count))
+    attitude, rate, wrong = worst_errors(INTEGRATORS["free_body"].kernel, new_record(PROBLEM), *cases(draw, count))
     assert wrong == -1, f"case {wrong} of {draw.__name__}"
     print(f"{draw.__name__}: attitude {attitude:.1f}, rate {rate:.1f} of eps (1 + |w|h)")
     assert attitude <= 50.0

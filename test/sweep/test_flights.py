@@ -39,7 +39,7 @@ def test_commands_by_hand_fly_as_a_script_does_and_the_recording_verifies(tmp_pa
     run.advance(reached.time_ns)
     assert run.simulation.state.row.tobytes() == reached.row.tobytes()
     (session,) = read_runs(tmp_path / "flight.mcap")
-    assert verify(session) is None and len(session.events) == 7  # the held torque is ended by a command
+    assert verify(session) is None and len(session.events) == 6
 
 
 def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_step() -> None:
