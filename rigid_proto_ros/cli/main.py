@@ -25,6 +25,7 @@ COMMANDS = {
     "replay": "show, verify, convert, publish or branch a recorded session",
     "identify": "mass properties from recorded motion, and which of them it identifies",
     "snapshot": "a picture of a recorded session, without a display",
+    "lesson": "a lesson as one file that opens in a browser, without a server",
     "demo": "start the node, send scripted pokes, record, and end",
     "up": "start the node with a live view, until Ctrl-C",
     "workbench": "start the node and an interactive page, until Ctrl-C",

@@ -137,15 +137,16 @@ class RerunBackend(Backend):
         self.send(name, rr.Points3D.columns(positions=positions).partition(counts))
 
     def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
-        """Log labels as points of no size, below the part."""
-        entity = f"{name}/label"
+        """Log labels as points of no size, below the part; those of loads change, others are logged once."""
+        entity, changes = f"{name}/label", name.startswith(style.LOADS)
         for stream in self.streams:
-            if entity not in stream.styled:
+            if entity not in stream.styled and len(texts):
                 stream.styled[entity] = 0.0
-                stream.log_static(
-                    entity, rr.Points3D.from_fields(colors=style.STYLES[name].colours[0], radii=0.0, show_labels=True)
-                )
-        self.send(entity, rr.Points3D.columns(positions=positions, labels=list(texts)).partition(counts))
+                colour, known = style.STYLES[name].colours[0], None if changes else texts[0]
+                look = rr.Points3D.from_fields(colors=colour, radii=0.0, labels=known, show_labels=True)
+                stream.log_static(entity, look)
+        labels = list(texts) if changes else None
+        self.send(entity, rr.Points3D.columns(positions=positions, labels=labels).partition(counts))
 
     def scalars(self, name: str, values: np.ndarray) -> None:
         """Log plotted values, and keep their range."""

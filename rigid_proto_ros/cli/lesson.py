@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""``rigid_proto lesson``: a lesson as one file that opens from disk in a browser."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+
+from ..base.bundled import scene_names
+from ..base.command_line import completes
+from ..base.errors import InputError, is_missing
+from ..base.files import output_file, whole_file
+from ..base.progress import Progress
+from .terminal import line
+
+FPS = 30.0
+
+EXAMPLES = (("rigid_proto lesson t_handle --html out/t_handle.html", "for a class: open it in a browser"),)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    name = parser.add_argument("name", metavar="NAME", help="a lesson: the name of a bundled scene")
+    completes(name, lambda _: scene_names())
+    parser.add_argument("--html", metavar="FILE.html", required=True, help="the file to write")
+    parser.add_argument(
+        "--duration", type=float, metavar="S", help="simulated seconds (default 10, or 1 s past its script)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fly the lesson's scene, with its script where it has one, and write the file."""
+    try:
+        from ..workbench.lesson_file import lesson_html
+    except ImportError:
+        raise InputError("--html", is_missing("viser", "workbench")) from None
+    from ..base.bundled import example_path
+    from ..export.flight_record import FlightRecord, frames, source_of_scene
+    from ..scene.lessons import lesson
+    from ..scene.offline import OfflineRun, read_scene
+    from ..scene.scenario import nanoseconds
+    from ..scene.script import read_script
+
+    if not args.html.lower().endswith((".html", ".htm")):
+        raise InputError("--html", args.html, "a file that ends in .html")
+    if args.duration is not None and not (math.isfinite(args.duration) and 0.1 <= args.duration <= 600.0):
+        raise InputError("--duration", args.duration, "seconds from 0.1 to 600")
+    shown = lesson(args.name)
+    output_file("--html", args.html)
+    script = read_script(example_path(shown.script)) if shown.script else []
+    last_ns = max((command.t_ns for command in script), default=0)
+    duration_ns = max(nanoseconds(10.0), last_ns + nanoseconds(1.0))
+    if args.duration is not None:
+        duration_ns = nanoseconds(args.duration)
+    scenario = read_scene(args.name, None, lambda text: print(f"rigid_proto lesson: {text}", file=sys.stderr))
+    record = FlightRecord()
+    with Progress(f"simulating {duration_ns / 1e9:g} s"):
+        OfflineRun(scenario, script, record).advance(duration_ns)
+        made, _ = frames(record, source_of_scene(scenario, script), FPS)
+    ghosts = dict(zip(made.ghosts.times_ns, made.ghosts.rows, strict=True))
+    with Progress(f"writing {args.html}"), whole_file("--html", args.html) as path:
+        path.write_text(lesson_html(shown, made.changes, made.times_ns, made.rows, ghosts), encoding="utf-8")
+    line(f"{args.html}: {duration_ns / 1e9:g} s of {args.name}; open it in a browser")
+    return 0

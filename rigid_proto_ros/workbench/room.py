@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""What surrounds the body in the picture: light, a floor that takes its shadow, a wall where it falls, the camera."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import viser
+
+from ..picture.plot_range import nice_step
+
+FIELD_OF_VIEW = math.radians(35.0)
+
+VIEW = np.array([0.50, -0.80, 0.34])
+"""Direction from the body to the camera, at first."""
+
+BODY_FILLS, PATH_FILLS = 0.62, 0.85
+"""Of the picture's height: the body's longest diagonal, so that the body as it stands fills a third, and the path of
+one that falls.
+"""
+
+CELLS = 4.0
+"""About so many cells of the floor's grid to a unit."""
+
+SUN = (2.0, -1.2, 4.2)
+
+LEASH = 0.2
+"""Body sizes that the body may move from the picture's middle before the picture follows."""
+
+SKY_ROWS = 64
+
+
+class Theme:
+    """Colours of light and of dark pages."""
+
+    def __init__(self, dark: bool) -> None:
+        self.dark = dark
+        self.floor = (44, 47, 52) if dark else (236, 236, 238)
+        self.cell = (58, 62, 68) if dark else (220, 220, 224)
+        self.section = (72, 77, 84) if dark else (202, 202, 208)
+        self.sky = (26, 28, 32) if dark else (250, 251, 253)
+        self.shadow = 0.5 if dark else 0.32
+        self.ambient, self.sun = (0.45, 1.7) if dark else (0.5, 1.5)
+
+
+class Room:
+    """Lengths are the picture's units: one is the body's size. The floor stays below the picture's middle while its
+    lines stand still in the world.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._scene = scene = server.scene
+        self._cell = 0.25
+        self._reach = 0.5
+        self._middle = np.zeros(3)
+        self._distance = 2.0
+        self._floor_height = -0.8
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        scene.configure_default_lights(enabled=False)
+        grid: dict[str, Any] = {
+            "infinite_grid": True,
+            "fade_from": "origin",
+            "fade_strength": 1.5,
+            "plane_opacity": 1.0,
+        }
+        self._floor = scene.add_grid("/room/floor", **grid)
+        self._wall = scene.add_grid(
+            "/room/wall", plane="xz", visible=False, infinite_grid=True, fade_from="origin", fade_strength=1.5
+        )
+        self._sun = scene.add_light_directional("/room/sun", color=(255, 250, 240), cast_shadow=True, position=SUN)
+        self.theme = Theme(False)
+        self.paint(False)
+
+    def paint(self, dark: bool) -> None:
+        """Light or dark, all of it."""
+        self.theme = theme = Theme(dark)
+        self._server.gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
+        )
+        self._scene.configure_environment_map("studio", environment_intensity=theme.ambient)
+        self._sun.intensity = theme.sun
+        for grid in (self._floor, self._wall):
+            grid.cell_color, grid.section_color = theme.cell, theme.section
+            grid.cell_thickness, grid.section_thickness = 0.6, 0.9
+        self._floor.plane_color, self._floor.shadow_opacity = theme.floor, theme.shadow
+        share = np.linspace(0.0, 1.0, SKY_ROWS)[:, np.newaxis] ** 2
+        rows = (1.0 - share) * np.array(theme.sky) + share * np.array(theme.floor)
+        self._scene.set_background_image(np.repeat(rows[:, np.newaxis].astype(np.uint8), 4, axis=1))
+
+    def furnish(self, size_m: float, low: np.ndarray, high: np.ndarray, falls: bool) -> None:
+        """For a body of this size [m] that will be between two corners (3,) [units, from the picture's middle]."""
+        self._middle = 0.5 * (low + high)
+        half = 0.5 * float(np.linalg.norm(high - low))
+        self._reach = max(half - 0.5, LEASH)
+        self._cell = nice_step(size_m / CELLS) / size_m
+        self._distance = max(0.5 / BODY_FILLS, half / PATH_FILLS) / math.tan(0.5 * FIELD_OF_VIEW)
+        far = 3.0 * self._distance
+        for grid in (self._floor, self._wall):
+            grid.cell_size, grid.section_size, grid.fade_distance = self._cell, 5.0 * self._cell, far
+        self._floor_height = float(low[2]) - 0.18
+        self._wall.visible = falls
+        self._look()
+
+    def _look(self) -> None:
+        at = self._middle
+        position = at + self._distance * VIEW / np.linalg.norm(VIEW)
+        camera = self._server.initial_camera
+        camera.position, camera.look_at, camera.fov = position, at, FIELD_OF_VIEW
+        for client in self._server.get_clients().values():
+            with client.atomic():
+                client.camera.position, client.camera.look_at = position, at
+
+    def follow(self, position: np.ndarray, origin: np.ndarray, unit: float) -> np.ndarray:
+        """The world point (3,) [m] at the picture's middle, for a body there, so that it stays in sight."""
+        away = position - (origin + unit * self._middle)
+        distance, leash = float(np.linalg.norm(away)), unit * self._reach
+        return origin + away * (1.0 - leash / distance) if distance > leash else origin
+
+    @property
+    def cell(self) -> float:
+        """Between lines of the floor's grid, in the picture's units."""
+        return self._cell
+
+    def place(self, origin: np.ndarray, unit: float) -> None:
+        """The picture's middle is at the world point ``origin`` (3,) [m], one of its units is ``unit`` [m]."""
+        period = 5.0 * self._cell
+        x, y, z = (-np.asarray(origin) / unit) % period
+        self._floor.position = (x, y, self._floor_height)
+        if self._wall.visible:
+            self._wall.position = (x, self._middle[1] + 1.5 + self._reach, z)
