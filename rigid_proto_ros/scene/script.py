@@ -106,14 +106,13 @@ def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_EN
     if not isinstance(entries, list):
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[ScriptCommand] = []
+    offsets_ns = _offsets_ns(whole, name, max_commands)
     for number, entry in enumerate(entries, 1):
         where = f"{name}, entry {number}"
-        for k, offset_ns in enumerate(_offsets_ns(whole, name, max_commands)):
+        for k, offset_ns in enumerate(offsets_ns):
             for t_ns in _times_ns(entry, where, f"{whole.get('seed', 0)}/{number}/{k}", max_commands):
                 jitter_ns = _jitter_ns(whole, name, f"whole/{number}/{k}/{t_ns}")
-                at_ns = max(0, t_ns + offset_ns + jitter_ns)
-                expanded = _expand(entry, at_ns, where)
-                commands += [replace(command, entry=number) for command in expanded]
+                commands += _expand(entry, max(0, t_ns + offset_ns + jitter_ns), number, where)
             if len(commands) > max_commands:
                 raise InputError(where, f"more than {max_commands} commands")
     return sorted(commands, key=lambda command: command.t_ns)
@@ -133,6 +132,8 @@ def _times_ns(entry: Any, where: str, seed: str, max_commands: int) -> list[int]
 
 
 def _offsets_ns(timing: dict, where: str, max_commands: int) -> list[int]:
+    if "repeat" not in timing and "every" not in timing:
+        return [0]
     repeat = _number(timing.get("repeat", 1), f"{where}, repeat", 1, max_commands)
     if repeat != int(repeat):
         raise InputError(f"{where}, repeat", repeat, "a whole number of times")
@@ -144,26 +145,29 @@ def _offsets_ns(timing: dict, where: str, max_commands: int) -> list[int]:
 
 def _jitter_ns(timing: dict, where: str, seed: str) -> int:
     """A uniform random shift, the same for the same seed wherever and whenever the script is read."""
-    jitter = _number(timing.get("jitter", 0.0), f"{where}, jitter", 0.0, MAX_TIME_S)
+    if "jitter" not in timing:
+        return 0
+    jitter = _number(timing["jitter"], f"{where}, jitter", 0.0, MAX_TIME_S)
     if jitter == 0.0:
         return 0
     own = _number(timing.get("seed", 0), f"{where}, seed", 0, 2**63)
     return nanoseconds(random.Random(f"{int(own)}/{seed}").uniform(-jitter, jitter))
 
 
-def _expand(entry: dict, t_ns: int, where: str) -> list[ScriptCommand]:
+def _expand(entry: dict, t_ns: int, number: int, where: str) -> list[ScriptCommand]:
     if "wrench" in entry:
         _check_keys(entry, _TIMING_KEYS | {"wrench"}, where)
-        return [_held_wrench(entry["wrench"], t_ns, f"{where}, wrench")]
+        return [_held_wrench(entry["wrench"], t_ns, number, f"{where}, wrench")]
     if "thrusters" in entry:
         _check_keys(entry, _TIMING_KEYS | {"thrusters"}, where)
-        return [ScriptCommand(t_ns, "thrusters", forces=_forces(entry["thrusters"], f"{where}, thrusters"))]
+        forces = _forces(entry["thrusters"], f"{where}, thrusters")
+        return [ScriptCommand(t_ns, "thrusters", forces=forces, entry=number)]
     if "state" in entry:
         _check_keys(entry, _TIMING_KEYS | {"state"}, where)
-        return [ScriptCommand(t_ns, "state", state=_state(entry["state"], f"{where}, state"))]
+        return [ScriptCommand(t_ns, "state", state=_state(entry["state"], f"{where}, state"), entry=number)]
     if "string" in entry:
         _check_keys(entry, _TIMING_KEYS | {"string"}, where)
-        return _expand_string(entry["string"], t_ns, f"{where}, string")
+        return _expand_string(entry["string"], t_ns, number, f"{where}, string")
     if "set" in entry:
         _check_keys(entry, _TIMING_KEYS | {"set"}, where)
         if not isinstance(entry["set"], dict) or not entry["set"]:
@@ -174,38 +178,40 @@ def _expand(entry: dict, t_ns: int, where: str) -> list[ScriptCommand]:
                 entry["set"]["record"],
                 "parameters of the motion; ros2 param set switches record",
             )
-        return [ScriptCommand(t_ns, "set", changes={str(k): v for k, v in entry["set"].items()})]
+        changes = {str(name): value for name, value in entry["set"].items()}
+        return [ScriptCommand(t_ns, "set", changes=changes, entry=number)]
     if "service" in entry:
         _check_keys(entry, _TIMING_KEYS | {"service"}, where)
         if entry["service"] != "clear_wrench":
             raise InputError(f"{where}, service", entry["service"], "clear_wrench")
-        return [ScriptCommand(t_ns, "clear_wrench")]
+        return [ScriptCommand(t_ns, "clear_wrench", entry=number)]
     _check_keys(entry, _TIMING_KEYS | _POKE_KEYS, where, ENTRY_KEYS["other"] - {"script"})
-    return [_poke(entry, t_ns, where)]
+    return [_poke(entry, t_ns, number, where)]
 
 
-def _poke(entry: dict, t_ns: int, where: str) -> ScriptCommand:
+def _poke(entry: dict, t_ns: int, number: int, where: str) -> ScriptCommand:
     impulsive = "impulse" in entry or "angular_impulse" in entry
     lasting = "force" in entry or "push" in entry or "torque" in entry
     if impulsive and (lasting or "duration" in entry or "slot" in entry):
         raise InputError(where, sorted(entry), "impulses alone, or force, push and torque with a duration or slot")
     frame, force, torque = _wrench_fields(entry, where)
     frame += ";impulse" if impulsive else _duration(entry, where)
-    return ScriptCommand(t_ns, "poke", _checked_frame(frame + _slot(entry, where), where), force, torque)
+    frame = _checked_frame(frame + _slot(entry, where), where)
+    return ScriptCommand(t_ns, "poke", frame, force, torque, entry=number)
 
 
-def _held_wrench(entry: Any, t_ns: int, where: str) -> ScriptCommand:
+def _held_wrench(entry: Any, t_ns: int, number: int, where: str) -> ScriptCommand:
     if not isinstance(entry, dict):
         raise InputError(where, entry, "{at, force or push, torque, axes, duration}")
     _check_keys(entry, _WRENCH_KEYS, where)
     frame, force, torque = _wrench_fields(entry, where)
     frame += _duration(entry, where) + _slot(entry, where)
-    return ScriptCommand(t_ns, "wrench", _checked_frame(frame, where), force, torque)
+    return ScriptCommand(t_ns, "wrench", _checked_frame(frame, where), force, torque, entry=number)
 
 
-def _expand_string(entry: Any, t_ns: int, where: str) -> list[ScriptCommand]:
+def _expand_string(entry: Any, t_ns: int, number: int, where: str) -> list[ScriptCommand]:
     if entry == "release":
-        return [ScriptCommand(t_ns, "string_release")]
+        return [ScriptCommand(t_ns, "string_release", entry=number)]
     accepted = "release, or {attach: contact or [x, y, z] in mesh coordinates, target: [x, y, z] in the world}"
     if not isinstance(entry, dict) or not entry or not set(entry) <= _STRING_KEYS:
         raise InputError(where, entry, accepted)
@@ -215,13 +221,13 @@ def _expand_string(entry: Any, t_ns: int, where: str) -> list[ScriptCommand]:
         if isinstance(attach, dict) and set(attach) == {"point"}:
             attach = attach["point"]
         if isinstance(attach, str) and CONTACT_NAME.match(attach):
-            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, contact=attach))
+            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, contact=attach, entry=number))
         else:
             point = _vector(attach, f"{where}, attach")
-            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, point=point))
+            commands.append(ScriptCommand(t_ns, "string_attach", MESH_FRAME, point=point, entry=number))
     if "target" in entry:
         target = _vector(entry["target"], f"{where}, target")
-        commands.append(ScriptCommand(t_ns, "string_target", "world", point=target))
+        commands.append(ScriptCommand(t_ns, "string_target", "world", point=target, entry=number))
     return commands
 
 
