@@ -363,7 +363,7 @@ def check_surface(
             verdict.add("zero_volume", ERROR, "the surface encloses no volume: it is flat, or folded onto itself")
         elif not empty and abs(volume) < THIN * diagonal**3:
             verdict.add("thin", INFO, f"thin body: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
-        crossings = self_crossings(vertices, topology.corners, topology.component, topology.edges)
+        crossings = self_crossings(vertices, topology.corners, topology.component)
         if crossings:
             message = f"the surface passes through itself ({counted(crossings, 'pair')} of triangles)"
             verdict.add(SELF_CROSSING, WARNING, f"{message}; what it encloses twice counts twice")

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
-from .cells import triangle_boxes
+from .bvh import LEAF, hierarchy
 from .crossing import crossing_components
-from .tree import LEAF, triangle_tree
 
 WORK_LIMIT = 100_000_000
 """Boxes and triangles visited after which nesting is left undecided and said to be so: about a second of work."""
@@ -31,20 +30,7 @@ isn't trusted.
 # Directions that no mesh is aligned with; the first alone is used unless a ray meets an edge.
 _DIRECTIONS = np.array([(0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316)])
 # Barycentric coordinates of the sample in its triangle: not on any of its symmetry lines.
-_SAMPLE = (0.4479, 0.3413, 0.2108)
-_UNKNOWN, _OUTSIDE, _INSIDE = 0, 1, 2
-
-
-@njit(cache=True, nogil=True)
-def _may_hit(box: np.ndarray, origin: np.ndarray, inverse: np.ndarray, reach: float) -> bool:
-    """Whether the ray from ``origin`` comes within ``reach`` of the box, so that no hit is lost that isn't sure;
-    inverse (3,): 1/direction.
-    """
-    near, far = 0.0, math.inf
-    for k in range(3):
-        a, b = (box[k] - reach - origin[k]) * inverse[k], (box[3 + k] + reach - origin[k]) * inverse[k]
-        near, far = max(near, min(a, b)), min(far, max(a, b))
-    return near <= far
+_SAMPLE = np.array([0.4479, 0.3413, 0.2108])
 
 
 @njit(cache=True, nogil=True)
@@ -99,59 +85,39 @@ def _shoot(
     reach: float,
     winding: np.ndarray,
     sure: np.ndarray,
-    limit: int,
 ) -> int:
-    """Add the signed hits of all components but ``own`` to winding (k,), marking those not sure; returns the visits."""
-    kz = 0
-    for k in range(1, 3):
-        if abs(direction[k]) > abs(direction[kz]):
-            kz = k
+    """Put the signed hits of all components but ``own`` into winding (k,), and into sure (k,) whether they are certain;
+    returns the boxes visited.
+    """
+    kz = int(np.argmax(np.abs(direction)))
     kx, ky = (kz + 1) % 3, (kz + 2) % 3
-    inverse = 1.0 / direction
-    leaves = (len(boxes) + 1) // 2
-    stack = np.empty(64, np.int64)
-    stack[0], top, visits = 0, 1, 0
-    while top > 0 and visits < limit:
+    winding[:] = 0
+    sure[:] = True
+    inner = (len(boxes) - 1) // 2
+    stack = np.zeros(64, np.int64)
+    top, visits = 1, 0
+    while top > 0:
         top -= 1
         node = stack[top]
         visits += 1
-        if not _may_hit(boxes[node], origin, inverse, reach):
+        near, far = 0.0, math.inf
+        for k in range(3):  # widened, so that no hit is lost that isn't sure
+            a = (boxes[node, k] - reach - origin[k]) / direction[k]
+            b = (boxes[node, 3 + k] + reach - origin[k]) / direction[k]
+            near, far = max(near, min(a, b)), min(far, max(a, b))
+        if near > far:
             continue
-        if node < leaves - 1:
+        if node < inner:
             stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
             top += 2
             continue
-        first = (node - leaves + 1) * LEAF
-        for i in range(first, min(first + LEAF, len(order))):
+        for i in range((node - inner) * LEAF, min((node - inner + 1) * LEAF, len(order))):
             other = component[order[i]]
             if other != own:
                 sign, certain = _hit(vertices, triangles[order[i]], origin, direction, kx, ky, kz, reach)
                 winding[other] += sign
-                if not certain:
-                    sure[other] = False
+                sure[other] &= certain
     return visits
-
-
-@njit(cache=True, nogil=True)
-def _samples(component: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """SAMPLES to twice as many triangles (s,) of each component that has one near, or all that it has, and whose they
-    are (s,); component by component."""
-    count = near.shape[0]
-    size, step, places = np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count + 1, np.int64)
-    for t in range(len(component)):
-        size[component[t]] += 1
-    for c in range(count):
-        step[c] = max(1, size[c] // SAMPLES) if near[c].any() else 0
-        places[c + 1] = places[c] + ((size[c] + step[c] - 1) // step[c] if step[c] > 0 else 0)
-    samples, owners = np.empty(places[count], np.int64), np.empty(places[count], np.int64)
-    size[:] = 0
-    for t in range(len(component)):
-        c = component[t]
-        if step[c] > 0 and size[c] % step[c] == 0:
-            samples[places[c]], owners[places[c]] = t, c
-            places[c] += 1
-        size[c] += 1
-    return samples, owners
 
 
 @njit(cache=True, nogil=True)
@@ -159,8 +125,8 @@ def _sides(
     vertices: np.ndarray,
     triangles: np.ndarray,
     component: np.ndarray,
-    order: np.ndarray,
-    boxes: np.ndarray,
+    chosen: np.ndarray,
+    samples: np.ndarray,
     near: np.ndarray,
     reach: float,
     limit: int,
@@ -168,58 +134,49 @@ def _sides(
     """How many of each component's samples are outside and inside each other one, (k, k) each, and the components left
     undecided (k,) when ``limit`` visits didn't suffice.
 
-    near (k, k): pairs whose boxes overlap.
+    chosen (c,): triangles of the components in question; samples (s,): those in whose middle a ray begins; near (k, k):
+    pairs whose boxes overlap.
     """
+    order, _, boxes = hierarchy(vertices, triangles, chosen)
     count = near.shape[0]
-    samples, owners = _samples(component, near)
     outside, inside = np.zeros((count, count), np.int32), np.zeros((count, count), np.int32)
     undecided = np.zeros(count, np.bool_)
-    winding, sure, answer = np.zeros(count, np.int64), np.ones(count, np.bool_), np.zeros(count, np.int8)
+    winding, sure = np.zeros(count, np.int64), np.ones(count, np.bool_)
     origin = np.empty(3)
     visits = 0
-    for s in range(len(samples)):
-        own = owners[s]
-        if visits >= limit:
-            undecided[own] = True
-            continue
-        a, b, c = triangles[samples[s], 0], triangles[samples[s], 1], triangles[samples[s], 2]
+    for sample in samples:
+        own = component[sample]
         for k in range(3):
-            origin[k] = _SAMPLE[0] * vertices[a, k] + _SAMPLE[1] * vertices[b, k] + _SAMPLE[2] * vertices[c, k]
-        answer[:] = _UNKNOWN
+            origin[k] = 0.0
+            for corner in range(3):
+                origin[k] += _SAMPLE[corner] * vertices[triangles[sample, corner], k]
+        asked = near[own].copy()
         for attempt in range(len(_DIRECTIONS)):
-            winding[:] = 0
-            sure[:] = True
-            visits += _shoot(
-                vertices,
-                triangles,
-                component,
-                order,
-                boxes,
-                own,
-                origin,
-                _DIRECTIONS[attempt],
-                reach,
-                winding,
-                sure,
-                limit - visits,
-            )
             if visits >= limit:
                 undecided[own] = True
                 break
-            open_ones = False
+            direction = _DIRECTIONS[attempt]
+            visits += _shoot(vertices, triangles, component, order, boxes, own, origin, direction, reach, winding, sure)
             for other in range(count):
-                if near[own, other] and answer[other] == _UNKNOWN:
-                    if sure[other]:
-                        answer[other] = _INSIDE if winding[other] != 0 else _OUTSIDE
-                    else:
-                        open_ones = True
-            if not open_ones:
+                if asked[other] and sure[other]:
+                    asked[other] = False
+                    inside[own, other] += winding[other] != 0
+                    outside[own, other] += winding[other] == 0
+            if not asked.any():
                 break
-        for other in range(count):
-            if near[own, other]:
-                outside[own, other] += answer[other] == _OUTSIDE
-                inside[own, other] += answer[other] == _INSIDE
     return outside, inside, undecided
+
+
+def _samples(component: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Up to SAMPLES triangles (s,), evenly picked, of each of the components marked in ``wanted`` (k,)."""
+    of_each = np.split(np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1])
+    return np.concatenate(
+        [
+            own[np.arange(min(SAMPLES, len(own))) * len(own) // min(SAMPLES, len(own))]
+            for own, asked in zip(of_each, wanted, strict=True)
+            if asked
+        ]
+    )
 
 
 @dataclass(frozen=True)
@@ -249,14 +206,13 @@ def component_nesting(
     np.fill_diagonal(near, False)
     if not near.any():
         return Nesting(np.zeros((count, count), dtype=bool), (), np.ones(count, dtype=bool), True)
-    cell_boxes = triangle_boxes(vertices, triangles)
-    chosen = np.nonzero(near.any(axis=1)[component])[0]
-    leaf_order, boxes = triangle_tree(vertices, triangles, cell_boxes, chosen)
+    wanted = near.any(axis=1)
+    chosen, samples = np.nonzero(wanted[component])[0], _samples(component, wanted)
     reach = NEAR * float(np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)))
-    outside, within, undecided = _sides(vertices, triangles, component, leaf_order, boxes, near, reach, WORK_LIMIT)
+    outside, within, undecided = _sides(vertices, triangles, component, chosen, samples, near, reach, WORK_LIMIT)
     found = (outside > 0) & (within > 0)
     found |= found.T
-    crossing, complete = crossing_components(vertices, triangles, component, cell_boxes, near & ~found)
+    crossing, complete = crossing_components(vertices, triangles, component, near & ~found)
     found |= crossing
     inside = (within > 0) & (outside == 0) & ~found & ~undecided[:, None]
     pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))

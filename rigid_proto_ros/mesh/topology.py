@@ -78,20 +78,6 @@ def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray
 
 
 @njit(cache=True, nogil=True)
-def joined_alike(edges: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """For each triangle (m,) the first one of those joined to it through triangles of its ``label`` (m,) ≥ 0 across
-    edges (e, 6), as a topology has them, that two share and both wind alike."""
-    parent = np.arange(len(label))
-    for e in range(len(edges)):
-        s, t = edges[e, 4], edges[e, 5]
-        if edges[e, 2] == 1 and edges[e, 3] == 1 and label[s] >= 0 and label[s] == label[t]:
-            _join(parent, s, t)
-    for i in range(len(parent)):
-        parent[i] = _root(parent, i)
-    return parent
-
-
-@njit(cache=True, nogil=True)
 def _half_edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """The triangles' sides by their lower vertex: those of vertex v are keys[starts[v]:starts[v + 1]].
 

@@ -6,13 +6,15 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mass_solids import box, sphere
+from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
 
-from rigid_proto_ros.mesh.cells import triangle_boxes
-from rigid_proto_ros.mesh.crossing import crossing_components, self_crossings
-from rigid_proto_ros.mesh.patches import surface_patches
+from rigid_proto_ros.mass.verdict import check_surface
+from rigid_proto_ros.mesh.bvh import LEAF, hierarchy
+from rigid_proto_ros.mesh.crossing import crossing_components, self_crossings, triangles_cross
 from rigid_proto_ros.mesh.topology import mesh_topology
-from rigid_proto_ros.mesh.tree import triangle_tree
 
 
 def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
@@ -57,7 +59,7 @@ def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
     expected = np.zeros((40, 40), dtype=bool)
     for i, j in pairs:
         expected[component[i], component[j]] = expected[component[j], component[i]] = True
-    found, complete = crossing_components(points, corners, component, triangle_boxes(points, corners), asked)
+    found, complete = crossing_components(points, corners, component, asked)
     assert complete and np.array_equal(found, expected & asked)
     assert found.any() and not found.all()
 
@@ -91,11 +93,12 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
     points = soup(1000, 7)
     corners = np.arange(3000).reshape(-1, 3)
     chosen = np.arange(0, 1000, 3)
-    order, boxes = triangle_tree(points, corners, triangle_boxes(points, corners), chosen)
+    order, own, boxes = hierarchy(points, corners, chosen)
     assert sorted(order.tolist()) == chosen.tolist()
     leaves = (len(boxes) + 1) // 2
     for place, triangle in enumerate(order.tolist()):
-        node = leaves - 1 + place // 4
+        assert own[place].tolist() == [*points[corners[triangle]].min(axis=0), *points[corners[triangle]].max(axis=0)]
+        node = leaves - 1 + place // LEAF
         while True:
             assert np.all(boxes[node, :3] <= points[corners[triangle]]) and np.all(
                 points[corners[triangle]] <= boxes[node, 3:]
@@ -105,37 +108,50 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it():
             node = (node - 1) // 2
 
 
-@pytest.mark.parametrize("count", [60, pytest.param(5000, marks=pytest.mark.stress)])
-def test_patches_leave_no_crossing_out(count):
-    """Spheres and boxes bent through themselves, with faces turned and cut out, some with all corners on a coarse grid:
-    as many crossings with patches as without, and patches cover most of what isn't bent much."""
-    random = np.random.default_rng(11)
-    crossings, covered = [], []
-    for number in range(count):
-        vertices, triangles = box(cells=6) if number % 3 else sphere(16)
-        bend = 10.0 ** random.uniform(-2.0, 1.0)
-        waves = random.normal(size=(3, 3))
-        vertices = vertices + bend * np.sin(vertices @ waves + random.uniform(0.0, 6.0, 3))
-        if number % 5 == 4:
-            vertices = np.round(8.0 * vertices) / 8.0
-        triangles = triangles[random.uniform(size=len(triangles)) < 1.0 - 0.02 * (number % 2)]
-        turned = random.uniform(size=len(triangles)) < 0.02 * (number % 4 == 3)
-        triangles[turned] = triangles[turned][:, ::-1]
-        topology = mesh_topology(vertices, triangles)
-        patch = surface_patches(vertices, topology.corners, topology.edges)
-        component = np.zeros(len(triangles), np.int64)
-        found = self_crossings(vertices, topology.corners, component, topology.edges)
-        assert found == self_crossings(vertices, topology.corners, component), number
-        crossings.append(found)
-        covered.append(np.mean(patch >= 0))
-    assert count // 4 < sum(found > 0 for found in crossings) < count - count // 4
-    assert np.max(covered) == 1.0 and np.median(covered) > 0.7
+@given(st.integers(0, 10**6), st.booleans(), st.floats(-2.0, 1.0), st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_the_hierarchy_leaves_no_crossing_out(seed, ball, bend, gridded):
+    """A sphere or a box bent through itself, with faces turned and cut out, with all corners on a coarse grid or not."""
+    random = np.random.default_rng(seed)
+    vertices, triangles = sphere(8) if ball else box(cells=4)
+    waves = random.normal(size=(3, 3))
+    vertices = vertices + 10.0**bend * np.sin(vertices @ waves + random.uniform(0.0, 6.0, 3))
+    if gridded:
+        vertices = np.round(8.0 * vertices) / 8.0
+    triangles = triangles[random.uniform(size=len(triangles)) < 0.98]
+    corners = mesh_topology(vertices, triangles).corners
+    pairs = [
+        (i, j)
+        for i, j in combinations(range(len(corners)), 2)
+        if not set(corners[i].tolist()) & set(corners[j].tolist()) and triangles_cross(vertices, corners, i, j)
+    ]
+    assert self_crossings(vertices, corners, np.zeros(len(corners), np.int64)) == len(pairs)
+
+
+def test_triangles_whose_sides_cross_each_other_cross():
+    """Both meet the line y = z = 0 from x = -0.5 to 0.5, with their sides at its ends."""
+    one = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
+    other = [[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
+    points, corners = np.array(one + other), np.arange(6).reshape(2, 3)
+    assert self_crossings(points, corners, np.zeros(2, np.int64)) == 1
+
+
+def test_a_cube_everted_through_its_own_edges_is_told():
+    """Corners exchanged or faces turned so that sides pass through sides, and by no inside of a triangle."""
+    cube = CUBE_VERTICES - 0.5
+    hourglass = np.where(cube[:, 2:] > 0.0, cube * (-1.0, -1.0, 1.0), cube)
+    everted = [hourglass]
+    for i in range(8):
+        exchanged = cube.copy()
+        exchanged[[i, i ^ 1]] = exchanged[[i ^ 1, i]]
+        everted.append(exchanged)
+    for vertices in everted:
+        found = {finding.code for finding in check_surface(vertices, CUBE_TRIANGLES)[0].findings}
+        assert "self_crossing" in found
 
 
 @pytest.mark.parametrize("turns", [0.9, 1.6])
-def test_a_spiral_ramp_that_lies_over_itself_is_no_patch(turns):
-    """All of it faces up; only one that stays below a full turn covers each point once. A needle through both floors of
-    the higher one is found."""
+def test_a_needle_crosses_every_floor_of_a_spiral_ramp(turns):
     steps = 80
     angle = np.linspace(0.0, 2.0 * np.pi * turns, steps + 1)
     rim = np.column_stack([np.cos(angle), np.sin(angle), 0.02 * angle])
@@ -144,15 +160,11 @@ def test_a_spiral_ramp_that_lies_over_itself_is_no_patch(turns):
     low, high = np.column_stack([k, steps + 1 + k, steps + 2 + k]), np.column_stack([k, steps + 2 + k, k + 1])
     needle = np.array([[0.75, 0.01, -1.0], [0.75, 0.02, -1.0], [0.75, 0.015, 1.0]])
     points, triangles = np.vstack([ramp, needle]), np.vstack([low, high, 2 * steps + 2 + np.arange(3)[None]])
-    topology = mesh_topology(points, triangles)
-    patch = surface_patches(points, topology.corners, topology.edges)
-    assert np.all(patch[:-1] >= 0) == (turns < 1.0) and patch[-1] < 0
     component = np.zeros(len(triangles), np.int64)
-    assert self_crossings(points, topology.corners, component, topology.edges) == (1 if turns < 1.0 else 2)
+    assert self_crossings(points, mesh_topology(points, triangles).corners, component) == (1 if turns < 1.0 else 2)
 
 
 def test_a_wall_that_dips_into_a_flat_floor_by_little_is_found_and_one_that_stands_on_it_is_not():
-    """Two patches whose boxes touch in the floor's plane aren't compared; any depth makes them meet."""
     x, y = (grid.ravel() for grid in np.meshgrid(np.arange(5.0), np.arange(5.0)))
     cell = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
     sheet = np.vstack([np.column_stack([cell, cell + 1, cell + 6]), np.column_stack([cell, cell + 6, cell + 5])])
@@ -160,9 +172,7 @@ def test_a_wall_that_dips_into_a_flat_floor_by_little_is_found_and_one_that_stan
     for depth in (0.0, 1e-7):
         wall = np.column_stack([np.full(25, 1.7), 0.4 * y + 0.25, 0.5 * x - depth])
         points, triangles = np.vstack([floor, wall]), np.vstack([sheet, sheet + 25])
-        topology = mesh_topology(points, triangles)
-        assert set(surface_patches(points, topology.corners, topology.edges).tolist()) == {0, 1}
         component = np.zeros(len(triangles), np.int64)
         pairs = sum(exactly_cross(points[one], points[other]) for one, other in combinations(triangles, 2))
-        assert self_crossings(points, topology.corners, component, topology.edges) == pairs
+        assert self_crossings(points, mesh_topology(points, triangles).corners, component) == pairs
         assert (pairs > 0) == (depth > 0.0)
