@@ -317,6 +317,8 @@ def _check_keys(entry: dict, known: set, where: str, others: Set[str] = frozense
 
 
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
+    if type(value) is float and lower <= value <= upper:
+        return value
     if isinstance(value, str):
         # YAML reads 1e-3 without a point as text.
         try:
