@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A workbench with a page in headless Chromium, and a client that listens to its node, for tests and pictures."""
+"""A workbench with a page in headless Chromium, for tests and pictures."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from command_rig import RosClient
-from ros_process import RosProcess, descendants
+from ros_process import RosProcess
 
 CHROMIUM = os.environ.get("CHROMIUM", shutil.which("chromium") or shutil.which("chromium-browser")) or None
 """The browser; ``CHROMIUM=`` hides the one that is installed."""
@@ -38,38 +37,15 @@ CAMERA, FIELD_OF_VIEW = np.array([1.45, -2.45, 1.2]), math.radians(40.0)
 
 
 class Bench:
-    """``rigid_proto workbench`` in a ROS domain of its own."""
+    """``rigid_proto workbench`` in a process of its own."""
 
-    def __init__(
-        self, environment: dict[str, str], folder: Path, port: int, *arguments: str, wait: bool = True
-    ) -> None:
-        self.port = port
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        environment = {**os.environ, "TMPDIR": str(folder)}
+        log = folder / "workbench"
         self.process = RosProcess(
-            *("rigid_proto", "workbench", "--port", port, "--no-browser", *arguments),
-            environment={**environment, "TMPDIR": str(folder)},
-            log=folder / "workbench",
+            "rigid_proto", "workbench", "--no-browser", *arguments, environment=environment, log=log
         )
-        if wait:
-            self.wait()
-
-    def wait(self) -> None:
-        """Until page and node are there."""
-        self.process.wait_for("The workbench is at")
-        self.process.wait_for("is simulating")
-
-    @property
-    def address(self) -> str:
-        return f"http://127.0.0.1:{self.port}"
-
-    def children(self) -> dict[str, int]:
-        """Process ids by what they run: ``page`` and ``node``."""
-        found = {}
-        for pid in descendants(self.process.pid):
-            command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
-            for name, module in (("page", "workbench.main"), ("node", "ros.main")):
-                if any(part.endswith(module) for part in command):
-                    found[name] = pid
-        return found
+        self.address = self.process.wait_for(r"The workbench is at").split()[4]
 
 
 class Page:
@@ -91,17 +67,16 @@ class Page:
             ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
         )
         self.page.add_style_tag(content=see_through)
-        self.until(lambda: "is simulating" in self.text or "is sleeping" in self.text, "a node on the page")
+        self.until(lambda: re.search(r"\d\.\d\d s", self.text), "time on the page")
 
     def drawn(self) -> None:
         """Wait for two pictures: what the page has been told is in the second, and there a click hits it."""
         self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     @property
-    def readout(self) -> tuple[float, float]:
-        """Time [s] and energy [J] as the page shows them."""
-        text = self.text
-        return tuple(float(re.search(rf"^{name}\s+(\S+) \w", text, re.M)[1]) for name in ("time", "energy"))
+    def time_s(self) -> float:
+        """As the bar shows it."""
+        return float(re.search(r"(\d+\.\d\d) s", self.text)[1])
 
     @property
     def text(self) -> str:
@@ -213,36 +188,6 @@ class Page:
         self.page.mouse.up()
 
 
-class Ear(RosClient):
-    """Listens to the node of a bench."""
-
-    def __init__(self, environment: dict[str, str], node: str = "/rigid_body", wait=lambda: None) -> None:
-        """wait(): until the node is there, while the client's own process starts."""
-        super().__init__(environment, node)
-        wait()
-        self.listen("pose", "events", "scene")
-
-    def event(self, kind: str, after: int = 0) -> dict:
-        """The first event of a kind after so many of any kind."""
-        return self.until(
-            lambda: next((event for event in self.events()[after:] if event["kind"] == kind), None), f"event {kind}"
-        )
-
-    def values(self) -> dict:
-        """The parameters in force, as ~/scene says."""
-        from rigid_proto_ros.scene.scene_file import read_scene_text
-
-        return read_scene_text(self.until(lambda: self.heard("scene", last=1), "a scene")[-1]["data"]).values
-
-    def until_scene(self, condition) -> dict:
-        """Wait until the parameters in force meet a condition; returns them."""
-        return self.until(lambda: condition(values := self.values()) and [values], "a scene as asked for")[0]
-
-    def until_value(self, name: str, condition):
-        """Wait until a parameter meets a condition; returns it."""
-        return self.until(lambda: condition(value := self.values().get(name)) and [value], f"{name} as asked for")[0]
-
-
 CAMERA_MESSAGE = {
     "type": "ViewerCameraMessage",
     "wxyz": (1.0, 0.0, 0.0, 0.0),
@@ -265,6 +210,8 @@ def bare_page(port: int) -> Iterator:
     import viser
     from websockets.sync.client import connect
 
-    with connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:
+    url, protocol = f"ws://127.0.0.1:{port}", f"viser-v{viser.__version__}"
+    # Read by nobody, but taken: a socket that is full answers no ping, and is dropped.
+    with connect(url, subprotocols=[protocol], max_size=None, max_queue=None) as page:
         page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
         yield page

@@ -9,14 +9,12 @@ test/test_interface_list.py compares; a line that goes, or changes, is a promise
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import functools
 import io
 import json
 import re
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -105,36 +103,13 @@ def bundled_files() -> Iterator[str]:
             yield f"{kind} {name}"
 
 
-class _SceneOnly:
-    """In the place of the page's link to ROS: a node that says its scene and takes nothing."""
-
-    def __init__(self, target: str, deliver: Callable, on_scene: Callable, _on_diagnostics: Callable) -> None:
-        self.target = target
-        self._deliver, self._on_scene = deliver, on_scene
-
-    def listen(self) -> None:
-        from rigid_proto_ros.scene.offline import read_scene
-
-        self._deliver(self._on_scene, read_scene("t_handle").text)
-
-    def take(self) -> object:
-        from rigid_proto_ros.workbench.ros_link import Received
-
-        return Received()
-
-    def close(self) -> None:
-        pass
-
-    stop_listening = close
-
-
 def page_controls() -> Iterator[str]:
     """Controls of the page by their kind and label; those that exist on every page from its start."""
     import viser
 
-    from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
-    from rigid_proto_ros.workbench import page as page_module
-    from rigid_proto_ros.workbench.server import make_server, stop_server
+    from rigid_proto_ros.live.live_simulation import LiveSimulation
+    from rigid_proto_ros.scene.offline import read_scene
+    from rigid_proto_ros.workbench.main import Workbench
 
     labels: set[str] = set()
 
@@ -155,25 +130,12 @@ def page_controls() -> Iterator[str]:
             undo.append((owner, name, method))
             if name not in ("add_panel", "add_tab_group", "add_uplot"):
                 setattr(owner, name, recording(method, name.removeprefix("add_")))
-    link, page_module.RosLink = page_module.RosLink, _SceneOnly
-    server = make_server(LOOPBACK, any_free_port(), lambda link: None)
     try:
-
-        async def made() -> page_module.Page:
-            return page_module.Page(server, "/rigid_body", "http://here")
-
-        loop = server.get_event_loop()
-        page = asyncio.run_coroutine_threadsafe(made(), loop).result(PATIENCE_S)
-        page.link.listen()
-        deadline = time.monotonic() + PATIENCE_S
-        while page.scenes.scenario is None and time.monotonic() < deadline:
-            time.sleep(0.02)
+        workbench = Workbench(LiveSimulation(read_scene("t_handle")))
     finally:
-        page_module.RosLink = link
         for owner, name, method in undo:
             setattr(owner, name, method)
-    stop_server(server)
-    page.close()
+    workbench.close()
     yield from labels
 
 

@@ -28,7 +28,7 @@ COMMANDS = {
     "lesson": "a lesson as one file that opens in a browser, without a server",
     "demo": "start the node, send scripted pokes, record, and end",
     "up": "start the node with a live view, until Ctrl-C",
-    "workbench": "start the node and an interactive page, until Ctrl-C",
+    "workbench": "a body and its interactive page, until Ctrl-C; needs no ROS",
 }
 
 EXAMPLES = (

@@ -16,7 +16,6 @@ from ..base.errors import InputError, is_missing
 _MODULES = {
     "rigid_body_node": "rigid_proto_ros.ros.main",
     "poke_client": "rigid_proto_ros.ros.poke_client",
-    "workbench": "rigid_proto_ros.workbench.main",
 }
 GRACE_S = 5.0
 """A process that doesn't end within this time of SIGINT is killed."""

@@ -154,6 +154,21 @@ class LiveSimulation:
         """Time 0 and the initial state; paused or running stays."""
         self.call(self.loop.reset)
 
+    def begin(self, scenario: Scenario) -> None:
+        """Another scene, from its time 0; paused or running stays. Raises InputError, and then the present one begins
+        anew.
+        """
+
+        def begin() -> None:
+            # What acts now is no reason to refuse a scene that begins without it.
+            self.loop.reset()
+            self.loop.replace(scenario)
+            self.loop.reset()
+
+        warm_up_change(self.scenario, scenario)
+        self.call(begin)
+        self.endpoints.parameters_changed()
+
     def step(self, periods: int = 1) -> int:
         """While paused, advance over so many publications; returns the simulated time reached [ns]. Raises InputError
         while time runs, or when it takes too long.

@@ -87,7 +87,9 @@ class LiveParameters:
         self._live.give_up_failed_recording()
         now = self._live.scenario.parameters
         behind = {
-            name: value for name, value in now.named().items() if not self._is_in_force(_as_ros({name: value})[0])
+            name: value
+            for name, value in now.named().items()
+            if not is_read_only(name) and not self._is_in_force(_as_ros({name: value})[0])
         }
         if behind:
             self._store(_as_ros(behind), behind)

@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 import threading
 import traceback
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import rclpy
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from ..base.compilation import notify_when_compiling
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..live.warm_up import IntegratorsCompiling, warm_up
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds
@@ -21,6 +23,9 @@ from ..simulation.observer import Observer
 from .arguments import given_arguments, remapped_node_name
 from .diagnostics import Reports
 from .node import RigidBodyNode
+
+if TYPE_CHECKING:
+    from ..workbench.main import Workbench
 
 
 class NodeProcess:
@@ -38,6 +43,7 @@ class NodeProcess:
         self._executor: Executor | None = None
         self._executing: threading.Thread | None = None
         self._reports: Reports | None = None
+        self._page: Workbench | None = None
 
     def start(self) -> None:
         """Make the node, which may compile for minutes, and let it run. Raises InputError."""
@@ -58,6 +64,7 @@ class NodeProcess:
             setup = node.live.scenario.setup
             integrators.wait(setup)
             node.states.pack_all(warm_up(setup))
+        self._page = _make_page(node)
         if self._until_s is not None:
             node.live.loop.end_at(nanoseconds(self._until_s), self._request_end)
         self._executor = SingleThreadedExecutor()
@@ -90,6 +97,8 @@ class NodeProcess:
         self._ending = True
         if self._reports is not None:
             self._reports.stop()
+        if self._page is not None:
+            self._page.close()
         if self._node is not None:
             self._node.live.stop()
         return 1 if self._crashed else 0
@@ -112,7 +121,7 @@ def _warn(warning: str) -> None:
 def _make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
     """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
     parameters = scenario.parameters
-    if parameters.viewer == "none":
+    if parameters.viewer in ("none", "workbench"):
         return None
     from ..rerun_view import RerunObserver
 
@@ -127,6 +136,20 @@ def _make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
         report=tell,
         on_error=tell,
     )
+
+
+def _make_page(node: RigidBodyNode) -> Workbench | None:
+    """The interactive page, where it is asked for."""
+    parameters = node.live.scenario.parameters
+    if parameters.viewer != "workbench":
+        return None
+    if importlib.util.find_spec("viser") is None:
+        raise InputError("viewer", is_missing("viser", "workbench"))
+    from ..workbench.main import Workbench
+
+    page = Workbench(node.live, _asked_for("workbench_port", parameters.workbench_port))
+    print(f"{node.get_name()}: the workbench is at {page.address}", file=sys.stderr)
+    return page
 
 
 def _asked_for(name: str, port: int) -> int | None:

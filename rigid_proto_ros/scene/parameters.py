@@ -313,8 +313,9 @@ class Parameters:
     record: str = text("", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty records nothing.")
     viewer: str = text(
         "none",
-        "Show the motion live in Rerun: in the browser, or in the native viewer.",
-        choices=("none", "web", "native"),
+        "Show the motion live: web in Rerun in the browser, native in Rerun's own window, workbench on the "
+        "interactive page.",
+        choices=("none", "web", "native", "workbench"),
         changes=READ_ONLY,
     )
     rerun_port: int = port(9876, "Port on which the live view is served, on this machine only.")

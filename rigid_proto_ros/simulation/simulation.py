@@ -161,7 +161,7 @@ class Simulation(Readings):
         self._notify([])
         self.observer.on(Reset())
         self.events.reset()
-        replaced = setup is not None and setup is not self.setup
+        before = self.setup
         self.setup = setup or self.setup
         try:
             check_in_flight(self.setup)
@@ -170,7 +170,8 @@ class Simulation(Readings):
             self.setup = replace(self.setup, in_flight=None)
         self._start_over()
         self.log("reset", {})
-        if replaced:
+        if self.setup is not before:
+            self._tell_of_mesh(before)
             self.announce()
 
     # The story
@@ -382,11 +383,14 @@ class Simulation(Readings):
         self._arrays.take(new)
         self._string.change(old, new, self.state)
         self.thrusters.change(new.wrench_timeout_ns, self.time_ns)
-        if new.surface is not old.surface and new.surface is not None:
-            surface = new.surface
-            mesh = MeshChanged(self.time_ns, surface.vertices, surface.triangles, str(new.geometry[0]))
-            self.observer.on(mesh)
+        self._tell_of_mesh(old)
         self.announce()
+
+    def _tell_of_mesh(self, before: Setup) -> None:
+        surface = self.setup.surface
+        if surface is not before.surface and surface is not None:
+            name = str(self.setup.geometry[0])
+            self.observer.on(MeshChanged(self.time_ns, surface.vertices, surface.triangles, name))
 
     # The beginning and a bad end
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import asyncio
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,39 +19,39 @@ from ..mass.tensor import six_from_tensor
 from ..mesh.reading import Mesh
 from ..scene.scenario import Scenario
 from .controls import Controls, parse_numbers
-from .node_control import NodeControl
-from .scene_loader import SceneLoader
-from .status import Announcements
+from .flight import Flight
 from .tensors import comparison, tensor_verdict
+from .upload import UploadFolder
 
 OWN_FILE = "(a file)"
 ANOTHER = "(another one)"
 
 
 class BodyTab:
-    """Everything about mass and shape. ``changed`` is called whenever the node's parameters have."""
+    """Everything about mass and shape. ``changed`` is called whenever the parameters have. fly(values) begins a scene
+    of these parameters, and says whether it was taken.
+    """
 
     def __init__(
         self,
         gui: viser.GuiApi,
         tabs: viser.GuiTabGroupHandle,
         controls: Controls,
-        scenes: SceneLoader,
-        node: NodeControl,
-        announcements: Announcements,
+        flight: Flight,
+        say: Callable[[str], None],
+        fly: Callable[[dict[str, object]], Any],
     ) -> None:
         self._gui = gui
         self._controls = controls
-        self._scenes = scenes
-        self._node = node
-        self._announcements = announcements
+        self._flight = flight
+        self._say = say
         self._base_scale = self._base_mass = 1.0
         self._judged_mesh: tuple[object, ...] = ()
         self._weights: dict[str, list[float]] = {}
         with tabs.add_tab("Body"):
-            self._mesh_folder()
             self._size_and_mass_folder()
             self._inertia_folder()
+            self._mesh_folder(fly)
             self._ballast_folder()
 
     @property
@@ -90,14 +90,14 @@ class BodyTab:
 
     # Mesh
 
-    def _mesh_folder(self) -> None:
+    def _mesh_folder(self, fly: Callable[[dict[str, object]], Any]) -> None:
         gui = self._gui
         with gui.add_folder("Mesh"):
             mesh = gui.add_dropdown(
                 "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="Bundled bodies (mesh)"
             )
             self._file = gui.add_markdown("")
-            self.upload_place = gui.add_folder("Upload", expand_by_default=True)
+            self.upload = UploadFolder(gui, self._flight, fly, self.show_verdict)
             self._verdict = gui.add_markdown("")
             self._controls.checkbox("mesh_repair", "Repair")
             self._controls.choice("mesh_fallback", "Fallback if open")
@@ -128,22 +128,17 @@ class BodyTab:
         scale = values["scale"]
         return float(math.prod(abs(s) for s in scale)) ** (1.0 / len(scale)) / self._base_scale
 
-    def _set_size(self, factor: float) -> dict[str, object] | None:
-        scenario = self._scenes.scenario
-        if scenario is None:
-            return None
-        scale = scenario.setup.body.scale
+    def _set_size(self, factor: float) -> dict[str, object]:
+        scale = self._flight.scenario.setup.body.scale
         present = float(np.prod(np.abs(scale))) ** (1.0 / 3.0)
         # The root's rounding would stand in what is shown and refused: 999999999999.9991 for 1e12.
         return {"scale": [float(f"{x:.14g}") for x in scale * (factor * self._base_scale / present)]}
 
     def _mass_factor(self, _: Mapping[str, Any]) -> float:
-        scenario = self._scenes.scenario
-        return _own_mass(scenario) / self._base_mass if scenario is not None and self._base_mass > 0.0 else 1.0
+        return _own_mass(self._flight.scenario) / self._base_mass if self._base_mass > 0.0 else 1.0
 
-    def _set_mass(self, factor: float) -> dict[str, object] | None:
-        scenario = self._scenes.scenario
-        return None if scenario is None else {_mass_parameter(scenario): factor * self._base_mass}
+    def _set_mass(self, factor: float) -> dict[str, object]:
+        return {_mass_parameter(self._flight.scenario): factor * self._base_mass}
 
     # Inertia
 
@@ -175,15 +170,14 @@ class BodyTab:
 
         @present.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            if self._scenes.scenario is not None:
-                inertia = self._scenes.scenario.setup.body.inertia
-                tensor.value = " ".join(f"{x:.9g}" for x in six_from_tensor(inertia))
+            inertia = self._flight.scenario.setup.body.inertia
+            tensor.value = " ".join(f"{x:.9g}" for x in six_from_tensor(inertia))
 
         @apply.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
             numbers = check()
-            if numbers is not None and self._scenes.scenario is not None:
-                self._node.set(_explicit(self._scenes.scenario, numbers))
+            if numbers is not None:
+                self._flight.set(_explicit(self._flight.scenario, numbers))
 
     # Ballast
 
@@ -208,11 +202,9 @@ class BodyTab:
             chosen = name.value if weight.value == ANOTHER else weight.value
             if numbers is None or not re.fullmatch(r"[a-z][a-z0-9_]*", chosen):
                 received = f"got {chosen[:40]!r}, {mass.value[:40]!r}, {place.value[:80]!r}"
-                self._announcements.say(
-                    f"Ballast: {received}; accepted: a name of small letters, a mass, three coordinates"
-                )
+                self._say(f"Ballast: {received}; accepted: a name of small letters, a mass, three coordinates")
             else:
-                self._node.set({f"ballast.{chosen}": numbers})
+                self._flight.set({f"ballast.{chosen}": numbers})
 
     def _ballast_changed(self, scenario: Scenario) -> None:
         weights = {name: list(value) for name, value in scenario.parameters.ballast.items()}

@@ -1,85 +1,93 @@
 # SPDX-License-Identifier: MIT
-"""The page's process: ``python -m rigid_proto_ros.workbench.main --node NAME --port PORT``, until SIGINT or SIGTERM."""
+"""The page of a body that flies in this process: served, shown and ended."""
 
 from __future__ import annotations
 
-import argparse
 import asyncio
-import sys
 import time
 import webbrowser
+from collections.abc import Callable
 
-from ..base.errors import InputError
-from ..live.shutdown import Shutdown
+from ..base.bundled import scene_names
+from ..live.live_simulation import LiveSimulation
+from ..live.warm_up import warm_up
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
+from ..scene.parameters import Parameters
+from ..scene.scenario import Scenario
+from ..session.recorded_session import RecordedSession
+from .page import Page
+from .server import make_server, stop_server
 
-PATIENCE_S = 10.0
-"""[s] For a node that is said to be running: discovery takes less than one of them."""
+TITLE = "rigid_proto workbench"
 
 LAST_MESSAGE_S = 0.2
 """[s] For the last message to reach the browsers."""
 
+ENDED = "the program has ended; this is the last state"
 
-def main(argv: list[str] | None = None) -> int:
-    """Serve the page; returns 0 after a signal, 2 when the input was refused (one line on stderr)."""
-    parser = argparse.ArgumentParser(prog="workbench page")
-    parser.add_argument("--node", default="/rigid_body")
-    parser.add_argument("--running", action="store_true", help="the node has to be running already")
-    parser.add_argument("--port", type=int, required=True)
-    parser.add_argument("--host", default=LOOPBACK)
-    parser.add_argument("--open", action="store_true")
-    parser.add_argument("--anew", action="store_true", help="start simulating when the first browser has connected")
-    parser.add_argument("--lesson", default="")
-    parser.add_argument("--link", default="")
-    args = parser.parse_args(argv)
-    try:
-        with Shutdown() as shutdown:
-            return serve(args, shutdown)
-    except InputError as error:
-        print(f"rigid_proto workbench: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+Gltf = Callable[[RecordedSession, float], bytes]
 
 
-def serve(args: argparse.Namespace, shutdown: Shutdown) -> int:
-    """Run the page until its end is asked for; open it in a browser where there is a display."""
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
+class Workbench:
+    """Serves the page of one body until ``close``. port: the one asked for, None for the first free one from the
+    default on. lesson, anew: as Page has them.
 
-    from .page import Page
-    from .ros_link import full_name
-    from .server import make_server, stop_server
+    Raises InputError naming ``--host`` or ``--port`` where nothing can listen there.
+    """
 
-    full_name(args.node)
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    address = f"http://{args.host}:{args.port}"
-    pages: list[Page] = []
+    def __init__(
+        self,
+        live: LiveSimulation,
+        port: int | None = None,
+        host: str = LOOPBACK,
+        lesson: str = "",
+        anew: bool = False,
+        gltf: Gltf | None = None,
+    ) -> None:
+        default = Parameters().workbench_port
+        name = "" if live.name == "rigid_body" else f" {live.name}"
+        self._server = make_server(f"{TITLE}{name}", host, port, default)
+        self.address = f"http://{host}:{self._server.get_port()}"
+        if port is None and self._server.get_port() != default:
+            # Another one runs already: its page and this one are to be told apart.
+            self._server.gui.set_panel_label(f"{TITLE}{name} :{self._server.get_port()}")
+        self.page = Page(self._server, live, lesson, anew, gltf)
+        self._running = asyncio.run_coroutine_threadsafe(self.page.run(), self._server.get_event_loop())
 
-    def on_link(link: str) -> None:
-        for page in pages:
-            page.deliver(page.follow_link, link)
-
-    server = make_server(args.host, args.port, on_link)
-    page = Page(server, args.node, address, args.lesson, args.anew)
-    pages.append(page)
-    running = asyncio.run_coroutine_threadsafe(page.run(), server.get_event_loop())
-    try:
-        if args.running:
-            page.link.wait_for_node(PATIENCE_S, lambda: shutdown.requested)
-        if args.link:
-            page.deliver(page.follow_link, args.link)
-        print(f"The workbench is at {address}   (Ctrl-C ends it)", flush=True)
-        if args.open and has_display():
-            webbrowser.open(address)
-        shutdown.wait()
-    finally:
-        running.cancel()
-        page.deliver(page.show_ended)
+    def close(self) -> None:
+        """Say so on the pages, and end them."""
+        self._running.cancel()
+        self.page.deliver(self.page.bar.show, self.page.state.time_ns * 1e-9, ENDED)
+        self.page.deliver(self._server.flush)
         time.sleep(LAST_MESSAGE_S)
-        stop_server(server)
-        page.close()
-    return 0
+        stop_server(self._server)
+        self.page.close()
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def serve(
+    scenario: Scenario,
+    scene: str,
+    port: int | None,
+    host: str,
+    opens: bool,
+    wait: Callable[[], None],
+    gltf: Gltf | None = None,
+) -> None:
+    """Fly a scenario with its page until ``wait`` returns. scene: its name; one of a lesson begins with its question.
+
+    Raises InputError as Workbench does.
+    """
+    live = LiveSimulation(scenario)
+    lesson = scene if scene in scene_names() else ""
+    workbench = Workbench(live, port, host, lesson, True, gltf)
+    try:
+        print(f"The workbench is at {workbench.address}   (Ctrl-C ends it)", flush=True)
+        if opens and has_display():
+            webbrowser.open(workbench.address)
+        live.announce()
+        workbench.page.flight.prepare(lambda: warm_up(scenario.setup), live.start)
+        wait()
+    finally:
+        workbench.close()
+        live.stop()

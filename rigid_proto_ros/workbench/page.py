@@ -1,138 +1,186 @@
 # SPDX-License-Identifier: MIT
 """The page: what all browsers show, and what they do to the body.
 
-Everything here runs on viser's event loop, so nothing needs a lock. While no browser is connected the loop sleeps and
-the link to ROS hears nothing. The page makes its parts, hands each what it needs, and draws what they know.
+Everything here runs on viser's event loop, so nothing needs a lock but the queue that the physics thread fills. While
+no browser is connected the page isn't told anything.
 """
 
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
+from collections import deque
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import viser
 
-from ..base.errors import InputError
+from ..live.live_simulation import LiveSimulation
 from ..motion.state import State
+from ..picture import style
+from ..picture.picture import Picture
 from ..scene.scenario import Scenario
+from ..session.recorded_session import RecordedSession
+from ..simulation.observer import (
+    BodyChanged,
+    Event,
+    GhostChanged,
+    GhostPublished,
+    LoadBegan,
+    LoadEnded,
+    MeshChanged,
+    Observer,
+    Published,
+    Refused,
+    Reset,
+    SceneChanged,
+    ShownLoad,
+    Started,
+    StatusChanged,
+    StringChanged,
+)
+from ..simulation.simulation import Simulation
 from .body_tab import BodyTab
 from .controls import Controls
-from .drawn_poses import DrawnPose, DrawnPoses
-from .follower import NodeFollower
-from .history import History
-from .keys import Keyboard, add_keys
-from .lesson_folder import LessonFolder
-from .node_control import NodeControl
-from .panel import Panel
-from .past_view import PastView
-from .pointer import Pointer, Tools, suggested_force
-from .readout_panel import ReadoutPanel
-from .rewind import core_row
-from .ros_link import RosLink
-from .scene_loader import SceneLoader
-from .scene_view import SceneView
+from .drawing import ViserBackend
+from .flight import Flight
+from .lesson_course import Course
+from .lesson_panel import LessonPanel
+from .page_style import ClassMode
+from .physics_tab import PhysicsTab
+from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
+from .readouts import Readings, ReadoutTab
+from .room import Room
 from .session_tab import SessionTab
-from .show_tab import ShowTab
-from .side_by_side import SideBySide, names
-from .situation import SituationControl
-from .status import ENDED, Announcements, Status
-from .upload_button import UploadButton
+from .show_tab import AT_FIRST, CENTRE_OF_MASS, PARTS, ShowTab
+from .status import Announcements, motion_words
+from .time_bar import TimeBar, add_keys
 
 FRAME_S = 0.02
-"""[s] Between two looks at what the node has said."""
+"""[s] Between two looks at what the simulation has told."""
 
 GRACE_S = 2.0
-"""[s] After the last browser left: a page that is loaded anew finds its history."""
+"""[s] After the last browser left: a page that is loaded anew finds what it showed."""
 
-COMPARED = "true_or_box_tensor"
-"""The lesson that shows a body and its ghost."""
+SEEN_NS = 800_000_000
+"""[ns, of a body that flies in real time] A poke is over before a page has drawn it twice; its arrow stays so long."""
+
+TRAIL_NS = 4_000_000_000
+"""[ns] Of the past that is drawn with a moment of it."""
+
+FORESEEN_S = {True: 3.0, False: 1.2}
+"""[s] Of the motion, that the picture makes room for: of a body on a string, or of one that falls."""
+
+COM_SIZE = 0.025
+"""Radius of the centre of mass as drawn, in body sizes."""
+
+AT_COM, AWAY = 0.03, 0.2
+"""Body sizes from the COM at which a force's line passes: through it, and clear of it."""
+
+DESCRIBED = (style.INERTIA_BOX, style.INERTIA_ELLIPSOID)
+"""Parts that are said only when the body changes, so always, whether they are switched on or not."""
+
+CONTACTS = f"{style.BODY}/contacts"
+
+
+class Told(Observer):
+    """Takes what the physics thread tells, for the page's thread."""
+
+    takes = frozenset(
+        {
+            *(Started, MeshChanged, BodyChanged, GhostChanged, SceneChanged, Reset, Published, GhostPublished),
+            *(LoadBegan, LoadEnded, StringChanged, Refused, StatusChanged),
+        }
+    )
+
+    def __init__(self) -> None:
+        self._queue: deque[Event] = deque()
+
+    def on(self, event: Event) -> None:
+        """Keep it; rows of states are the teller's own."""
+        if isinstance(event, (Published, GhostPublished)):
+            event = event._replace(row=event.row.copy())
+        if type(event) in self.takes:
+            self._queue.append(event)
+
+    def take(self) -> list[Event]:
+        """All that was told since the last call, in order."""
+        return [self._queue.popleft() for _ in range(len(self._queue))]
 
 
 class Page:
-    """Follows one node.
-
-    address: of this page. lesson: name of the bundled scene that it was started with, or empty. anew: the flight begins
-    anew when the first browser is there to see it.
+    """live: what flies. lesson: name of the bundled scene that it flies, or empty. anew: it begins anew when the first
+    browser is there to see it. gltf: as SessionTab has it.
     """
 
     def __init__(
-        self, server: viser.ViserServer, target: str, address: str, lesson: str = "", anew: bool = False
+        self,
+        server: viser.ViserServer,
+        live: LiveSimulation,
+        lesson: str = "",
+        anew: bool = False,
+        gltf: Callable[[RecordedSession, float], bytes] | None = None,
     ) -> None:
+        self._gltf = gltf
+        self._begins_anew = anew
         self.server = server
         self.loop = server.get_event_loop()
-        self._begin_anew = anew
+        self.live = live
         self.announcements = Announcements(server)
-        # The node, and what is known of it.
-        self.link = RosLink(target, self.deliver, self._on_scene, self._on_diagnostics)
-        self._status_of = Status(self.link.target)
-        self.node = NodeControl(self.link, lambda text: self.announcements.say(text), self._refused)
-        self.scenes = SceneLoader(self.loop, self._on_loaded, self._unshown)
-        self.history = History(target.strip("/"), lambda: self._upload.attachments())
-        self.follower = NodeFollower(
-            self.link.target, self.scenes, self.history, self.announcements, self._on_event, self._on_begin
-        )
+        self.flight = Flight(live, self.announcements.say, self.announcements.busy)
+        live.add_observer(self.flight.memory)
+        self._told = Told()
+        self._listening = False
         # The picture, and the hand in it.
-        self.view = SceneView(server)
-        self._com: Any = None
-        self.drawn_poses = DrawnPoses()
-        self.tools = Tools()
-        self.pointer = Pointer(self.node.hand, self.scenes, self.drawn_poses, self.tools)
-        # The past, and other beginnings.
-        self.past_view = PastView(self.node, self.history, self.scenes)
-        self.situations = SituationControl(
-            self.node, self.history, self.past_view, self.announcements, self.pointer.let_go
-        )
-        self._make_panel(address)
-        self.lessons.show_lesson_named(lesson)
-        keyboard = Keyboard(self.node, self.past_view, self.situations, self.view, self.announcements)
-        add_keys(server.gui, keyboard)
+        self.room = Room(server)
+        shown = {part for name in AT_FIRST for part in PARTS[name]} | {style.BODY_MESH, CONTACTS}
+        self.backend = ViserBackend(server.scene, shown, lambda node: self.pointer.attach(node))
+        self.picture = Picture(self.backend, lambda name: name in DESCRIBED or self.backend.wanted(name))
+        self._com = server.scene.add_icosphere(f"/{style.CENTRE}/com", COM_SIZE, (30, 30, 30), visible=False)
+        self.poses, self.tools = DrawnPoses(), Tools()
+        self.pointer = Pointer(self.flight, self.poses, self.tools)
+        self.pointer.attach_com(self._com)
+        # What is known of the motion.
+        self.state = live.state
+        self._scenario = live.scenario
+        self._tracks: dict[str, str] = {}
+        self._loads: dict[int, tuple[int, ShownLoad]] = {}
+        self._ghost_row: np.ndarray | None = None
+        self._drawn_moment_ns: int | None = None
+        self._new_scene = True
+        self._scenes_seen = 0
+        self._unit = self.backend.unit
+        self.readings = Readings()
+        self._make_panel()
         self._open = asyncio.Event()
         self._slow_due_s = 0.0
+        if lesson:
+            self.lessons.name(lesson)
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
 
-    def _make_panel(self, address: str) -> None:
-        gui, announcements = self.server.gui, self.announcements
-        self._controls = Controls(gui, self.node.set, lambda text: self.announcements.say(text))
-        self._readouts = ReadoutPanel(self.server)
-        self._status = gui.add_markdown("")
-        self.side_by_side = SideBySide(gui, lambda: self.lessons.fly_lesson(COMPARED))
+    def _make_panel(self) -> None:
+        gui, flight, say = self.server.gui, self.flight, self.announcements.say
+        self.controls = Controls(gui, flight.set, say)
+        self.bar = TimeBar(gui, self.controls, flight)
         tabs = gui.add_tab_group()
-        self._panel = Panel(
-            gui, tabs, self._controls, self.tools, self.node, self.past_view, self.situations, announcements
-        )
-        self.body_tab = BodyTab(gui, tabs, self._controls, self.scenes, self.node, announcements)
-        self.session_tab = SessionTab(
+        self.lessons = LessonPanel(gui, tabs, flight, self.readings, self._on_lesson)
+        self.body_tab = BodyTab(gui, tabs, self.controls, flight, say, self._fly)
+        self.physics_tab = PhysicsTab(gui, tabs, self.controls, self.tools, flight, say)
+        self.readout_tab = ReadoutTab(gui, tabs, self.readings)
+        self.session_tab = SessionTab(gui, tabs, flight, say, self._gltf)
+        self.show_tab = ShowTab(
             gui,
             tabs,
-            address,
-            self.history,
-            self.past_view,
-            self.situations,
-            announcements,
-            lambda scene, script: self.lessons.fly(scene, script),
+            self._switch,
+            self.backend.see_into,
+            self.room.paint,
+            ClassMode(self.server).switch,
+            self._centre,
+            lambda name: self.lessons.did(f"show {name}"),
         )
-        show_tab = ShowTab(gui, tabs, self.view, announcements, lambda name: self.lessons.did(f"show {name}"))
-        self.lessons = LessonFolder(
-            gui,
-            self._panel.play_tab,
-            self.scenes,
-            self.situations,
-            announcements,
-            show_tab.show,
-            self.view.body.label_contacts,
-        )
-        self._upload = UploadButton(
-            self.server,
-            self.body_tab.upload_place,
-            self.scenes,
-            self.situations,
-            announcements,
-            self.body_tab.show_verdict,
-        )
+        add_keys(gui, self.bar, flight, self._centre, say)
 
     def deliver(self, function: Callable[..., object], *arguments: object) -> None:
         """Run a function on the page's thread soon; from any thread."""
@@ -142,180 +190,300 @@ class Page:
             pass  # the loop has ended
 
     async def run(self) -> None:
-        """Follow the node for as long as the server runs."""
-        try:
-            while True:
-                await self._open.wait()
-                started = time.monotonic()
-                self.tick(started)
-                await asyncio.sleep(max(0.002, started + FRAME_S - time.monotonic()))
-        except asyncio.CancelledError:
-            self._open.clear()  # the browsers that go now are no reason to do anything: close is
-            raise
+        """Draw for as long as the server runs."""
+        while True:
+            await self._open.wait()
+            started = time.monotonic()
+            self.tick(started)
+            await asyncio.sleep(max(0.002, started + FRAME_S - time.monotonic()))
 
     def close(self) -> None:
-        """Leave ROS, the node as it was before the past was shown, and nothing on the disk."""
-        self.past_view.close()
-        self.link.close()
-        self._upload.close()
-
-    def show_ended(self) -> None:
-        """What stands on the page when its server ends: browsers show what was sent last for as long as
-        they are open.
-        """
-        self._status.content = ENDED
-        self.server.flush()
-
-    def follow_link(self, link: str) -> None:
-        """Take the node where a link leads, once a page is open."""
-        self._begin_anew = False
-
-        async def following() -> None:
-            await self.scenes.known()  # before that nobody would see a refusal
-            await self.session_tab.open_link(link)
-
-        self._following = self.loop.create_task(following())
+        """Leave nothing on the disk."""
+        self.flight.close()
+        self.body_tab.upload.uploads.close()
 
     # Browsers come and go
 
     async def _on_connect(self, _: viser.ClientHandle) -> None:
-        if not self._open.is_set():
-            self._status_of.received(time.monotonic())  # it has time to be heard
-            self.link.listen()
+        if not self._listening:
+            self._listening = True
+            self._new_scene = True
+            await asyncio.to_thread(self.live.add_observer, self._told)
             self._open.set()
+            if self._begins_anew:
+                self._begins_anew = False
+                await self._begin()
+            else:
+                self.lessons.show()
+
+    async def _begin(self) -> None:
+        """The first browser is there to see it."""
+        if self.lessons.lesson is not None:
+            await self.lessons.begin()
+        else:
+            self.flight.reset()
 
     async def _on_disconnect(self, client: viser.ClientHandle) -> None:
         self.pointer.left(client.client_id)
         await asyncio.sleep(GRACE_S)
-        if not self.server.get_clients() and self._open.is_set():
+        if not self.server.get_clients() and self._listening:
+            self._listening = False
             self._open.clear()
-            self.pointer.let_go()
-            self.past_view.resume()
-            self.link.stop_listening()
-            # What happens from now on isn't heard: the memory of the flight ends here.
-            self.follower.forget()
-            self.history.forget()
-            self.drawn_poses.forget()
-            self.view.trails.forget()
-            self._readouts.restart()
-            self.scenes.forget()
+            self.flight.look_at_present()
+            await asyncio.to_thread(self.live.remove_observer, self._told)
 
-    # What the node says
-
-    def _on_scene(self, text: str) -> None:
-        self.history.scene(text)
-        self.scenes.load(text)
-
-    def _unshown(self, error: InputError) -> None:
-        self.announcements.say(f"The node's scene can't be shown: {error}")
-
-    def _on_loaded(self, old: Scenario | None, scenario: Scenario) -> None:
-        another = self.situations.another_body
-        if self.view.set_body(scenario, zoom=another):
-            self.drawn_poses.forget()
-            self.pointer.attach(self.view.body.mesh)
-            another = True
-        if self.view.body.com is not self._com:
-            self._com = self.view.body.com
-            self.pointer.attach_com(self._com)
-        if old is not None:
-            self.follower.changed(old, scenario)
-            self.lessons.changed(old, scenario)
-        self.body_tab.changed(scenario, another)
-        self._upload.flies(str(scenario.parameters.mesh))
-        self._controls.update(scenario.parameters.named())
-        self.situations.another_body = False
-        if another:
-            self.tools.usual_force = self.tools.force = suggested_force(scenario, 2.0 * self.view.radius)
-            self._panel.show_force()
-        if self._begin_anew:
-            self._begin_anew = False
-            self.past_view.reset()
-
-    def _on_diagnostics(self, values: dict[str, str]) -> None:
-        self.node.diagnostics = values
-        self._status_of.report(values, time.monotonic())
-        self._set_paused(values.get("state") == "paused")
-
-    def _set_paused(self, paused: bool) -> None:
-        self._panel.show_state(paused)
-        self.node.on_paused(paused)
-
-    def _refused(self, reason: str) -> None:
-        self.announcements.say(f"Refused: {reason}")
-        self._controls.show_again()
-
-    def _on_event(self, kind: str, content: Any) -> None:
-        if kind == "reset":
-            self.node.hand.forget()
-            self.view.trails.forget()
-            if self.past_view.moment_ns is None:
-                self.view.origin = np.zeros(3)
-        elif kind == "pause":
-            self._set_paused(bool(content.get("data")))
-        elif kind.startswith("string_"):
-            self.pointer.string_event(kind, content)
-        self.lessons.acted(kind)
-
-    def _on_begin(self) -> None:
-        self.side_by_side.restart()
-        self._readouts.restart()
-
-    # Every frame
+    # What the simulation tells
 
     def tick(self, now_s: float) -> None:
-        """Take what the node has said and draw it."""
-        received = self.link.take()
-        self.follower.receive(received.states, received.events)
-        for time_ns, row in received.states:
-            self.view.trails.add(time_ns, row)
-        if received.states:
-            self._status_of.received(now_s)
-        if self.scenes.scenario is not None:
-            self.follower.follow(self.scenes.scenario, now_s)
-            if self.follower.state is not None:
-                self.lessons.watched([time_ns for time_ns, _ in received.states])
-                self._draw(now_s, self.scenes.scenario, self.follower.state)
+        """Take what the simulation has told, and draw it."""
+        looking = self.flight.moment_ns is not None
+        with self.server.atomic():
+            if looking:
+                self._told.take()
+                self._draw_past()
+            else:
+                if self._drawn_moment_ns is not None:
+                    self._return_to_present()
+                self._take()
+            self.backend.finish(now_s)
+        self.poses.add(
+            DrawnPose(
+                now_s, self.state.position, self.state.orientation_xyzw, self.backend.origin.copy(), self.backend.unit
+            )
+        )
         self.pointer.hold()
+        self.lessons.draw(now_s)
+        self.readout_tab.draw(now_s, self._scales())
+        words = self.announcements.text or ("the past" if looking else self._words())
+        self.bar.show(self.state.time_ns * 1e-9, words)
         if now_s >= self._slow_due_s:
             self._slow_due_s = now_s + 1.0
-            self._every_second(now_s)
+            self.announcements.lost(self.live.loop.timekeeping.real_time_lost_s)
+            if self.live.loop.simulation.failure:
+                self.announcements.trouble(self.live.loop.simulation.failure)
+        self.session_tab.draw()
 
-    def _draw(self, now_s: float, scenario: Scenario, present: State) -> None:
-        state, setup, view, acting = self._shown_state(present), scenario.setup, self.view, self.follower.acting
-        looking_at = self.past_view.moment_ns
-        looking = looking_at is not None
-        left = self.history.ghost is not None
-        ghost, com = self.follower.ghost_row(scenario, looking_at)
-        view.follow(state.position, held=self.pointer.dragging)
-        with self.server.atomic():
-            view.place(state.row, now_s)
-            view.place_surroundings(bool(np.any(setup.gravity)))
-            view.body.look_again(now_s)
-            view.draw_trails(now_s, state.time_ns, scenario)
-            ends = None if looking else acting.string_ends(setup, state)
-            view.show_string(ends, acting.slack_length, setup.gravity)
-            view.show_loads([] if looking else acting.arrows(setup, state, 2.0 * view.radius))
-            view.show_hit(None if looking else acting.hit(setup, state))
-            momentum, spin = state.angular_momentum(setup.body.inertia), state.angular_velocity
-            scales = view.show_motion(state.position, momentum, spin)
-            view.show_ghost(ghost, com, names(scenario, left))
-            began_ns = None if left else self.follower.ghost.began_ns
-            self.side_by_side.show(now_s, scenario, state, ghost, began_ns)
-        self.drawn_poses.add(DrawnPose(now_s, state.position, state.orientation_xyzw, view.origin.copy(), view.unit))
-        stretched = 0.0 if looking else acting.string_energy(setup, state)
-        self._readouts.show(now_s, scenario, state, stretched, scales, self.side_by_side.angle)
+    def _words(self) -> str:
+        tracks = {**self._tracks, "motion": "paused"} if self.live.paused else self._tracks
+        return motion_words(self._scenario, tracks, len(self._loads))
 
-    def _shown_state(self, present: State) -> State:
-        moment_ns = self.past_view.moment_ns
-        if moment_ns is not None:
-            row = self.history.row(moment_ns)
-            if row is not None:
-                return State(self.history.simulated_ns(moment_ns), core_row(row))
-        return present
+    def _take(self) -> None:
+        times: list[int] = []
+        rows: list[np.ndarray] = []
+        for event in self._told.take():
+            if isinstance(event, Published):
+                times.append(event.time_ns)
+                rows.append(event.row)
+            elif isinstance(event, GhostPublished):
+                self._ghost_row = event.row
+            else:
+                self._draw(times, rows)
+                times, rows = [], []
+                self._on(event)
+        self._draw(times, rows)
 
-    def _every_second(self, now_s: float) -> None:
-        self.session_tab.every_second()
-        status = self._status_of.text(now_s, self.announcements.activity)
-        if self._status.content != status:
-            self._status.content = status
+    def _on(self, event: Event) -> None:
+        match event:
+            case Started(vertices=vertices, triangles=triangles) | MeshChanged(vertices=vertices, triangles=triangles):
+                self.picture.set_mesh(event.time_ns, vertices, triangles)
+                self.poses.forget()
+                self._new_scene = True
+            case BodyChanged(time_ns, body):
+                self.backend.is_new |= self._new_scene
+                self.picture.set_body(time_ns, body)
+                self.backend.is_new = False
+                self._body_changed()
+            case GhostChanged(time_ns, body):
+                self.picture.set_ghost(time_ns, body if self.live.scenario.ghost is not None else None)
+                self._ghost_row = None
+            case SceneChanged():
+                self._scene_changed()
+            case Reset():
+                self._reset()
+            case LoadBegan(time_ns, load_id, load):
+                self._load_began(time_ns, load_id, load)
+            case LoadEnded(time_ns, load_id):
+                self._load_ended(time_ns, load_id)
+            case StringChanged(time_ns, string):
+                self.picture.set_string(time_ns, string)
+                if string is not None and self.pointer.dragging:
+                    self.lessons.did("drag")
+            case Refused(message=message):
+                self.announcements.say(f"Refused: {message}")
+                self.controls.show_again()
+            case StatusChanged(_, track, value):
+                self._tracks[track] = value
+
+    def _body_changed(self) -> None:
+        unit = self.backend.unit
+        scenario = self.live.scenario
+        if self._new_scene:
+            self._new_scene = False
+            self._furnish(scenario)
+            size = self.picture.shape.size if self.picture.shape else 1.0
+            self.tools.usual_force = self.tools.force = suggested_force(scenario, size)
+            self.physics_tab.show_force()
+        elif unit != self._unit:
+            self._furnish(scenario)
+        self._unit = self.backend.unit
+
+    def _load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
+        self.picture.load_began(time_ns, load_id, load)
+        if load.kind != "impulse":
+            self._loads[load_id] = (time_ns, load)
+        if load.kind in ("poke", "impulse"):
+            self._poked(load)
+
+    def _poked(self, load: ShownLoad) -> None:
+        size = self.picture.shape.size if self.picture.shape else 1.0
+        force = load.force
+        if load.axes == "world":
+            force = self.state.rotation.T @ force
+        strength = float(np.linalg.norm(force))
+        self.lessons.did("poke")
+        if strength > 0.0:
+            lever = float(np.linalg.norm(np.cross(load.point, force))) / strength / size
+            self.lessons.did("poke com" if lever < AT_COM else "poke away" if lever > AWAY else "poke between")
+
+    def _load_ended(self, time_ns: int, load_id: int) -> None:
+        began = self._loads.pop(load_id, None)
+        if began is not None and began[1].kind == "poke":
+            factor = float(self._scenario.parameters.real_time_factor) or 1.0
+            time_ns = max(time_ns, began[0] + round(SEEN_NS * factor))
+        self.picture.load_ended(time_ns, load_id)
+
+    def _scene_changed(self) -> None:
+        before, self._scenario = self._scenario, self.live.scenario
+        self.lessons.changed(before, self._scenario)
+        self.controls.update(self._scenario.parameters.named())
+        self.body_tab.changed(self._scenario, self._new_scene)
+
+    def _reset(self) -> None:
+        self._new_scene |= self.flight.scenes_begun != self._scenes_seen
+        self._scenes_seen = self.flight.scenes_begun
+        self.picture.restart()
+        self.backend.forget()
+        self.poses.forget()
+        self.readings.restart()
+        self._loads.clear()
+        self._tracks.clear()
+        self._centre()
+        self.lessons.did("reset")
+
+    # Drawing
+
+    def _draw(self, times: list[int], rows: list[np.ndarray]) -> None:
+        if not times:
+            return
+        last = rows[-1]
+        self.state = State(times[-1], last)
+        self._follow(last[0:3])
+        picture = self.picture
+        picture.draw(np.array(times), np.array(rows))
+        ghost = self.flight.left_row(times[-1])
+        if ghost is None:
+            ghost = self._ghost_row if self.live.scenario.ghost is not None else None
+        elif picture.ghost is None and picture.body is not None:
+            picture.set_ghost(times[-1], picture.body)
+        if ghost is not None and picture.ghost is not None:
+            picture.draw_ghost(np.array(times[-1:]), ghost[np.newaxis])
+        elif picture.ghost is not None and self.flight.left is not None:
+            picture.set_ghost(times[-1], None)
+        for time_ns, row in zip(times[:-1], rows[:-1], strict=True):
+            if self.readings.is_due(time_ns):
+                self._read(State(time_ns, row), None)
+        self._read(self.state, ghost)
+        self.lessons.watched(times)
+
+    def _read(self, state: State, ghost: np.ndarray | None) -> None:
+        string = self.live.loop.simulation.string
+        held = 0.0 if string is None else string.potential_energy(self._scenario.setup.body, state)
+        self.readings.take(self._scenario, state, held, ghost)
+
+    def _draw_past(self) -> None:
+        moment_ns = self.flight.moment_ns
+        if moment_ns == self._drawn_moment_ns or moment_ns is None:
+            return
+        self._drawn_moment_ns = moment_ns
+        times, rows = self.flight.past_rows(TRAIL_NS)
+        self.picture.restart()
+        self.backend.forget()
+        self.state = State(moment_ns, rows[-1])
+        self._follow(rows[-1][0:3])
+        self.picture.draw(times, rows)
+        self.readings.take(self._scenario, self.state, 0.0, None)
+
+    def _return_to_present(self) -> None:
+        self._drawn_moment_ns = None
+        self.picture.restart()
+        self.backend.forget()
+        self._loads.clear()
+        threading.Thread(target=self._introduce, daemon=True).start()
+
+    def _introduce(self) -> None:
+        def introduce() -> None:
+            self.live.loop.simulation.introduce(self._told)
+            state = self.live.loop.simulation.state
+            self._told.on(Published(state.time_ns, state.row))
+
+        self.live.call(introduce)
+
+    def _follow(self, position: np.ndarray) -> None:
+        if not self.pointer.dragging:
+            self.backend.origin = self.room.follow(position, self.backend.origin, self.backend.unit)
+        self.room.place(self.backend.origin, self.backend.unit)
+
+    def _centre(self) -> None:
+        self.backend.origin = np.array(self.live.loop.simulation.state.position)
+
+    def _furnish(self, scenario: Scenario) -> None:
+        """Make room for what is going to be seen, and look at it."""
+        shape = self.picture.shape
+        size = shape.size if shape is not None else 1.0
+        setup = scenario.setup
+        start = setup.initial[0:3]
+        points = [start]
+        falls, held = bool(setup.gravity.any()), setup.string.attached
+        if falls or held:
+            trial = Simulation(setup)
+            for k in range(1, 41):
+                points.append(trial.advance(round(FORESEEN_S[held] * 1e9 * k / 40)).position)
+        places = np.array(points)
+        low, high = places.min(axis=0) - 0.5 * size, places.max(axis=0) + 0.5 * size
+        if held:
+            low, high = np.minimum(low, setup.string.target), np.maximum(high, setup.string.target)
+        self.backend.origin = np.array(start)
+        unit = self.backend.unit
+        self.room.furnish(unit, (low - start) / unit, (high - start) / unit, falls and not held)
+
+    def _scales(self) -> dict[str, str]:
+        cell = self.room.cell * self.backend.unit
+        rows = {"a square of the floor": f"{cell:.3g} m"}
+        for symbol, unit in (("L", style.MOMENTUM_UNIT), ("ω", style.OMEGA_UNIT)):
+            value = self.picture.scales.per_metre(symbol) * cell
+            if value > 0.0:
+                rows[f"arrow of {symbol} as long"] = f"{value:.3g} {unit}"
+        return rows
+
+    # What the panel asks for
+
+    def _switch(self, part: str, shown: bool) -> None:
+        if part == CENTRE_OF_MASS:
+            self._com.visible = shown
+        else:
+            self.backend.switch(part, shown)
+
+    async def _fly(self, values: dict[str, object]) -> bool:
+        taken = await self.flight.fly(values)
+        if taken:
+            self.lessons.leave()
+        return taken
+
+    def _on_lesson(self, course: Course) -> None:
+        self.show_tab.show_for(course.shows)
+        contacts = self.live.scenario.setup.contacts
+        body = self.live.scenario.setup.body
+        named = [name for name in course.labels if name in contacts]
+        self.backend.labelled = {CONTACTS, *course.labels}
+        points = np.array([body.point(contacts[name]) for name in named]).reshape(-1, 3)
+        self.backend.labels(CONTACTS, np.array([len(named)]), points, named)

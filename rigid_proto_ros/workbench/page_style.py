@@ -15,6 +15,12 @@ from __future__ import annotations
 
 import viser
 
+MARK = "rp-bar"
+"""Class of the time bar's line, by which the bar is known."""
+
+ANSWERS = "rp-answers"
+"""Class of the room for answers on a printed lesson."""
+
 NARROW = "36em"
 """Pages up to this width get viser's sheet at the bottom (its theme's breakpoint ``xs``)."""
 
@@ -31,28 +37,29 @@ PANEL_PIXELS = 380
 """Width of the panel beside the picture, until a user drags its edge."""
 
 _SHEET = '.mantine-Paper-root[style*="position: fixed"][style*="max-height: 60%"]'
-_READOUTS = '[aria-label$=" panel Readouts"]'
 _PICTURE = 'div[style*="flex-grow: 1"][style*="height: 100%"]:has(canvas)'
 
 # Of any width: dragging its edge changes that, and so does viser on a window that was a telephone's.
 _DOCK = '[style*="position: absolute; top: 0px; bottom: 0px; right: 0px; width: "]'
 _DOCKED_ROW = f'{_DOCK} [style*="flex-direction: row; position: relative; width: "]'
 _DOCKED_PICTURE = '[style*="position: absolute; inset: 0px "]:has(canvas)'
-_DOCKED_COLUMN = f'{_DOCK} [style*="flex-direction: column"][style*="overflow: hidden auto"]'
 
 _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
 _SCROLLED = ".mantine-ScrollArea-viewport"
 
+_BAR = f".mantine-Paper-root:has(> .mantine-Collapse-root .{MARK})"
+
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
+.mantine-Notification-root:has(.tabler-icon-check) {{ display: none; }}
 .mantine-Notification-description {{ white-space: pre-line; }}
+.{MARK} {{ padding: 0 0.6em; font-size: 0.95em; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }}
+.{MARK} b {{ font-size: 1.35em; font-weight: 500; font-variant-numeric: tabular-nums; display: inline-block; min-width:
+4.6em; }} .{MARK} span {{ opacity: 0.7; }} {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-
+color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
   {_SHEET} [style*="width: 20em"] {{ width: 100% !important; }}
-  {_SHEET} :has(> * > .mantine-Tabs-root > {_READOUTS}):not([style*="display: none"]) {{
-    display: flex !important; flex-direction: column;
-  }}
-  {_SHEET} :has(> .mantine-Tabs-root > {_READOUTS}) {{ order: -1; }}
   {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
 }}
 @media {MEDIUM} {{ {_DOCKED_ROW} {{ width: 100% !important; }} }}
@@ -63,18 +70,37 @@ STYLE = f"""<style>
 @media {MEDIUM} and (orientation: portrait) {{
   {_DOCK} {{ width: 100% !important; top: {PICTURE_SHARE}% !important; }}
   {_DOCKED_PICTURE} {{ inset: 0 0 {100 - PICTURE_SHARE}% 0 !important; }}
-  {_DOCKED_COLUMN} {{ flex-direction: row !important; }}
 }}
 @media print {{
   html, body, #root, div:has({_SCROLLED}), div:has({_CANVAS}), .mantine-ScrollArea-root, {_SCROLLED} {{
     position: static !important; overflow: visible !important; flex: none !important;
     height: auto !important; min-height: auto !important; max-height: none !important;
   }}
-  .mantine-Notifications-root {{ display: none; }}
+  .mantine-Notifications-root, {_BAR} {{ display: none; }}
+  .{ANSWERS} {{ display: block; height: 12em;
+    background: repeating-linear-gradient(transparent 0 1.9em, #999 1.9em calc(1.9em + 1px)); }}
 }}
+</style>"""
+
+CLASS_STYLE = f"""<style>
+:root {{ --mantine-scale: 1.25; }}
+.mantine-Tabs-list, [role="tablist"], .mantine-Paper-root:has(> .mantine-Collapse-root .{MARK}) .mantine-Select-root
+  {{ display: none !important; }}
+.{MARK} b {{ font-size: 1.7em; }}
 </style>"""
 
 
 def lay_out(server: viser.ViserServer) -> None:
     """Give all pages the style sheet."""
     server.gui.add_html(STYLE, order=-10.0)
+
+
+class ClassMode:
+    """Large letters, and nothing but picture, lesson and three buttons."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._sheet = server.gui.add_html("", order=-9.0)
+
+    def switch(self, on: bool) -> None:
+        """On or off."""
+        self._sheet.content = CLASS_STYLE if on else ""

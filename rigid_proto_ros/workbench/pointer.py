@@ -1,32 +1,41 @@
 # SPDX-License-Identifier: MIT
-"""Mouse, trackpad and touch on the body: a drag pulls on a string, a click pokes, a shift-click pushes."""
+"""Mouse, trackpad and touch on the body: a drag pulls on a string, a click pokes, a shift-click pushes.
+
+What a user points at is what a browser drew, some moments before the message came here: so poses are remembered.
+"""
 
 from __future__ import annotations
 
-import asyncio
 import time
-from collections.abc import Iterable, Mapping
+from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import viser
 
-from ..scene.command_codec import MESH_FRAME, ScriptCommand
+from ..base.rotation import matrix_from_quaternion
+from ..motion.body import Body
+from ..motion.surface import Surface
 from ..scene.scenario import Scenario
-from .drawn_poses import DrawnPose, DrawnPoses
-from .hand_commands import HandCommands
-from .scene_loader import SceneLoader
+from .flight import Entry, Flight
+
+KEPT_S = 1.0
+"""Drawn poses are remembered for this long: a page further behind isn't usable."""
+
+USUAL_DELAY_S = 0.06
+"""From a pose sent to a pointer message that saw it: a window of 1/60 s each way, a frame, and the way itself."""
+
+SEARCHED_TRIANGLES = 1_000_000
+"""Times poses: more distances to a surface than this would be felt as a delay."""
+
+ON_SURFACE = 1e-4
+"""Of the body's size: a browser counts in single precision, and gives this much away with room to spare."""
 
 HOLD_S = 0.2
 """A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that
 is short.
-"""
-
-SAME_TICK_S = 0.012
-"""[s] Between the last target and the release. The node takes messages at least every 10 ms, and those that it takes
-together act by kind: the release would act first, and the target would tie the string again. Where that happens all the
-same, the release is sent again. While time stands still they go as one list.
 """
 
 POKE_TRAVEL = 0.3
@@ -44,7 +53,7 @@ class Tools:
     pages without a shift key.
 
     at_com: the string pulls at the centre of mass and not at the grabbed point. frequency [rad/s]: how hard, scaled by
-    the effective mass; 0 leaves the node's stiffness.
+    the effective mass; 0 leaves the stiffness as it is.
     """
 
     force: float = 1.0
@@ -54,32 +63,96 @@ class Tools:
     frequency: float = 8.0
 
 
+@dataclass(frozen=True)
+class DrawnPose:
+    """time_s: by the monotonic clock. The picture shows the world point ``origin`` (3,) at its middle, ``unit`` metres
+    as one."""
+
+    time_s: float
+    position: np.ndarray
+    orientation_xyzw: np.ndarray
+    origin: np.ndarray
+    unit: float
+
+    def world_point(self, drawn_point: Iterable[float]) -> np.ndarray:
+        """A point of the picture (3,) in the world [m]."""
+        return self.origin + self.unit * np.array(list(drawn_point))
+
+    def body_point(self, drawn_point: Iterable[float]) -> np.ndarray:
+        """A point of the picture (3,) in metres from the COM, body axes."""
+        return (self.world_point(drawn_point) - self.position) @ matrix_from_quaternion(self.orientation_xyzw)
+
+    def body_direction(self, direction: Iterable[float]) -> np.ndarray:
+        """A direction of the picture (3,) in body axes."""
+        return np.array(list(direction)) @ matrix_from_quaternion(self.orientation_xyzw)
+
+
+class DrawnPoses:
+    """The poses drawn lately, and which of them a pointer event belongs to."""
+
+    def __init__(self) -> None:
+        self._drawn: deque[DrawnPose] = deque()
+
+    def add(self, pose: DrawnPose) -> None:
+        """A pose went to the pages."""
+        self._drawn.append(pose)
+        while self._drawn[0].time_s < pose.time_s - KEPT_S:
+            self._drawn.popleft()
+
+    def forget(self) -> None:
+        """Another body, or another flight: old poses mean nothing."""
+        self._drawn.clear()
+
+    def usual(self, now_s: float) -> DrawnPose | None:
+        """The pose that an event arriving now has most likely seen."""
+        for pose in reversed(self._drawn):
+            if pose.time_s <= now_s - USUAL_DELAY_S:
+                return pose
+        return self._drawn[0] if self._drawn else None
+
+    def of_point(
+        self, drawn_point: Iterable[float], now_s: float, surface: Surface | None, body: Body
+    ) -> DrawnPose | None:
+        """The pose in which ``drawn_point`` (3,) lay on the surface, so that the user grabbed what he saw.
+
+        Where several fit, as for a sphere, the one nearest to the usual delay; where none does, that of the usual
+        delay.
+        """
+        usual = self.usual(now_s)
+        if usual is None or surface is None:
+            return usual
+        size = float(np.linalg.norm(surface.extent * body.scale))
+        nearest_first = sorted(self._drawn, key=lambda pose: abs(pose.time_s - usual.time_s))
+        for pose in nearest_first[: max(1, SEARCHED_TRIANGLES // len(surface.triangles))]:
+            point = body.mesh_point(numbers(pose.body_point(drawn_point)))
+            gap = float(np.linalg.norm((surface.nearest_point(numbers(point)) - point) * body.scale))
+            if gap <= ON_SURFACE * size:
+                return pose
+        return usual
+
+
 @dataclass
 class _Drag:
     client_id: int
     target: np.ndarray
     view: DrawnPose
     last_target_s: float
-    ended: bool = False
 
 
 class Pointer:
     """Turns pointer events of any page into commands. One string, so one drag at a time: the first page has it."""
 
-    def __init__(self, hand: HandCommands, scenes: SceneLoader, drawn_poses: DrawnPoses, tools: Tools) -> None:
-        self._hand = hand
-        self._scenes = scenes
-        self._drawn_poses = drawn_poses
+    def __init__(self, flight: Flight, poses: DrawnPoses, tools: Tools) -> None:
+        self._flight = flight
+        self._poses = poses
         self._tools = tools
         self._drag: _Drag | None = None
-        self._knot_by_message = False
-        self._loose_after = np.zeros(0)
-        self._release_heard = False
+        self._knot_by_hand = False
 
     @property
     def dragging(self) -> bool:
         """Whether somebody holds the string."""
-        return self._drag is not None and not self._drag.ended
+        return self._drag is not None
 
     def attach(self, node: Any) -> None:
         """React to the pointer on this node of the picture."""
@@ -92,56 +165,36 @@ class Pointer:
 
         async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
             if event.ray_direction is not None:
-                self.click_com(event.ray_direction)
+                direction = np.array(event.ray_direction, dtype=float)
+                self._flight.do({"force": numbers(self._tools.force * direction / np.linalg.norm(direction))})
 
         for modifier in MODIFIERS:
             node.on_click(modifier=modifier)(clicked)
 
-    def string_event(self, kind: str, content: Mapping[str, Any]) -> None:
-        """An event of the string, whoever caused it."""
-        if kind == "string_attach":
-            # The parameter ``string.attach`` doesn't say any more where the knot is.
-            self._knot_by_message = True
-        elif kind == "string_release":
-            self._release_heard = True
-        elif self._release_heard and np.array_equal(content.get("point", 0.0), self._loose_after):
-            self._hand.do(ScriptCommand(0, "string_release"))  # our last target acted after the release
-
     # Click
 
     async def _on_click(self, event: viser.SceneNodePointerEvent[Any]) -> None:
-        seen = self._drawn_poses.usual(time.monotonic())
+        seen = self._poses.usual(time.monotonic())
         if seen is not None and event.ray_origin is not None and event.ray_direction is not None:
             push = (event.modifier == "shift") != (self._tools.click == PUSH)
             self.click(event.ray_origin, event.ray_direction, seen, push)
 
     def click(self, ray_origin: Iterable[float], ray_direction: Iterable[float], seen: DrawnPose, push: bool) -> bool:
         """Poke where the ray of the picture meets the body as it was ``seen``; whether it meets it."""
-        scenario = self._scenes.scenario
-        if scenario is None:
-            return False
-        body, surface = scenario.setup.body, scenario.setup.surface
-        direction = _unit(ray_direction)
+        setup = self._flight.scenario.setup
+        body, surface, force = setup.body, setup.surface, self._tools.force
+        direction = np.array(list(ray_direction), dtype=float)
+        direction /= np.linalg.norm(direction)
         if surface is None:
-            self._poke("world@com", self._tools.force * direction)
+            self._flight.do({"force": numbers(force * direction)})
             return True
-        origin = body.mesh_point(_three(seen.body_point(ray_origin)))
+        origin = body.mesh_point(numbers(seen.body_point(ray_origin)))
         hit = surface.ray_hit(origin, seen.body_direction(direction) / body.scale)
         if hit is None:
             return False
-        point = "point/" + ",".join(repr(float(x)) for x in hit[0])
-        if push:
-            self._poke(f"normal@{point}", (self._tools.force, 0.0, 0.0))
-        else:
-            self._poke(f"world@{point}", self._tools.force * direction)
+        at = {"point": numbers(hit[0])}
+        self._flight.do({"at": at, "push": force} if push else {"at": at, "force": numbers(force * direction)})
         return True
-
-    def click_com(self, ray_direction: Iterable[float]) -> None:
-        """Poke at the centre of mass, along the view."""
-        self._poke("world@com", self._tools.force * _unit(ray_direction))
-
-    def _poke(self, frame_id: str, force: Iterable[float]) -> None:
-        self._hand.do(ScriptCommand(0, "poke", frame_id, _three(force)))
 
     # Drag
 
@@ -156,95 +209,69 @@ class Pointer:
 
     def grab(self, client_id: int, start: Iterable[float], end: Iterable[float]) -> None:
         """Tie the string where the body was grabbed, and take its free end to the pointer."""
-        scenario = self._scenes.scenario
-        if scenario is None or self.dragging:
+        scenario, tools = self._flight.scenario, self._tools
+        if self.dragging:
             return
         body, surface = scenario.setup.body, scenario.setup.surface
         now = time.monotonic()
-        seen = self._drawn_poses.of_point(start, now, surface, body)
+        seen = self._poses.of_point(start, now, surface, body)
         if seen is None:
             return
-        commands: list[ScriptCommand] = []
-        frequency = self._tools.frequency
-        if frequency > 0.0 and scenario.parameters.string.frequency != frequency:
-            commands.append(_set("string.frequency", frequency))
-        if self._tools.at_com or surface is None:
+        entries: list[Entry] = []
+        if tools.frequency > 0.0 and scenario.parameters.string.frequency != tools.frequency:
+            entries.append({"set": {"string.frequency": tools.frequency}})
+        if tools.at_com or surface is None:
             aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
-            commands += self._tie_to(body.mesh_point((0.0, 0.0, 0.0)), aside)
+            entries += self._tie_inside(body.mesh_point((0.0, 0.0, 0.0)), aside)
         else:
-            point = body.mesh_point(_three(seen.body_point(start)))
-            commands.append(ScriptCommand(0, "string_attach", MESH_FRAME, point=_three(point)))
-            self._knot_by_message = True
+            entries.append({"string": {"attach": numbers(body.mesh_point(numbers(seen.body_point(start))))}})
+            self._knot_by_hand = True
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
-        self._loose_after = np.zeros(0)
-        self._hand.do(*commands, _target(self._drag))
+        self._flight.do(*entries, _target(self._drag))
 
-    def _tie_to(self, point: np.ndarray, aside: np.ndarray) -> list[ScriptCommand]:
+    def _tie_inside(self, point: np.ndarray, aside: np.ndarray) -> list[Entry]:
         """The knot at a point that isn't on the surface: only the parameter can say so."""
-        if not self._knot_by_message:
-            return [_set("string.attach", list(_three(point)))]
-        # A parameter that keeps its value changes nothing, so it takes a step aside first.
-        self._knot_by_message = False
-        return [_set("string.attach", list(_three(knot))) for knot in (point + aside, point)]
+        # A parameter that keeps its value changes nothing, so after a knot by hand it takes a step aside first.
+        places = [point + aside, point] if self._knot_by_hand else [point]
+        self._knot_by_hand = False
+        return [{"set": {"string.attach": numbers(place)}} for place in places]
 
     def pull(self, end: Iterable[float]) -> None:
         """Move the string's free end."""
-        drag = self._drag
-        if drag is not None and not drag.ended:
-            drag.target = drag.view.world_point(end)
-            self._hand.do(_target(drag))
+        if self._drag is not None:
+            self._drag.target = self._drag.view.world_point(end)
+            self._flight.do(_target(self._drag))
 
     def hold(self) -> None:
         """To be called often: a hand that doesn't move goes on holding."""
-        drag, scenario = self._drag, self._scenes.scenario
-        if drag is None or drag.ended or scenario is None or self._hand.paused:
+        drag = self._drag
+        if drag is None or self._flight.paused:
             return
-        timeout_s = float(scenario.parameters.string.timeout)
+        timeout_s = float(self._flight.scenario.parameters.string.timeout)
         hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
         if time.monotonic() >= drag.last_target_s + hold_s:
-            self._hand.do(_target(drag))
+            self._flight.do(_target(drag))
 
     def let_go(self) -> None:
         """Release the string."""
-        drag = self._drag
-        if drag is None or drag.ended:
-            return
-        drag.ended = True
-        if self._hand.paused:
-            self._release(drag)
-            return
-        self._loose_after, self._release_heard = drag.target, False
-        wait_s = max(0.0, drag.last_target_s + SAME_TICK_S - time.monotonic())
-        asyncio.get_running_loop().call_later(wait_s, self._release, drag)
+        if self._drag is not None:
+            self._drag = None
+            self._flight.do({"string": "release"})
 
     def left(self, client_id: int) -> None:
         """A page has gone, perhaps without a word: a string that it held would be held for ever."""
         if self._drag is not None and self._drag.client_id == client_id:
             self.let_go()
 
-    def _release(self, drag: _Drag) -> None:
-        self._hand.do(ScriptCommand(0, "string_release"))
-        if self._drag is drag:
-            self._drag = None
 
-
-def _target(drag: _Drag) -> ScriptCommand:
+def _target(drag: _Drag) -> Entry:
     drag.last_target_s = time.monotonic()
-    return ScriptCommand(0, "string_target", "world", point=_three(drag.target))
+    return {"string": {"target": numbers(drag.target)}}
 
 
-def _unit(direction: Iterable[float]) -> np.ndarray:
-    vector = np.array(list(direction), dtype=float)
-    return vector / np.linalg.norm(vector)
-
-
-def _set(name: str, value: object) -> ScriptCommand:
-    return ScriptCommand(0, "set", changes={name: value})
-
-
-def _three(point: Iterable[float]) -> tuple[float, float, float]:
-    x, y, z = (float(coordinate) for coordinate in point)
-    return x, y, z
+def numbers(values: Iterable[float]) -> list[float]:
+    """Plain numbers, as a script entry has them."""
+    return [float(value) for value in values]
 
 
 def suggested_force(scenario: Scenario, size: float) -> float:

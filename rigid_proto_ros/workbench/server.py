@@ -1,47 +1,63 @@
 # SPDX-License-Identifier: MIT
-"""viser's server as the workbench needs it: quiet, for pages of its own alone, and with nothing that
-leads beyond it.
+"""viser's server as the workbench needs it: quiet, for pages of its own alone, and with nothing that leads beyond it.
+
+Two things viser 1.1 has no setting for, so names of its own are used (test_workbench_server.py says when another
+version lacks them): a look at requests before it answers them, and browsers' requests for a public tunnel to be passed
+over.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import functools
+import gzip
+import html
 import http
 import io
 import logging
-from collections.abc import Callable
-from urllib.parse import unquote, urlsplit
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
 
 import viser
+import websockets.asyncio.server
+from viser import _messages
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from ..base.errors import InputError
-from .listening import check_address
+from ..rerun_view.ports import PortTakenError, serve_on_port
 from .page_style import PANEL_PIXELS, lay_out
-from .viser_internals import Gate, refuse_tunnels, requests_go_through
 
-TITLE = "rigid_proto workbench"
+# ruff: noqa: SLF001 (see above)
+
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "::1")
 
+VISERS_TITLE = b"<title>Viser</title>"
 
-def make_server(host: str, port: int, on_link: Callable[[str], None]) -> viser.ViserServer:
-    """A server that listens on exactly this port. on_link(text) is called when a page is opened with ``/?<link>``.
+
+def make_server(title: str, host: str, asked: int | None, default: int) -> viser.ViserServer:
+    """A server on the port that was asked for, or on the first free one from the default on.
 
     Raises InputError naming ``--host`` or ``--port`` where nothing can listen there.
     """
-    check_address(host, port)
+    _check_host(host)
     # Whoever knocks and goes, a port scan or a browser that thought better of it, is no error of ours.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    # Its greeting would stand between the lines that the command prints.
-    with contextlib.redirect_stdout(io.StringIO()), requests_go_through(_gate(host, on_link)):
-        server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
-    if server.get_port() != port:
-        # Somebody took it in between, and viser went on to the next.
-        stop_server(server)
-        raise InputError("--port", port, f"a port on {host} that no other program listens on")
-    refuse_tunnels(server)  # nobody asked us for one
-    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+
+    def serve(port: int) -> viser.ViserServer:
+        # Its greeting would stand between the lines that the command prints.
+        with contextlib.redirect_stdout(io.StringIO()), _requests_looked_at(host, title):
+            server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        if server.get_port() != port:
+            stop_server(server)  # viser goes on to other ports by itself
+            raise PortTakenError
+        return server
+
+    server = serve_on_port("--port", asked, default, serve)
+    for request in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+        server._websock_server.unregister_handler(request)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(PANEL_PIXELS)
     lay_out(server)
@@ -54,19 +70,58 @@ def stop_server(server: viser.ViserServer) -> None:
         server.stop()
 
 
-def _gate(host: str, on_link: Callable[[str], None]) -> Gate:
-    def answer(connection: ServerConnection, request: Request) -> Response | None:
-        reason = refusal(host, request.headers.get("Host", ""), request.headers.get("Origin"))
-        if reason:
-            return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
-        path, _, query = request.path.partition("?")
-        # Only a page that is opened: an image of another site's page must not set anything.
-        opened = request.headers.get("Sec-Fetch-Dest", "document") == "document"
-        if path == "/" and query and opened and request.headers.get("Upgrade") != "websocket":
-            on_link(unquote(query))
-        return None
+def _check_host(host: str) -> None:
+    """viser tries for ever to listen on an address that isn't this machine's."""
 
-    return answer
+    async def bound() -> None:
+        server = await asyncio.get_running_loop().create_server(asyncio.Protocol, host, 0, start_serving=False)
+        server.close()
+        await server.wait_closed()
+
+    loop = asyncio.new_event_loop()
+    try:
+        loop.run_until_complete(bound())
+    except (OSError, UnicodeError, ValueError):  # no such address; no name at all
+        accepted = "an address of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
+        raise InputError("--host", host, accepted) from None
+    finally:
+        loop.close()
+
+
+@contextlib.contextmanager
+def _requests_looked_at(host: str, title: str) -> Iterator[None]:
+    """While this lasts, a server that is started turns requests of other sites away, and its page has this title."""
+    module: Any = websockets.asyncio.server
+    serve = module.serve
+
+    @functools.wraps(serve)
+    def guarded(*arguments: Any, process_request: Any, **options: Any) -> Any:
+        def process(connection: ServerConnection, request: Request) -> Response | None:
+            reason = refusal(host, request.headers.get("Host", ""), request.headers.get("Origin"))
+            if reason:
+                return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
+            response = process_request(connection, request)
+            if response is not None and request.path.partition("?")[0] == "/":
+                _set_title(response, title)
+            return response
+
+        return serve(*arguments, process_request=process, **options)
+
+    module.serve = guarded
+    try:
+        yield
+    finally:
+        module.serve = serve
+
+
+def _set_title(response: Response, title: str) -> None:
+    """Give the page its title, in place of viser's."""
+    packed = response.headers.get("Content-Encoding") == "gzip"
+    text = gzip.decompress(response.body) if packed else response.body
+    text = text.replace(VISERS_TITLE, f"<title>{html.escape(title)}</title>".encode(), 1)
+    response.body = gzip.compress(text, 1) if packed else text
+    del response.headers["Content-Length"]
+    response.headers["Content-Length"] = str(len(response.body))
 
 
 def refusal(served_on: str, host: str, origin: str | None) -> str:

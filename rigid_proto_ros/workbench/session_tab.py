@@ -1,156 +1,136 @@
 # SPDX-License-Identifier: MIT
-"""Time as a session: rewind and branch, saving what was done by hand, links."""
+"""Time as a session: rewind and branch, and the take as files: scene and script, mesh, glTF."""
 
 from __future__ import annotations
 
 import asyncio
-import math
-from collections.abc import Awaitable, Callable
+import io
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import viser
 
 from ..base.errors import InputError
-from .history import History
-from .link import decode, encode
-from .past_view import PastView
-from .situation import SituationControl
-from .status import Announcements
-
-MAX_QUERY = 7000
-"""Characters of a link that a server reads from an address; a longer one is pasted."""
+from ..session.recorded_session import RecordedSession
+from ..session.script_of_session import script_of_session
+from .flight import Flight
 
 STEP_S = 0.05
 """[s] Of the rewind slider."""
 
+RATES = ("24", "25", "30", "60")
+
 
 class SessionTab:
-    """The tab of rewind, save and link. address: of this page. open_scene(scene, script) takes the node
-    there, both as texts.
-    """
+    """gltf(session, frames a second) gives the take as a binary glTF file."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
         tabs: viser.GuiTabGroupHandle,
-        address: str,
-        history: History,
-        past_view: PastView,
-        situations: SituationControl,
-        announcements: Announcements,
-        open_scene: Callable[[str, str], Awaitable[None]],
+        flight: Flight,
+        say: Callable[[str], None],
+        gltf: Callable[[RecordedSession, float], bytes] | None,
     ) -> None:
         self._gui = gui
-        self._address = address
-        self._history = history
-        self._past_view = past_view
-        self._situations = situations
-        self._announcements = announcements
-        self._open_scene = open_scene
-        with tabs.add_tab("Session"):
+        self._flight = flight
+        self._say = say
+        self._gltf = gltf
+        with tabs.add_tab("Record"):
             self._rewind_folder()
             self._save_folder()
-            self._link_folder()
-        past_view.on_change = self._show_moment
-
-    # Rewind
 
     def _rewind_folder(self) -> None:
-        gui = self._gui
+        gui, flight = self._gui, self._flight
         with gui.add_folder("Rewind"):
-            gui.add_markdown("Go back in time and continue from there; the previous motion stays as a ghost.")
-            self._back: Any = gui.add_slider("Seconds back", 0.0, 10.0, STEP_S, 0.0)
-            self._go_on = gui.add_button("Continue from here", disabled=True)
-            self._forget = gui.add_button("Remove the ghost", visible=False)
-            self._looking = gui.add_markdown("")
+            self._back: Any = gui.add_slider(
+                "Seconds back", 0.0, 10.0, STEP_S, 0.0, hint="Time stands while the past is shown"
+            )
+            self._go_on = gui.add_button("Go on from here", disabled=True, hint="With another future")
+            self._forget = gui.add_button("Forget the previous motion", visible=False)
 
         @self._back.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                self._past_view.show(float(self._back.value))
+                seconds = float(self._back.value)
+                if seconds <= 0.0:
+                    flight.look_at_present()
+                else:
+                    flight.look_at(flight.reach_s[1] - seconds)
 
         @self._go_on.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            await self._situations.go_on_from_here()
+            await flight.go_on_from_here()
 
         @self._forget.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            self._history.forget_ghost()
+            flight.left = None
 
-    def every_second(self) -> None:
+    def draw(self) -> None:
         """How far back one can go grows while the body flies."""
-        first_ns, last_ns = self._history.span
-        if self._past_view.moment_ns is None:
-            available = max(10.0, 10.0 * math.ceil((last_ns - first_ns) * 1e-10))
+        flight = self._flight
+        first_s, last_s = flight.reach_s
+        looking = flight.moment_ns is not None
+        if not looking:
+            available = max(10.0, 10.0 * -(-(last_s - first_s) // 10.0))
             if self._back.max != available:
                 self._back.max = available
-        self._forget.visible = self._history.ghost is not None
-
-    def _show_moment(self) -> None:
-        moment_ns = self._past_view.moment_ns
-        self._go_on.disabled = moment_ns is None
-        if moment_ns is None:
-            self._looking.content = ""
-        else:
-            self._looking.content = f"Looking at {self._history.simulated_ns(moment_ns) * 1e-9:.2f} s"
-        back_s = min(self._past_view.back_s, self._back.max)
+        back_s = last_s - (flight.moment_ns or 0) * 1e-9 if looking else 0.0
         # What a hand has just set may be more than there is; only what differs by a step is written over it.
-        if moment_ns is None or abs(self._back.value - back_s) > 0.5 * STEP_S:
-            self._back.value = back_s
-
-    # Save
+        if abs(self._back.value - back_s) > 0.5 * STEP_S:
+            self._back.value = min(back_s, self._back.max)
+        self._go_on.disabled = not looking
+        self._forget.visible = flight.left is not None
 
     def _save_folder(self) -> None:
         gui = self._gui
-        with gui.add_folder("Save as script"):
-            gui.add_markdown(
-                "What was done since the last reset, as a scene and a script that reproduce it bit for bit."
+        with gui.add_folder("Take, since the last reset"):
+            save = gui.add_button(
+                "Save scene and script", hint="What was done by hand; reproduces the motion bit for bit (.zip)"
             )
-            save = gui.add_button("Save scene and script")
+            rate: Any = gui.add_dropdown("Frames a second", RATES, initial_value="30")
+            export = gui.add_button(
+                "Save as glTF", visible=self._gltf is not None, hint="For Blender and others (.glb)"
+            )
             self._saved = gui.add_markdown("")
 
         @save.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                await self._announcements.while_doing("saving", self._save(event.client))
+                await self._saving(event.client, "take.zip", self._take)
 
-    async def _save(self, client: viser.ClientHandle) -> None:
-        saved = await asyncio.to_thread(self._history.save_as_script)
-        client.send_file_download("scene.yaml", saved.scene.encode(), save_immediately=True)
-        client.send_file_download("script.yaml", saved.script.encode(), save_immediately=True)
-        lines = [
-            f"{saved.commands} commands. Reproduce it with:",
-            "`rigid_proto simulate scene.yaml --script script.yaml`",
-        ]
-        self._saved.content = "\n\n".join([*lines, *saved.notes])
+        @export.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                await self._saving(event.client, "take.glb", lambda: self._motion(float(rate.value)))
 
-    # Link
-
-    def _link_folder(self) -> None:
-        gui = self._gui
-        with gui.add_folder("Link"):
-            make = gui.add_button("Make a link", hint="Scene and script since the last reset, in one line")
-            self._link: Any = gui.add_text("Link", "", hint="Copy it, or paste one and open it")
-            opening = gui.add_button("Open the link above")
-
-        @make.on_click
-        async def _(_: viser.GuiEvent[Any]) -> None:
-            await self._announcements.while_doing("making a link", self._make_link())
-
-        @opening.on_click
-        async def _(_: viser.GuiEvent[Any]) -> None:
-            await self.open_link(self._link.value)
-
-    async def _make_link(self) -> None:
-        saved = await asyncio.to_thread(self._history.save_as_script)
-        link = encode(saved.scene, saved.script)
-        self._link.value = f"{self._address}/?{link}" if len(link) <= MAX_QUERY else link
-
-    async def open_link(self, text: str) -> None:
-        """Take the node where a link leads; a refusal is said on the page."""
+    async def _saving(self, client: viser.ClientHandle, name: str, make: Callable[[], tuple[bytes, str]]) -> None:
         try:
-            scene, script = decode(text)
+            content, note = await asyncio.to_thread(make)
         except InputError as error:
-            self._announcements.say(str(error))
+            self._say(str(error))
             return
-        await self._open_scene(scene, script)
+        client.send_file_download(name, content, save_immediately=True)
+        self._saved.content = note
+
+    def _take(self) -> tuple[bytes, str]:
+        saved = script_of_session(self._flight.memory.session())
+        scene, packed = saved.scene, io.BytesIO()
+        mesh = self._flight.scenario.body_mesh
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            if mesh is not None and mesh.mesh.path == self._flight.scenario.parameters.mesh:
+                # Beside the scene, which names it: the file itself may be gone by then.
+                name = Path(mesh.mesh.path).name
+                archive.writestr(name, Path(mesh.mesh.path).read_bytes())
+                scene = scene.replace(mesh.mesh.path, name)
+            archive.writestr("scene.yaml", scene)
+            archive.writestr("script.yaml", saved.script)
+        note = f"{saved.commands} commands. Unpack, then:\n\n`rigid_proto simulate scene.yaml --script script.yaml`"
+        return packed.getvalue(), note
+
+    def _motion(self, rate: float) -> tuple[bytes, str]:
+        assert self._gltf is not None
+        session = self._flight.memory.session()
+        return self._gltf(session, rate), f"{session.end_ns * 1e-9:.2f} s at {rate:g} frames a second"

@@ -1,67 +1,96 @@
 # SPDX-License-Identifier: MIT
-"""The tab of switches: what is drawn beside the body."""
+"""The tab of switches: what is drawn beside the body, light or dark, and the page for a class."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
-import numpy as np
 import viser
 
-from .controls import parse_numbers
-from .scene_view import HINTS, SWITCHES, SceneView
-from .status import Announcements
+from ..picture import style
+
+SEE_INTO, CENTRE_OF_MASS = "See into the body", "Centre of mass"
+
+PARTS: dict[str, tuple[str, ...]] = {
+    CENTRE_OF_MASS: (CENTRE_OF_MASS,),
+    "Principal axes": (style.PRINCIPAL_AXES,),
+    "Body axes": (style.BODY_AXES,),
+    "Inertia ellipsoid": (style.INERTIA_ELLIPSOID,),
+    "Box of equal inertia": (style.INERTIA_BOX,),
+    "Bounding box": (style.BOUNDING_BOX,),
+    "String": (style.STRING, style.HAND),
+    "Line of the string": (style.STRING_LINE,),
+    "Forces": (style.LOADS,),
+    "Angular momentum L": (style.MOMENTUM,),
+    "Angular velocity ω": (style.OMEGA,),
+    "Ghost": (style.GHOST_MESH, style.GHOST_BOX),
+    "Path of the COM": (style.COM_TRAIL,),
+    "Path of a point": (style.TRAIL,),
+}
+"""Parts of the picture by the name of their switch."""
+
+AT_FIRST = ("String", "Forces", "Angular momentum L", "Ghost")
 
 
 class ShowTab:
-    """One switch for each of SWITCHES. ``show`` does what a click on them does, for lessons and keys. on_shown(name) is
-    told of what is switched on."""
+    """switch(part, shown) shows a part; see_into(on), dark(on) and for_class(on) do what they say. on_shown(name) is
+    told of what is switched on.
+    """
 
     def __init__(
         self,
         gui: viser.GuiApi,
         tabs: viser.GuiTabGroupHandle,
-        view: SceneView,
-        announcements: Announcements,
+        switch: Callable[[str, bool], None],
+        see_into: Callable[[bool], None],
+        dark: Callable[[bool], None],
+        for_class: Callable[[bool], None],
+        centre: Callable[[], None],
         on_shown: Callable[[str], None],
     ) -> None:
+        self._switch = switch
         self._switches: dict[str, Any] = {}
         with tabs.add_tab("Show"):
-            for name, shown in SWITCHES.items():
-                self._switches[name] = switch = gui.add_checkbox(name, shown, hint=HINTS.get(name))
-
-                @switch.on_update
-                async def _(_: viser.GuiEvent[Any], name: str = name, switch: Any = switch) -> None:
-                    view.switch(name, switch.value)
-                    if switch.value:
-                        on_shown(name)
-
-            point = gui.add_text(
-                "Point of the path", "", hint="x y z in mesh coordinates; empty: the vertex farthest from the COM"
+            self._class: Any = gui.add_checkbox(
+                "Class mode", False, hint="Picture, lesson and three buttons, in large letters; F11 fills the screen"
             )
-            follow = gui.add_checkbox(
-                "Keep the body in view", True, hint="The camera follows it; the grid shows the distance covered"
-            )
-            centre = gui.add_button("Centre on the body")
+            self._dark: Any = gui.add_checkbox("Dark", False)
+            centred = gui.add_button("Centre on the body")
+            self._switches[SEE_INTO] = gui.add_checkbox(SEE_INTO, False)
+            for name in PARTS:
+                self._switches[name] = gui.add_checkbox(name, name in AT_FIRST)
 
-        @point.on_update
+        for name, box in self._switches.items():
+
+            @box.on_update
+            async def _(_: viser.GuiEvent[Any], name: str = name, box: Any = box) -> None:
+                self._set(name, box.value, see_into)
+                if box.value:
+                    on_shown(name)
+
+        @self._dark.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:
-            numbers = parse_numbers(point.value, 3)
-            if point.value.strip() and numbers is None:
-                announcements.say(f"Point of the path: {point.value[:40]!r}; accepted: three numbers, or nothing")
-            else:
-                view.trails.point = None if numbers is None else np.array(numbers)
+            dark(self._dark.value)
 
-        @follow.on_update
+        @self._class.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:
-            view.follows = follow.value
+            for_class(self._class.value)
 
-        @centre.on_click
+        @centred.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            view.centre()
+            centre()
 
-    def show(self, changes: Mapping[str, bool]) -> None:
-        """Turn switches on or off, by name."""
-        for name, shown in changes.items():
-            self._switches[name].value = shown
+    def _set(self, name: str, shown: bool, see_into: Callable[[bool], None]) -> None:
+        if name == SEE_INTO:
+            see_into(shown)
+        for part in PARTS.get(name, ()):
+            self._switch(part, shown)
+
+    def show_for(self, parts: Iterable[str]) -> None:
+        """Switch on what a scene needs, by parts or names of switches, and off what it doesn't."""
+        wanted = set(parts)
+        for name, box in self._switches.items():
+            shown = name in AT_FIRST or name in wanted or bool(wanted.intersection(PARTS.get(name, ())))
+            if box.value != shown:
+                box.value = shown

@@ -15,8 +15,11 @@ from ..mass.properties import MassProperties, explicit_mass_properties
 from ..mass.tensor import check_tensor, principal_axes, tensor_from_six
 from ..scene.scenario import Scenario
 
-ROUNDING = 1e-11
-"""Relative: what is smaller comes from the arithmetic."""
+ROUNDING = 1e-9
+"""Relative: what is smaller comes from the arithmetic, or from the digits of the mesh's coordinates."""
+
+TURNED = 1e-6
+"""[°] The same of an angle between axes, whose moments may be close to each other."""
 
 TITLES = {"solid": "solid (true)", "shell": "shell", "points": "points", "bounding_box": "bounding box"}
 
@@ -108,7 +111,7 @@ def _com_text(scenario: Scenario, off: np.ndarray, own: np.ndarray) -> str:
 
 def _degrees(angle: float) -> str:
     degrees = math.degrees(angle)
-    return f"{degrees if degrees > ROUNDING else 0.0:.3g}°"
+    return f"{degrees if degrees > TURNED else 0.0:.3g}°"
 
 
 def _per_cent(error: float) -> str:

@@ -1,31 +1,33 @@
 # SPDX-License-Identifier: MIT
-"""Meshes that come as bytes through a page: checked as ``inspect`` checks files, kept as one file while they are flown.
+"""Meshes that come from a browser: judged as ``inspect`` judges files, asked for unit and up axis, and flown.
 
-The node reads a mesh by path, so the file must be there; it lies in a folder of this process alone, under a name made
-here. The next upload replaces it, and the folder goes with the process; one that was killed is swept up by the next.
+A body reads its mesh by path, so the file lies in a folder of this process, under a name made here, for as long as it
+flies; a saved take carries it.
 """
 
 from __future__ import annotations
 
-import atexit
+import asyncio
 import json
 import math
-import os
 import re
 import shutil
 import struct
 import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 import numpy as np
+import viser
 
-from ..base.errors import MeshError
+from ..base.errors import InputError, MeshError
 from ..mass.from_mesh import mesh_body
 from ..mass.inspection import Inspection, as_json, inspect_mesh
 from ..mesh.cache import PASSING
 from ..mesh.reading import BYTES_PER_TRIANGLE, MAX_TRIANGLES, OWN_FORMATS, load_mesh
+from .flight import Flight
 
 MAX_BYTES = 256_000_000
 """Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""
@@ -34,6 +36,11 @@ ACCEPTED = (*OWN_FORMATS, "glb")
 """Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip. A .glb
 that names others is refused.
 """
+
+Y_UP = ("glb", "obj")
+"""glTF says so, and most tools write .obj like that; what it says itself, in a comment ``# z up``, comes first."""
+
+UP_COMMENT = re.compile(rb"^#.*\b([xyz])[ -]?(?:axis )?(?:is )?up\b", re.IGNORECASE | re.MULTILINE)
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Metres, by the name of what a file's numbers may be in."""
@@ -48,17 +55,18 @@ are in millimetres.
 """
 
 SENSIBLE_DENSITY = 1000.0
-"""[kg/m³] Water's, the node's own default."""
+"""[kg/m³] Water's, the default."""
 
 
 @dataclass(frozen=True)
 class Upload:
-    """name: as shown. path: for the parameter ``mesh``. inspection: what is known of it; report: as
-    ``inspect --json``.
+    """name: as shown. path: for the parameter ``mesh``. up: which of its axes points up most likely. inspection: what
+    is known of it; report: as ``inspect --json``.
     """
 
     name: str
     path: str
+    up: str
     inspection: Inspection
     report: dict
 
@@ -73,11 +81,6 @@ class Upload:
         """Which of UNITS it is most likely in."""
         return "m" if self.name.endswith(".glb") or float(self.sides.max()) <= ROOM_SIZE else "mm"
 
-    @property
-    def likely_up(self) -> str:
-        """Which of its axes points up most likely: glTF says y."""
-        return "y" if self.name.endswith(".glb") else "z"
-
     def size_and_mass(self, unit: str) -> str:
         """Its size and mass in one line, its numbers being in this unit and its density SENSIBLE_DENSITY."""
         metres = UNITS[unit]
@@ -87,19 +90,14 @@ class Upload:
             return f"{sides} m"
         return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
 
-    def flight(self, unit: str, up: str) -> dict[str, object]:
-        """Parameters to fly it with: what another body left behind, its mass, spin or stand-in, isn't its own."""
-        at_rest = {f"initial.{name}": [0.0, 0.0, 0.0] for name in ("position", "linear_velocity", "angular_velocity")}
+    def scene(self, unit: str, up: str, stand_in: dict[str, object]) -> dict[str, object]:
+        """Parameters of a scene of this body alone, at rest; stand_in: how one that isn't closed flies."""
         return {
             "mesh": self.path,
             "scale": [UNITS[unit]] * 3,
-            "mass": 0.0,
             "density": SENSIBLE_DENSITY,
-            "inertia_model": "solid",
-            "mesh_repair": False,
-            "mesh_fallback": "",
             "initial.orientation_xyzw": UPRIGHT[up],
-            **at_rest,
+            **stand_in,
         }
 
     @property
@@ -114,75 +112,58 @@ class Upload:
 
 
 class Uploads:
-    """The uploads of one page server; ``close`` leaves nothing on the disk, and so does the end of the process.
+    """The files of one page; ``close`` leaves nothing on the disk, and so does the end of the process."""
 
-    max_bytes, max_triangles: larger files are refused, by their size before anything is written.
-    """
-
-    def __init__(self, max_bytes: int = MAX_BYTES, max_triangles: int = MAX_TRIANGLES) -> None:
-        self._limit = min(max_bytes, BYTES_PER_TRIANGLE * max_triangles)
+    def __init__(self, max_triangles: int = MAX_TRIANGLES) -> None:
+        self._limit = min(MAX_BYTES, BYTES_PER_TRIANGLE * max_triangles)
         self._max_triangles = max_triangles
-        self._folder: Path | None = None
+        self._home: tempfile.TemporaryDirectory[str] | None = None
         self._count = 0
-        self._flown: Path | None = None
-        sweep()
-        atexit.register(self.close)
 
-    def take(self, file_name: str, data: bytes, *, repair: bool = False, fallback: str = "") -> Upload:
-        """Judge a file and lay it beside the one in flight, in place of any other.
-
-        A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises MeshError for what is no
-        mesh, and keeps nothing of it.
+    def take(self, file_name: str, data: bytes) -> Upload:
+        """Judge a file and keep it. A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises
+        MeshError for what is no mesh, and keeps nothing of it.
         """
         name, suffix = shown_name(file_name)
         if suffix not in ACCEPTED:
             raise MeshError("upload", name, f"a file named .{', .'.join(ACCEPTED)}")
         if len(data) > self._limit:
-            raise MeshError(
-                "upload",
-                f"{name} has {len(data)} bytes; at most {self._limit} are accepted, so name a larger file by its path",
-            )
-        self._remove_all_but(self._flown)
-        self._count += 1
+            limit = f"at most {self._limit} are accepted, so name a larger file by its path"
+            raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
         if suffix == "glb":
             refuse_other_files(name, data)
-        # Another folder each time: a node that is told the same path again sees no change.
-        path = self._home() / str(self._count) / name
+        if self._home is None:
+            self._home = tempfile.TemporaryDirectory(prefix=PASSING)
+        # Another folder each time: a body that is told the same path again sees no change.
+        self._count += 1
+        path = Path(self._home.name) / str(self._count) / name
         try:
             path.parent.mkdir()
             path.write_bytes(data)
-            body = mesh_body(load_mesh(str(path), max_triangles=self._max_triangles), repair=repair, fallback=fallback)
+            body = mesh_body(load_mesh(str(path), max_triangles=self._max_triangles))
             inspection = inspect_mesh(body)
-            return Upload(name, str(path), inspection, as_json(inspection))
         except OSError as error:
             shutil.rmtree(path.parent, ignore_errors=True)
             raise MeshError("upload", name, f"free space for it ({error.strerror})") from None
         except BaseException:
             shutil.rmtree(path.parent, ignore_errors=True)
             raise
+        said = UP_COMMENT.search(data[:4096]) if suffix == "obj" else None
+        up = said[1].decode().lower() if said else "y" if suffix in Y_UP else "z"
+        return Upload(name, str(path), up, inspection, as_json(inspection))
 
-    def fly(self, upload: Upload | None) -> None:
-        """Say which one the node has taken on, None when it flies another mesh; all others go."""
-        self._flown = None if upload is None else Path(upload.path)
-        self._remove_all_but(self._flown)
+    def keep(self, paths: Sequence[str]) -> None:
+        """Remove all but these files."""
+        kept = {Path(path).parent for path in paths}
+        for folder in Path(self._home.name).iterdir() if self._home is not None else ():
+            if folder not in kept:
+                shutil.rmtree(folder, ignore_errors=True)
 
     def close(self) -> None:
         """Remove all of it."""
-        self._flown = None
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
-            self._folder = None
-        atexit.unregister(self.close)
-
-    def _home(self) -> Path:
-        if self._folder is None:
-            self._folder = Path(tempfile.mkdtemp(prefix=f"{PASSING}{os.getpid()}_"))
-        return self._folder
-
-    def _remove_all_but(self, kept: Path | None) -> None:
-        for folder in self._folder.iterdir() if self._folder else ():
-            if kept is None or folder != kept.parent:
-                shutil.rmtree(folder, ignore_errors=True)
+        if self._home is not None:
+            self._home.cleanup()
+            self._home = None
 
 
 def refuse_other_files(name: str, data: bytes) -> None:
@@ -210,19 +191,91 @@ def shown_name(file_name: str) -> tuple[str, str]:
     return f"{stem}.{suffix}", suffix
 
 
-def sweep() -> None:
-    """Remove the folders of processes that were killed."""
-    for path in Path(tempfile.gettempdir()).glob(f"{PASSING}*"):
-        pid = path.name.removeprefix(PASSING).partition("_")[0]
-        if pid.isdigit() and not _runs(int(pid)):
-            shutil.rmtree(path, ignore_errors=True)
+class UploadFolder:
+    """viser's upload button, and what is asked before a file flies. fly(values) begins a scene of these parameters;
+    show_verdict(lines) says what is found of a file.
+    """
 
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        flight: Flight,
+        fly: Callable[[dict[str, object]], Any],
+        show_verdict: Callable[[Sequence[str]], None],
+    ) -> None:
+        self._flight = flight
+        self._fly_scene = fly
+        self._show_verdict = show_verdict
+        self.uploads = Uploads()
+        self.present: Upload | None = None
+        with gui.add_folder("Upload"):
+            button = gui.add_upload_button(
+                "Upload a mesh",
+                icon=viser.Icon.UPLOAD,
+                mime_type=",".join(f".{suffix}" for suffix in ACCEPTED),
+                hint=f".{', .'.join(ACCEPTED)}; at most {MAX_BYTES // 1_000_000} MB",
+            )
+            self._unit: Any = gui.add_dropdown(
+                "Its unit", tuple(UNITS), visible=False, hint="Unit of the file's coordinates (scale)"
+            )
+            self._up: Any = gui.add_dropdown(
+                "Its up axis",
+                tuple(UPRIGHT),
+                visible=False,
+                hint="The file's axis that points up (initial.orientation_xyzw)",
+            )
+            self._size = gui.add_markdown("", visible=False)
+            self._as_it_is = gui.add_button("Simulate it", visible=False)
+            self._repaired = gui.add_button("Simulate it repaired", visible=False)
+            self._hull = gui.add_button("Simulate its hull", visible=False)
 
-def _runs(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        pass  # somebody else's
-    return True
+        @button.on_upload
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            await self.take(button.value.name, button.value.content)
+
+        @self._unit.on_update
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            self._show_size()
+
+        ways: tuple[tuple[viser.GuiButtonHandle, dict[str, object]], ...] = (
+            (self._as_it_is, {}),
+            (self._repaired, {"mesh_repair": True}),
+            (self._hull, {"mesh_fallback": "hull"}),
+        )
+        for way, stand_in in ways:
+
+            @way.on_click
+            async def _(_: viser.GuiEvent[Any], stand_in: dict[str, object] = stand_in) -> None:
+                await self._fly(stand_in)
+
+    async def take(self, name: str, content: bytes) -> None:
+        """Judge a file, and say what is found of it."""
+        self.uploads.keep([self._flight.scenario.parameters.mesh])
+        try:
+            upload = await asyncio.to_thread(self.uploads.take, name, content)
+        except InputError as error:
+            self._show([f"refused: {error}"], None)
+            return
+        lines = [*upload.verdict, *([f"refused: {upload.refusal}"] if upload.refusal else [])]
+        self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: no problems found"], upload)
+
+    def _show(self, lines: list[str], upload: Upload | None) -> None:
+        """The verdict, and what is asked before this upload flies; None: nothing is asked."""
+        self.present = upload
+        self._show_verdict(lines)
+        if upload is not None:
+            self._unit.value, self._up.value = upload.likely_unit, upload.up
+            self._show_size()
+        for handle in (self._unit, self._up, self._size):
+            handle.visible = upload is not None
+        self._as_it_is.visible = upload is not None and not upload.refusal
+        self._repaired.visible = self._hull.visible = upload is not None and bool(upload.refusal)
+
+    def _show_size(self) -> None:
+        if self.present is not None:
+            self._size.content = f"**{self.present.size_and_mass(self._unit.value)}**"
+
+    async def _fly(self, stand_in: dict[str, object]) -> None:
+        upload = self.present
+        if upload is not None and await self._fly_scene(upload.scene(self._unit.value, self._up.value, stand_in)):
+            self._show([f"{upload.name}: simulated"], None)

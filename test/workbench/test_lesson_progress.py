@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from rigid_proto_ros.workbench.lesson_progress import LessonProgress
+from rigid_proto_ros.workbench.lesson_course import LessonProgress
 
 PERIOD_NS = 100_000_000
 

@@ -18,7 +18,7 @@ from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.workbench.upload import MAX_BYTES, Uploads, shown_name
 
 BOOK = resolve_mesh("book").read_bytes()
@@ -76,7 +76,6 @@ def test_an_upload_gets_the_verdict_that_inspect_gives(place: Path, capsys: pyte
 def test_what_is_no_mesh_is_refused_and_nothing_is_kept_of_it(place: Path, name: str, data: bytes) -> None:
     uploads = Uploads()
     flown = uploads.take("flown.obj", BOOK)
-    uploads.fly(flown)
     with pytest.raises(InputError):
         uploads.take(name, data)
     assert files(place) == [Path(flown.path)]
@@ -95,20 +94,20 @@ def bust_in_millimetres() -> bytes:
 def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as_much_as_a_mountain(
     place: Path,
 ) -> None:
-    upload = Uploads().take("bust.obj", bust_in_millimetres())
-    assert (upload.likely_unit, upload.likely_up) == ("mm", "z")
+    uploads = Uploads()
+    upload = uploads.take("bust.obj", bust_in_millimetres())
+    assert (upload.likely_unit, upload.up) == ("mm", "y")
     assert upload.size_and_mass("mm") == "0.2 × 0.25 × 0.48 m, 24 kg at 1000 kg/m³"
     assert upload.size_and_mass("m") == "200 × 250 × 480 m, 2.4e+10 kg at 1000 kg/m³"
-    values = upload.flight("mm", "y")
-    body = read_scene("t_handle", {**values, "mass": 0.0}).setup
+    values = upload.scene("mm", "y", {})
+    body = make_scenario(values).setup
     assert body.body.mass == pytest.approx(24.0, rel=1e-12)
-    # Its y is up now, and nothing is left of the spin and the stand-in of the body before.
+    # Its y is up now.
     assert matrix_from_quaternion(values["initial.orientation_xyzw"])[:, 1] == pytest.approx([0.0, 0.0, 1.0])
-    assert matrix_from_quaternion(upload.flight("mm", "x")["initial.orientation_xyzw"])[:, 0] == pytest.approx(
+    assert matrix_from_quaternion(upload.scene("mm", "x", {})["initial.orientation_xyzw"])[:, 0] == pytest.approx(
         [0, 0, 1]
     )
     assert not body.initial[7:13].any()
-    assert (values["mesh_fallback"], values["inertia_model"], values["density"]) == ("", "solid", 1000.0)
 
 
 def test_an_upload_that_bounds_no_solid_has_a_size_and_no_mass(place: Path) -> None:
@@ -132,7 +131,7 @@ def glb(buffer_uri: str | None = None) -> bytes:
 
 def test_a_glb_is_taken_in_metres_with_y_up(place: Path) -> None:
     upload = Uploads().take("Box.glb", glb())
-    assert (upload.likely_unit, upload.likely_up, upload.refusal) == ("m", "y", "")
+    assert (upload.likely_unit, upload.up, upload.refusal) == ("m", "y", "")
     assert upload.size_and_mass("m") == "1 × 2 × 3 m, 6e+03 kg at 1000 kg/m³"
 
 
@@ -193,22 +192,20 @@ def test_shown_names_are_plain() -> None:
     assert shown_name("<script>.obj") == ("script.obj", "obj")
 
 
-def test_a_thousand_uploads_in_a_row_leave_one_file_then_none(place: Path) -> None:
+def test_uploads_that_fly_no_more_are_removed(place: Path) -> None:
     uploads = Uploads()
-    for k in range(1000):
-        upload = uploads.take(f"part {k}.obj", OPEN)
-        if k == 500:
-            uploads.fly(upload)
-            flown = upload
-    assert sorted(files(place)) == sorted([Path(flown.path), Path(upload.path)])
-    uploads.fly(upload)
-    assert files(place) == [Path(upload.path)]
-    uploads.fly(None)
-    assert not files(place)
+    taken = [uploads.take(f"part {k}.obj", OPEN) for k in range(20)]
+    uploads.keep([taken[5].path])
+    assert files(place) == [Path(taken[5].path)]
     uploads.close()
     assert not list(place.iterdir())
     assert mesh_cache.folder() is not None
     assert not mesh_cache.folder().exists()
+
+
+@pytest.mark.parametrize(("head", "up"), [(b"", "y"), (b"# z up\n", "z"), (b"# made by hand\n# Z-up\n", "z")])
+def test_an_obj_is_y_up_unless_it_says_otherwise(place: Path, head: bytes, up: str) -> None:
+    assert Uploads().take("book.obj", head + BOOK).up == up
 
 
 def test_the_end_of_the_process_removes_its_uploads(place: Path) -> None:
@@ -220,12 +217,3 @@ def test_the_end_of_the_process_removes_its_uploads(place: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert Path(done.stdout.strip()).parent.parent.parent == place
     assert not list(place.iterdir())
-
-
-def test_what_a_killed_process_left_is_swept_up_by_the_next_and_a_living_ones_is_not(place: Path) -> None:
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    for pid in (ended.pid, os.getpid(), "text"):
-        (place / f"rigid_proto_upload_{pid}_abc").mkdir()
-    Uploads().close()
-    assert sorted(p.name.split("_")[3] for p in place.iterdir()) == sorted([str(os.getpid()), "text"])

@@ -16,7 +16,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule
 from rigid_proto_ros.scene.yaml_text import flow
-from rigid_proto_ros.workbench.save_as_script import SavedScript, save_as_script
+from rigid_proto_ros.session.script_of_session import SavedScript, script_of_session
 
 SECOND = 10**9
 
@@ -30,7 +30,7 @@ def flown(saved: SavedScript, until_ns: int) -> State:
 
 
 def assert_flies_again(hand: HandSession) -> SavedScript:
-    saved = save_as_script(hand.session())
+    saved = script_of_session(hand.session())
     assert flown(saved, hand.now_ns).sha256() == hand.simulation.state.sha256()
     return saved
 
@@ -48,7 +48,7 @@ def test_a_thousand_hand_sessions_fly_again_to_the_bit(first: int) -> None:
     other = []
     for seed in range(first, first + 100):
         hand = random_hand_session(seed, seconds=5.0)
-        saved = save_as_script(hand.session())
+        saved = script_of_session(hand.session())
         if saved.notes or flown(saved, hand.now_ns).sha256() != hand.simulation.state.sha256():
             other.append(seed)
     assert other == []
@@ -129,7 +129,7 @@ def test_a_log_with_a_line_missing_is_refused() -> None:
     session = hand.session()
     del session.events[3]
     with pytest.raises(InputError):
-        save_as_script(session)
+        script_of_session(session)
 
 
 def test_nothing_of_the_running_program_is_saved() -> None:
@@ -149,7 +149,7 @@ def test_entries_are_the_commands_of_the_hand() -> None:
     hand.load(True, "body@point/0.01,0.02,0.03", [0.1, 0.2, 0.3], [0.0, 0.0, 1e-7])
     hand.wait(SECOND // 3)
     third = 333_333_333
-    assert parse_script(save_as_script(hand.session()).script) == [
+    assert parse_script(script_of_session(hand.session()).script) == [
         ScriptCommand(third, "wrench", "body@point/0.01,0.02,0.03", (0.1, 0.2, 0.3), (0.0, 0.0, 1e-7)),
         ScriptCommand(third, "poke", "normal@tip", (0.02, 0.0, 0.0)),
     ]

@@ -25,12 +25,12 @@ from ..scene.command_codec import (
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds, scene_text
 from ..scene.yaml_text import flow
-from ..session.recorded_session import RecordedSession
-from ..session.replay import Resimulation, mesh_finder, session_scenario
-from ..session.runs import decode_event
 from ..simulation.commands import TieString, WrenchCommand
 from ..simulation.observer import Applied, Event, Logged, Observer
 from ..simulation.string_control import mesh_point
+from .recorded_session import RecordedSession
+from .replay import Resimulation, mesh_finder, session_scenario
+from .runs import decode_event
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
 """Parameters of a running node that a scene to keep or to send doesn't carry."""
@@ -49,7 +49,7 @@ class SavedScript:
     notes: list[str]
 
 
-def save_as_script(session: RecordedSession) -> SavedScript:
+def script_of_session(session: RecordedSession) -> SavedScript:
     """The run as a scene and a script; ``simulate --script`` and ``poke_client --reset`` fly it again.
 
     Raises InputError for events that can't be decoded or taken, which is what an incomplete record of the run gives.

@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: MIT
+"""The body that flies in this process, as the page uses it: what it is told and asked, and the present run in memory.
+
+The page's thread calls; the physics thread tells. What takes longer than a moment (a mesh, kernels, a run computed
+anew) is done on one worker thread, in the order in which it was asked for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import json
+import threading
+from collections import deque
+from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..base.compilation import notify_when_compiling
+from ..base.errors import InputError
+from ..live.live_simulation import LiveSimulation
+from ..scene.parameters import parameter_named
+from ..scene.scenario import Scenario, make_scenario
+from ..scene.scene_file import read_scene_text
+from ..session.branch import branch_at
+from ..session.recorded_session import RecordedSession, scene_sha256
+from ..simulation.observer import Event, Logged, Observer, Published, Reset, SceneChanged
+
+KEPT_S = 300.0
+"""[s, simulated] How far back one can go."""
+
+SPACING_NS = 5_000_000
+"""States closer than this aren't kept: a body at 1 kHz would fill the memory five times as fast."""
+
+MAX_EVENTS = 50_000
+"""Of one run: 40 minutes of pulling at 20 targets a second, 20 MB."""
+
+LOOKS = frozenset(
+    {"record", "real_time_factor", "publish_rate", "publish_clock", "publish_tf", "imu_contact", "schedule_horizon"}
+)
+"""Parameters that a lesson leaves as they are: how one looks at the motion, not the motion."""
+
+COMPILING = "compiling numerical kernels, once only; up to a minute"
+
+Entry = dict[str, Any]
+"""One entry of a poke script."""
+
+Result = TypeVar("Result")
+
+
+class RunMemory(Observer):
+    """The run since the last reset, kept as a session. Told on the physics thread, read from any."""
+
+    takes = frozenset({Published, Logged, SceneChanged, Reset})
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._lock = threading.Lock()
+        self._text = ""
+        self._begin()
+
+    def _begin(self) -> None:
+        self._scene = self._text
+        self._scenes = [self._text]
+        self._events: list[tuple[int, str]] = []
+        self._states: deque[tuple[int, np.ndarray]] = deque(maxlen=round(KEPT_S * 1e9 / SPACING_NS))
+        self._whole = True
+
+    def on(self, event: Event) -> None:
+        """Keep what a session has."""
+        with self._lock:
+            match event:
+                case Published(time_ns, row):
+                    if not self._states or time_ns >= self._states[-1][0] + SPACING_NS:
+                        self._states.append((time_ns, row.copy()))
+                case Logged(time_ns, line):
+                    self._whole &= len(self._events) < MAX_EVENTS
+                    if self._whole:
+                        self._events.append((time_ns, line))
+                case SceneChanged(time_ns, scene):
+                    self._scene_changed(time_ns, scene)
+                case Reset():
+                    self._begin()
+
+    def _scene_changed(self, time_ns: int, scene: str) -> None:
+        self._text = scene
+        if not self._scene or (time_ns == 0 and not self._events):
+            self._begin()
+        elif scene_sha256(scene) != scene_sha256(self._scenes[-1]):
+            self._scenes.append(scene)
+
+    def session(self) -> RecordedSession:
+        """The run so far. Raises InputError when more has happened in it than is kept."""
+        with self._lock:
+            if not self._whole:
+                accepted = f"at most {MAX_EVENTS} commands since the last reset; reset, then go on"
+                raise InputError("session", "more commands than are kept", accepted)
+            states = list(self._states)
+            return RecordedSession(
+                scene=self._scene,
+                events=list(self._events),
+                times=np.array([time_ns for time_ns, _ in states], np.int64),
+                rows=np.array([row for _, row in states]).reshape(-1, 13),
+                mesh_sha256=scene_sha256(self._scene),
+                node_name=self._name,
+                scenes=list(self._scenes),
+            )
+
+
+class Flight:
+    """say(text) tells the users of a refusal, busy(text) what takes time, "" when it is over.
+
+    scenario: the one in force; scenes_begun: how many others began since the start. moment_ns: the time of the past
+    that is looked at, None while the present is.
+    """
+
+    def __init__(
+        self, live: LiveSimulation, say: Callable[[str], None], busy: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self.live = live
+        self.memory = RunMemory(live.name)
+        self._say = say
+        self._busy = busy
+        self._worker = ThreadPoolExecutor(1, "page")
+        self.scenes_begun = 0
+        self._past: RecordedSession | None = None
+        self.moment_ns: int | None = None
+        self.left: RecordedSession | None = None
+        self._left_ns = 0
+        self._start: dict[str, object] = {}
+        self._ran_before = False
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario in force."""
+        return self.live.scenario
+
+    @property
+    def paused(self) -> bool:
+        """Whether simulated time stands."""
+        return self.live.paused
+
+    def close(self) -> None:
+        """No more requests."""
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    # Asking
+
+    async def _ask(self, doing: str, function: Callable[[], Result]) -> Result | None:
+        """Run a function on the worker thread; a refusal is said, and gives None."""
+        if doing:
+            self._busy(doing)
+
+        def work() -> Result:
+            with notify_when_compiling(lambda: self._busy(COMPILING)):
+                return function()
+
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._worker, work)
+        except InputError as error:
+            self._say(f"Refused: {error}")
+            return None
+        finally:
+            if doing:
+                self._busy("")
+
+    def _soon(self, asked: Awaitable[object]) -> None:
+        task = asyncio.ensure_future(asked)
+        task.add_done_callback(lambda done: None if done.cancelled() else done.exception())
+
+    def do(self, *entries: Entry) -> None:
+        """Do this by hand, in this order: entries of a poke script without their time, which is now."""
+        text = json.dumps([{"t": 0, **entry} for entry in entries])
+        self._soon(self._ask("", functools.partial(self.live.schedule, text)))
+
+    def set(self, changes: Mapping[str, object]) -> None:
+        """Set parameters, all or none."""
+        self._soon(self._ask("setting parameters", functools.partial(self.live.set_parameters, dict(changes))))
+
+    def pause(self, paused: bool) -> None:
+        """Stop simulated time, or let it go on."""
+        self._soon(self._ask("", functools.partial(self.live.pause, paused)))
+
+    def step(self) -> None:
+        """Go on by one publication period."""
+        self._soon(self._ask("", self.live.step))
+
+    def prepare(self, warm_up: Callable[[], object], start: Callable[[], None]) -> None:
+        """Compile what the body needs, then let its time begin; from any thread."""
+
+        def work() -> None:
+            with notify_when_compiling(lambda: self._busy(COMPILING)):
+                warm_up()
+            self._busy("")
+            start()
+
+        self._worker.submit(work)
+
+    # Scenes
+
+    async def fly(
+        self,
+        scene: str | Mapping[str, object],
+        script: str = "",
+        paused: bool | None = None,
+        speed: float | None = None,
+    ) -> bool:
+        """Begin a scene (parameter-file text, or its parameters) and a poke script (YAML text) at time 0; paused: or as
+        it was; speed: simulated seconds per second, or as they were. Returns whether it was taken.
+        """
+        self.look_at_present()
+
+        def begin() -> bool:
+            values: dict[str, object] = {}
+            values.update(read_scene_text(scene).values if isinstance(scene, str) else scene)
+            values.update(self._kept)
+            if speed is not None:
+                values["real_time_factor"] = speed
+            self._begin(make_scenario(values), script, self.paused if paused is None else paused)
+            self._start = {}
+            self.left = None
+            return True
+
+        return await self._ask("preparing the scene", begin) or False
+
+    @property
+    def _kept(self) -> dict[str, object]:
+        """Parameters that another scene leaves as they are."""
+        in_force = self.scenario.parameters.named()
+        return {name: value for name, value in in_force.items() if name in LOOKS or _is_of_the_node(name)}
+
+    def _begin(self, scenario: Scenario, script: str, paused: bool) -> None:
+        self.scenes_begun += 1
+        self.live.begin(scenario)
+        try:
+            if script.strip():
+                self.live.schedule(script)
+        finally:
+            self.live.pause(paused)
+
+    def reset(self) -> None:
+        """Time 0 of the scene; of the one before a branch, too."""
+        self.look_at_present()
+        self.left = None
+        start, self._start = self._start, {}
+
+        def begin() -> None:
+            if start:
+                self._begin(self.scenario.with_changes(start), "", self.paused)
+            else:
+                self.live.reset()
+
+        self._soon(self._ask("", begin))
+
+    # The past
+
+    @property
+    def reach_s(self) -> tuple[float, float]:
+        """The first and the last simulated time [s] that can be looked at."""
+        past = self._past
+        if past is None or not len(past.times):
+            return 0.0, self.live.state.time_ns * 1e-9
+        return float(past.times[0]) * 1e-9, float(past.times[-1]) * 1e-9
+
+    def look_at(self, time_s: float) -> None:
+        """Show the body as it was at a time of this run; simulated time stands meanwhile."""
+        if self._past is None:
+            try:
+                past = self.memory.session()
+            except InputError as error:
+                self._say(str(error))
+                return
+            if not len(past.times):
+                return
+            self._past, self._ran_before = past, not self.paused
+            self.pause(True)
+        k = int(np.searchsorted(self._past.times, round(time_s * 1e9), side="right")) - 1
+        self.moment_ns = int(self._past.times[max(k, 0)])
+
+    def look_back(self, seconds: float) -> None:
+        """Look at a time before the one that is shown; after it with a negative number."""
+        shown_ns = self.live.state.time_ns if self.moment_ns is None else self.moment_ns
+        time_s = shown_ns * 1e-9 - seconds
+        if self._past is not None and time_s > self.reach_s[1]:
+            self.look_at_present()
+        elif seconds > 0.0 or self._past is not None:
+            self.look_at(max(time_s, 0.0))
+
+    def look_at_present(self) -> None:
+        """Show the present again, which goes on if it did."""
+        if self._past is not None:
+            self._past = self.moment_ns = None
+            if self._ran_before:
+                self.pause(False)
+
+    def past_rows(self, lasting_ns: int) -> tuple[np.ndarray, np.ndarray]:
+        """Times (n,) and states (n, 13) up to the one that is looked at."""
+        past, moment_ns = self._past, self.moment_ns
+        assert past is not None
+        assert moment_ns is not None
+        first, last = np.searchsorted(past.times, [moment_ns - lasting_ns, moment_ns])
+        return past.times[first : last + 1], past.rows[first : last + 1]
+
+    def left_row(self, time_ns: int) -> np.ndarray | None:
+        """Where the body was in the future that the last branch left, at a time of this run; None for nowhere."""
+        left = self.left
+        if left is None:
+            return None
+        k = int(np.searchsorted(left.times, self._left_ns + time_ns, side="right")) - 1
+        return left.rows[k] if 0 <= k < len(left.times) - 1 else None
+
+    async def go_on_from_here(self) -> None:
+        """Let simulated time go on from the moment that is looked at, with another future."""
+        past, moment_ns = self._past, self.moment_ns
+        if past is None or moment_ns is None:
+            return
+        before = self.scenario.parameters.named()
+
+        def branch() -> bool:
+            values: dict[str, object] = {}
+            values.update(read_scene_text(branch_at(past, moment_ns).scene).values)
+            values.update(self._kept)
+            start: dict[str, object] = {name: value for name, value in before.items() if name.startswith("initial.")}
+            self._begin(make_scenario(values), "", False)
+            self._start = self._start or start
+            self.left, self._left_ns = past, moment_ns
+            return True
+
+        if await self._ask("going back", branch):
+            self._past = self.moment_ns = None
+
+
+def _is_of_the_node(name: str) -> bool:
+    """Whether a parameter belongs to the running program, and not to what flies in it."""
+    return parameter_named(name).changes == "read-only" and not name.startswith(("contacts.", "thrusters."))

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""The tab of forces: poke and string, gravity and damping, the start, integrators and the ghost."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from ..motion.integrators import INTEGRATORS
+from .controls import TYPING_S, Controls, log_slider, on_slider, parse_numbers
+from .flight import Flight
+from .pointer import POKE, PUSH, Tools
+
+GRABBED, COM = "Grabbed point", "Centre of mass"
+
+GRAVITIES = {"off": [0.0, 0.0, 0.0], "Earth's": [0.0, 0.0, -9.81], "Moon's": [0.0, 0.0, -1.62]}
+
+FORCE_DECADES = 2.0
+"""Of the force's slider, up and down from the force that suits the body."""
+
+STRONGEST = 1e12
+"""[N] More comes from a slip of the finger."""
+
+
+class PhysicsTab:
+    """All of it is parameters, but the tools of the pointer."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tabs: viser.GuiTabGroupHandle,
+        controls: Controls,
+        tools: Tools,
+        flight: Flight,
+        say: Callable[[str], None],
+    ) -> None:
+        self._gui = gui
+        self._controls = controls
+        self._tools = tools
+        self._flight = flight
+        self._say = say
+        with tabs.add_tab("Forces"):
+            self._poke_folder()
+            self._string_folder()
+            self._start_folder()
+            self._surroundings()
+
+    def _start_folder(self) -> None:
+        with self._gui.add_folder("Start, at the next reset"):
+            self._controls.vector("initial.position", "Initial position [m]", 3)
+            self._controls.vector("initial.orientation_xyzw", "Initial attitude x y z w", 4)
+            self._controls.vector("initial.angular_velocity", "Initial spin [rad/s]", 3)
+            self._controls.vector("initial.linear_velocity", "Initial velocity [m/s]", 3)
+
+    def show_force(self) -> None:
+        """The poke's force, as it is now, in all its inputs."""
+        force = self._tools.force
+        times = force / self._tools.usual_force
+        for box, text in ((self._force, f"{force:.4g}"), (self._times, f"{times:.4g}")):
+            # "2." means what is in force, so it may stay as it is typed.
+            if parse_numbers(box.value, 1) != parse_numbers(text, 1):
+                box.value = text
+        place = on_slider(abs(times), FORCE_DECADES)
+        if self._slider.value != place:
+            self._slider.value = place
+
+    def _poke_folder(self) -> None:
+        gui, tools = self._gui, self._tools
+        with gui.add_folder("Poke (click)"):
+            click = gui.add_dropdown(
+                "Click", (POKE, PUSH), initial_value=POKE, hint="What a click does; shift-click does the other"
+            )
+            self._force: Any = gui.add_text("Force [N]", "1", hint="Force of a poke; its duration is the next input")
+            suits = "Times a force that suits the body's mass and size"
+            self._times: Any = gui.add_text("Force ×", "1", hint=suits)
+            self._slider: Any = log_slider(gui, FORCE_DECADES, suits)
+            self._controls.number("poke_duration", "Duration [s]")
+
+        @click.on_update
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            tools.click = click.value
+
+        def take(force: float) -> None:
+            tools.force = float(f"{force:.9g}")
+            self.show_force()
+
+        def typed(box: viser.GuiInputHandle[Any], unit: Callable[[], float]) -> None:
+            def complain(text: str) -> None:
+                if box.value == text:  # else somebody is still typing
+                    self._say(f"{box.label}: got {text[:40]!r}; accepted: a number, up to {STRONGEST:g} N")
+                    self.show_force()
+
+            @box.on_update
+            async def _(event: viser.GuiEvent[Any]) -> None:
+                if event.client is None:
+                    return
+                numbers = parse_numbers(box.value, 1)
+                if numbers is not None and abs(numbers[0] * unit()) <= STRONGEST:
+                    take(numbers[0] * unit())
+                else:
+                    asyncio.get_running_loop().call_later(TYPING_S, complain, box.value)
+
+        typed(self._force, lambda: 1.0)
+        typed(self._times, lambda: tools.usual_force)
+
+        @self._slider.on_update
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                take(float(f"{tools.usual_force * 10.0 ** self._slider.value[0]:.3g}"))
+
+    def _string_folder(self) -> None:
+        gui, tools, controls = self._gui, self._tools, self._controls
+        with gui.add_folder("String (drag)"):
+            at = gui.add_dropdown(
+                "Pull at", (GRABBED, COM), initial_value=GRABBED, hint="Where the string is tied when you drag"
+            )
+            hint = "Frequency of the effective mass (string.frequency)"
+            strength = gui.add_slider("Strength [rad/s]", 1.0, 40.0, 0.5, tools.frequency, hint=hint)
+            hint = "Light and heavy bodies then respond alike"
+            scaled = gui.add_checkbox("Scaled by effective mass", True, hint=hint)
+            controls.number("string.stiffness", "Stiffness [N/m]")
+            controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
+            controls.number("string.rest_length", "Rest length [m]")
+            controls.checkbox("string.bilateral", "Pushes too")
+            controls.checkbox("string.attached", "Tied from the start")
+            controls.vector("string.attach", "Tied at x y z", 3)
+            controls.number("string.timeout", "Released after [s]")
+
+        @at.on_update
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            tools.at_com = at.value == COM
+
+        for handle in (strength, scaled):
+
+            @handle.on_update
+            async def _(event: viser.GuiEvent[Any]) -> None:
+                if event.client is not None:
+                    tools.frequency = float(strength.value) if scaled.value else 0.0
+                    self._flight.set({"string.frequency": tools.frequency})
+
+    def _surroundings(self) -> None:
+        gui, controls = self._gui, self._controls
+        with gui.add_folder("Physics"):
+            controls.checkbox("gyroscopic", "Gyroscopic term ω × Iω")
+            controls.vector("gravity", "Gravity [m/s²]", 3)
+            gravity = gui.add_button_group("Gravity is", tuple(GRAVITIES))
+            controls.number("linear_damping", "Linear damping [N s/m]")
+            controls.number("angular_damping", "Angular damping [N m s]")
+            controls.choice("integrator", "Integrator", tuple(INTEGRATORS))
+            controls.number("step", "Step [s]")
+            controls.number("accuracy", "Accuracy [1/s]")
+        with gui.add_folder("Ghost beside it", expand_by_default=False):
+            controls.choice("ghost.inertia_model", "Its tensor")
+            controls.choice("ghost.integrator", "Its integrator")
+
+        @gravity.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            self._flight.set({"gravity": GRAVITIES[gravity.value]})

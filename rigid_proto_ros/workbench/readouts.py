@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""Numbers and small plots of the flight: the five that a lesson speaks of, and all of them a click away."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+import viser
+
+from ..mass.tensor import principal_axes
+from ..motion.state import State
+from ..picture import style
+from ..picture.plot_range import AXIS_PIXELS, PlotRange, plot_range
+from ..picture.plots import angle_to
+from ..scene.scenario import Scenario
+from ..simulation.quantities import attitude_angle
+
+SPEED, SPIN, SPINS, COM_PLACE = "speed of the COM", "|ω|", "ω₁ ω₂ ω₃", "COM x y z"
+ENERGY, TRANSLATIONAL, ROTATIONAL = "energy", "translational energy", "rotational energy"
+MOMENTUM, DRIFT, GHOST_ANGLE = "|L|", "L has turned by", "angle to the ghost"
+
+PLOTTED_S = 20.0
+"""[s, simulated] Length of the plots, up to now."""
+
+SAMPLE_S = 0.1
+"""[s, simulated] Between two points of a plot."""
+
+NUMBERS_S, PLOTS_S = 0.2, 0.5
+"""[s] How often numbers and plots are drawn anew."""
+
+PADDING = (10, 12, 0, 0)
+"""[pixels] Above, right, below, left of a plot: a number at the end of an axis has half of its size beyond it."""
+
+PLOT_PIXELS = 130
+
+AXES: Any = ({"label": "seconds before now", "labelSize": 14, "size": 30}, {"size": AXIS_PIXELS})
+
+ROUNDING = 1e-9
+"""Relative, and in degrees: what is smaller comes from the arithmetic."""
+
+FLAT_ANGLE = 1.0
+"""[°] An angle's plot spans at least this much: rounding isn't blown up to fill it."""
+
+
+def html_table(rows: Iterable[tuple[str, str]]) -> str:
+    """Names and values as HTML, which a browser takes at once; Markdown it would compile anew at every change."""
+    cells = "".join(
+        f'<tr><td style="opacity: 0.65; padding: 0 1em 0 0">{escape(name)}</td><td>{escape(value)}</td></tr>'
+        for name, value in rows
+    )
+    return f'<table style="margin: 0.4em 0.9em; font-size: 0.85em; line-height: 1.5">{cells}</table>'
+
+
+class LivePlot:
+    """One small plot of values against seconds before now. series: name and colour of each; least: as ``plot_range``
+    takes it.
+    """
+
+    def __init__(
+        self,
+        gui: Any,
+        title: str,
+        unit: str,
+        series: Sequence[tuple[str, style.Colour]],
+        least: float = 0.0,
+    ) -> None:
+        self._title, self._unit, self._least = title, unit, least
+        self._range = PlotRange(0, -1.0, 1.0)
+        self.columns = len(series)
+        styles = [
+            {"label": "t"},
+            *({"label": name, "stroke": style.css(colour), "width": 1.5} for name, colour in series),
+        ]
+        self._handle = gui.add_uplot(
+            tuple(np.zeros(1) for _ in styles),
+            tuple(styles),
+            title=self._range.title(title, unit),
+            scales=self._scales,
+            axes=AXES,
+            height=PLOT_PIXELS,
+            # Its values are those under the pointer, "--" while there is none.
+            legend={"show": len(series) > 1, "live": False},
+            padding=PADDING,
+        )
+
+    @property
+    def _scales(self) -> Any:
+        return {"x": {"time": False, "range": (-PLOTTED_S, 0.0)}, "y": {"range": (self._range.low, self._range.high)}}
+
+    def show(self, ages_s: np.ndarray, values: np.ndarray) -> None:
+        """Draw values (n, columns) at times (n,) [s] up to 0, which is now."""
+        suited = plot_range(values, self._least)
+        if suited != self._range:
+            # The page makes the plot anew for these, so they change in steps.
+            self._range = suited
+            self._handle.scales = self._scales
+            title = suited.title(self._title, self._unit)
+            if self._handle.title != title:
+                self._handle.title = title
+        self._handle.data = (ages_s, *(values / 10.0**suited.exponent).T)
+
+    def switch(self, shown: bool) -> None:
+        """Show or hide it."""
+        if self._handle.visible != shown:
+            self._handle.visible = shown
+
+
+class Readings:
+    """What can be read off a flight. ``restart`` at every reset; values: as text, by name."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, str] = {}
+        self._samples: deque[tuple[float, ...]] = deque()
+        self._start: np.ndarray | None = None
+
+    def restart(self) -> None:
+        """The flight began anew."""
+        self._samples.clear()
+        self._start = None
+
+    @property
+    def samples(self) -> np.ndarray:
+        """(n, 11): time [s], five energies [J], ω in principal axes (3), angle of L and of the ghost [°]."""
+        return np.array(self._samples)
+
+    def is_due(self, time_ns: int) -> bool:
+        """Whether a point of the plots belongs to this time."""
+        return not self._samples or time_ns * 1e-9 >= self._samples[-1][0] + SAMPLE_S
+
+    def take(self, scenario: Scenario, state: State, string_energy: float, ghost: np.ndarray | None) -> None:
+        """A state, what the string holds [J], and the ghost's state (13,)."""
+        body = scenario.setup.body
+        momentum = state.angular_momentum(body.inertia)
+        length = float(np.linalg.norm(momentum))
+        if self._start is None and length > 0.0:
+            self._start = momentum
+        angle = 0.0 if self._start is None else float(np.degrees(angle_to(self._start, momentum[np.newaxis])[0]))
+        w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
+        kinetic = state.kinetic_energy(body.mass, body.inertia)
+        translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
+        rotational = kinetic - translational
+        gravity = -body.mass * float(scenario.setup.gravity @ state.position)
+        total = kinetic + gravity + string_energy
+        apart = 0.0
+        if ghost is not None:
+            apart = float(np.degrees(attitude_angle(np.array(state.orientation_xyzw), ghost[3:7])))
+        time_s = state.time_ns * 1e-9
+        if self._samples and time_s < self._samples[-1][0]:
+            self._samples.clear()
+        if self.is_due(state.time_ns):
+            energies = (translational, rotational, gravity, string_energy, total)
+            self._samples.append((time_s, *energies, *w.tolist(), angle, apart))
+        while self._samples[0][0] < time_s - PLOTTED_S:
+            self._samples.popleft()
+        spin = float(np.linalg.norm(state.angular_velocity_body))
+        spins = " ".join(f"{x if abs(x) > ROUNDING * spin else 0.0:.3g}" for x in w)
+        self.values = {
+            SPEED: f"{_seen(float(np.linalg.norm(state.linear_velocity))):.4g} m/s",
+            SPIN: f"{_seen(spin):.4g} {style.OMEGA_UNIT}",
+            SPINS: f"{spins} {style.OMEGA_UNIT}",
+            ENERGY: f"{total:.5g} {style.ENERGY_UNIT}",
+            TRANSLATIONAL: f"{_seen(translational):.4g} {style.ENERGY_UNIT}",
+            ROTATIONAL: f"{_seen(rotational):.4g} {style.ENERGY_UNIT}",
+            MOMENTUM: f"{length:.5g} {style.MOMENTUM_UNIT}",
+            DRIFT: f"{_seen(angle):.3g}{style.ANGLE_UNIT}",
+            COM_PLACE: " ".join(f"{_seen(x):.4g}" for x in state.position) + " m",
+        }
+        if ghost is not None:
+            self.values[GHOST_ANGLE] = f"{apart:.0f}{style.ANGLE_UNIT}"
+
+
+def _seen(value: float) -> float:
+    return value if abs(value) > ROUNDING else 0.0
+
+
+class ReadoutTab:
+    """All numbers and the plots, in a tab of their own."""
+
+    def __init__(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, readings: Readings) -> None:
+        self._readings = readings
+        with tabs.add_tab("Plots"):
+            self._numbers = gui.add_html("")
+            self._plots = (
+                LivePlot(
+                    gui,
+                    style.ENERGY_TITLE,
+                    style.ENERGY_UNIT,
+                    (*style.ENERGY_SERIES, *style.STRING_ENERGY_SERIES, *style.TOTAL_ENERGY_SERIES),
+                ),
+                LivePlot(gui, style.OMEGA_TITLE, style.OMEGA_UNIT, style.OMEGA_SERIES),
+                LivePlot(
+                    gui, style.MOMENTUM_ANGLE_TITLE, style.ANGLE_UNIT, style.MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE
+                ),
+                LivePlot(
+                    gui,
+                    style.GHOST_ANGLE_TITLE,
+                    style.ANGLE_UNIT,
+                    (("angle", style.GHOST_COLOUR),),
+                    least=FLAT_ANGLE,
+                ),
+            )
+        self._numbers_due_s = self._plots_due_s = 0.0
+
+    def draw(self, now_s: float, more: Mapping[str, str]) -> None:
+        """Draw what is due; more: rows below the numbers."""
+        readings = self._readings
+        if now_s >= self._numbers_due_s:
+            self._numbers_due_s = now_s + NUMBERS_S
+            content = html_table((*readings.values.items(), *more.items()))
+            if self._numbers.content != content:
+                self._numbers.content = content
+        samples = readings.samples
+        if now_s >= self._plots_due_s and len(samples) > 1:
+            self._plots_due_s = now_s + PLOTS_S
+            ages = samples[:, 0] - samples[-1, 0]
+            self._plots[-1].switch(GHOST_ANGLE in readings.values)
+            first = 1
+            for plot in self._plots:
+                plot.show(ages, samples[:, first : first + plot.columns])
+                first += plot.columns
