@@ -18,7 +18,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 KEYS = {
     *("time_ns", "position", "orientation_xyzw", "linear_velocity", "angular_velocity", "angular_velocity_body"),
     *("kinetic_energy", "potential_energy", "angular_momentum", "integrator", "steps", "force_evaluations"),
-    *("wall_time", "state_hash"),
+    *("wall_time", "state_hash", "accuracy_floor"),
 }
 DEFAULTS = {
     "mesh": "t_handle",
