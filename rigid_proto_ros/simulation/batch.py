@@ -64,7 +64,8 @@ class Variants:
 @dataclass
 class Results:
     """status (n,): 1 done, 0 the simulation must do it. end_ns (n,), stop (n,): which condition ended it, −1 none.
-    measured (n, k); states (n, 13) at the end.
+    measured (n, k); states (n, 13) at the end. floors (n, FLOOR_KINDS): what has held the motion to less than its
+    accuracy (simulation/flight.py).
     """
 
     status: np.ndarray
@@ -72,13 +73,14 @@ class Results:
     stop: np.ndarray
     measured: np.ndarray
     states: np.ndarray
+    floors: np.ndarray
 
 
 def new_results(rows: int, measures: int) -> Results:
     """Empty ones, as failed rows have them."""
     unknown = np.full((rows, measures), np.nan)
-    state = np.full((rows, STATE - 1), np.nan)
-    return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, state)
+    state, floors = np.full((rows, STATE - 1), np.nan), np.zeros((rows, fl.FLOOR_KINDS))
+    return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, state, floors)
 
 
 _VARIANTS = (
@@ -94,7 +96,7 @@ _VARIANTS = (
 _Flights = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool, np.ndarray]
 """Arrays of a block, in the order of _VARIANTS."""
 _SAMPLING = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
-_RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1])
+_RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
@@ -229,7 +231,8 @@ def _fly_block(
     """Variations first to last − 1."""
     variants, references = uncounted(variants), uncounted(references)
     sample_ns, watched, stops, measures = uncounted((sample_ns, watched, stops, measures))
-    status, end_ns, stop, measured, finals = uncounted(results)
+    status, end_ns, stop, measured, finals, floors = uncounted(results)
+    flights, times, chooses, methods = room[2][0], variants[4], variants[6], variants[7]
     body, context, tables, states, others = uncounted(room)
     # One place that flies, whichever it is: a second one would be compiled a second time.
     sides, kept, ends = (references, variants), (others, states), (stops[:0], stops)
@@ -245,6 +248,10 @@ def _fly_block(
         status[i] = 1
         end_ns[i] = sample_ns[reached - 1]
         copy_numbers(states[reached - 1], finals[i])
+        if chooses:
+            degree = times[i if times.shape[0] > 1 else 0, b.DEGREE]
+            copy_numbers(flights[0].floors, floors[i])
+            fl.note_floors(flights[0], methods[degree], floors[i])
         measure_flight(measures, states, others, sample_ns, watched, reached, context, measured[i])
 
 
@@ -285,7 +292,7 @@ def fly_variants(
     """Fly all variants, each beside its reference if there are any; the rows that it can't check have status 0."""
     rows = len(variants)
     results = new_results(rows, len(measures))
-    filled = (results.status, results.end_ns, results.stop, results.measured, results.states)
+    filled = (results.status, results.end_ns, results.stop, results.measured, results.states, results.floors)
     own = variants.arrays
     other = own if references is None else references.arrays
     room = _room(variants, references, len(sample_ns))

@@ -87,6 +87,10 @@ class EventNotifier:
         if readings.time_ns >= self._next_effort_ns:
             self._next_effort_ns = readings.time_ns + EFFORT_PERIOD_NS
             self.observer.on(Effort(readings.time_ns, readings.steps, readings.force_evaluations))
+            floor = readings.accuracy_floor
+            if floor != self._told.get("accuracy", ""):
+                self._told["accuracy"] = floor
+                self.observer.on(StatusChanged(readings.time_ns, "accuracy", floor))
 
     def load_began(self, readings: Readings, load_id: int, kind: str, load: Load) -> None:
         """A load begins to act; ``kind`` is wrench, poke, impulse or thruster."""

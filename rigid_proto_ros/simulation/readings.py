@@ -5,13 +5,15 @@ motion has cost.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..base.rotation import Numbers, cross, dot, length, times, transposed_times
 from ..motion.loads import LoadSum
 from ..motion.state import State
 from ..motion.string import Tied
-from .flight import HELD_WRENCH, NEVER
+from .flight import FLOOR_KINDS, HELD_WRENCH, NEVER
 from .flight_arrays import ActingLoad, FlightArrays
 from .in_flight import GoingLoad, InFlight
 from .segment import Segment
@@ -32,6 +34,11 @@ FLOORS = (
     "rounding of a position far from the world's origin is {:.2g} of the body's size",
 )
 """In the order of flight.FLOOR_KINDS."""
+
+
+def floor_text(floors: Iterable[float]) -> str:
+    """What floors of a flight, by kind, say; empty where there are none."""
+    return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
 
 
 class Readings:
@@ -88,10 +95,14 @@ class Readings:
         """Why, since start or reset, rounding and not the accuracy asked for has set what the motion errs; empty where
         it hasn't, or nothing adapts to the accuracy.
         """
+        return floor_text(self.floors)
+
+    @property
+    def floors(self) -> list[float]:
+        """The same by kind (flight.FLOOR_KINDS), 0 where it hasn't."""
         if not self.setup.integrator.chooses and self.setup.integrator.name != "free_body":
-            return ""
-        floors = self._arrays.floors
-        return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
+            return [0.0] * FLOOR_KINDS
+        return self._arrays.floors
 
     @property
     def too_coarse(self) -> str:

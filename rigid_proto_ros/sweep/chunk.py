@@ -17,6 +17,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..scene.declaration import Value
 from ..simulation.batch import Results, fly_variants, new_results
+from ..simulation.readings import floor_text
 from .forms import VERTEX, Draw, as_text
 from .groups import Group, is_structural
 from .row_flight import fly_row
@@ -131,7 +132,7 @@ def _fly_group(study: Study, key: tuple, members: np.ndarray, columns: list[np.n
         good &= also_good
     done = fly_variants(variants, references, measures.sample_ns, measures.watched, measures.stops, measures.table)
     done.status[~good] = 0
-    for name in ("status", "end_ns", "stop", "measured", "states"):
+    for name in ("status", "end_ns", "stop", "measured", "states", "floors"):
         getattr(flown.results, name)[members] = getattr(done, name)
 
 
@@ -147,7 +148,7 @@ def _fly_alone(study: Study, i: int, columns: list[np.ndarray], flown: _Rows) ->
         return
     result = fly_row(study, row)
     results.measured[i], results.stop[i] = result.measured, result.stop
-    results.end_ns[i], results.states[i] = result.end_ns, result.state
+    results.end_ns[i], results.states[i], results.floors[i] = result.end_ns, result.state, result.floors
     if result.failure:
         flown.failures[i] = result.failure
     else:
@@ -172,6 +173,10 @@ def _table(study: Study, rows: np.ndarray, columns: list[np.ndarray], flown: _Ro
     if study.measures.stop_names:
         names = np.array([*study.measures.stop_names, None], dtype=object)
         table["stopped"] = names[results.stop]
+    floors = np.full(len(rows), None, dtype=object)
+    for i in np.flatnonzero(results.floors.any(axis=1) & ~failed).tolist():
+        floors[i] = floor_text(results.floors[i])
+    table["accuracy_floor"] = floors
     failures = np.full(len(rows), None, dtype=object)
     for i, reason in flown.failures.items():
         failures[i] = reason

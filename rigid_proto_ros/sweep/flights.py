@@ -94,6 +94,13 @@ class Flight:
         """
         return self._run.simulation.state
 
+    @property
+    def accuracy_floor(self) -> str:
+        """Why, since time 0, rounding and not the accuracy asked for has set what the motion errs; empty where it
+        hasn't.
+        """
+        return self._run.simulation.accuracy_floor
+
     def close(self) -> None:
         """Finish the recording."""
         if self._observer is not None:

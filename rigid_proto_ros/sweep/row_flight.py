@@ -12,6 +12,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..scene.offline import OfflineRun
 from ..scene.scenario import Scenario
+from ..simulation.flight import FLOOR_KINDS
 from ..simulation.flight_measures import measure_flight
 from ..simulation.quantities import CONTEXT, STATE, begin, which_is_met
 from ..simulation.simulation import Simulation
@@ -23,7 +24,7 @@ from .variation import Variation
 @dataclass
 class RowResult:
     """failure: why there is no result, or empty. stop: number of the condition that ended the flight, or −1. end_ns:
-    when it ended. measured (k,), state (13,) at the end.
+    when it ended. measured (k,), state (13,) at the end. floors (FLOOR_KINDS,): simulation/flight.py.
     """
 
     failure: str
@@ -31,6 +32,7 @@ class RowResult:
     end_ns: int
     measured: np.ndarray
     state: np.ndarray
+    floors: np.ndarray
 
 
 def fly_row(study: Study, row: Variation) -> RowResult:
@@ -38,28 +40,34 @@ def fly_row(study: Study, row: Variation) -> RowResult:
     measures = study.measures
     measured = np.full(len(measures.table), np.nan)
     states, others = np.zeros((len(measures.sample_ns), STATE)), np.zeros((len(measures.sample_ns), STATE))
-    context = np.zeros(CONTEXT)
+    context, floors = np.zeros(CONTEXT), np.zeros(FLOOR_KINDS)
     try:
         scenario = row.scenario
         if study.reference is not None:
             reference = scenario.with_changes(study.reference)
-            reached, _, failure = _fly(reference, row, measures, others, context, np.zeros((0, 3)))
+            reached, _, failure = _fly(reference, row, measures, others, context, np.zeros((0, 3)), floors)
             if failure:
-                return RowResult(f"reference: {failure}", -1, 0, measured, np.full(13, np.nan))
-        reached, stop, failure = _fly(scenario, row, measures, states, context, measures.stops)
+                return RowResult(f"reference: {failure}", -1, 0, measured, np.full(13, np.nan), floors)
+        reached, stop, failure = _fly(scenario, row, measures, states, context, measures.stops, floors)
     except InputError as error:
-        return RowResult(" ".join(str(error).split()), -1, 0, measured, np.full(13, np.nan))
+        return RowResult(" ".join(str(error).split()), -1, 0, measured, np.full(13, np.nan), floors)
     if failure:
-        return RowResult(failure, -1, 0, measured, np.full(13, np.nan))
+        return RowResult(failure, -1, 0, measured, np.full(13, np.nan), floors)
     times = measures.sample_ns
     measure_flight(measures.table, states, others, times, measures.watched, reached, context, measured)
-    return RowResult("", stop, int(times[reached - 1]), measured, states[reached - 1, :13].copy())
+    return RowResult("", stop, int(times[reached - 1]), measured, states[reached - 1, :13].copy(), floors)
 
 
 def _fly(
-    scenario: Scenario, row: Variation, measures: Measures, states: np.ndarray, context: np.ndarray, stops: np.ndarray
+    scenario: Scenario,
+    row: Variation,
+    measures: Measures,
+    states: np.ndarray,
+    context: np.ndarray,
+    stops: np.ndarray,
+    floors: np.ndarray,
 ) -> tuple[int, int, str]:
-    """Fill ``states`` at the times; how many were reached, which stop held, and why it failed."""
+    """Fill ``states`` at the times, and ``floors``; how many were reached, which stop held, and why it failed."""
     simulation = OfflineRun(scenario, row.commands).simulation
     body = simulation.setup.body
     first = _state(simulation)
@@ -69,6 +77,7 @@ def _fly(
         if simulation.failure:
             return 0, -1, simulation.failure
         states[k] = _state(simulation)
+        floors[:] = simulation.floors
         stop = which_is_met(stops, states[k], context)
         if stop >= 0:
             return k + 1, stop, _refusals(simulation)

@@ -97,6 +97,20 @@ def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -
         assert reasons[0] is None and "for this body: auto follows rates up to" in reasons[1]
 
 
+def test_a_floor_of_accuracy_is_in_the_table_whoever_flew_the_row() -> None:
+    vary = {
+        "initial.angular_velocity": {"list": [[0.1, 0.2, 3.0], [6e4, 7e4, -3e4]]},
+        "accuracy": {"list": [1e-9, 1e-12]},
+    }
+    flown = study({"scene": "t_handle", "duration": 0.01, "samples": 1, "vary": vary})
+    by_simulation = study({**PULLED, "duration": 0.01, "samples": 1, "vary": vary})
+    for own, simulated in ((flown, 0), (by_simulation, 2)):
+        chunk = run_chunk(own, 0, own.rows)
+        assert chunk.simulated == simulated
+        slow, *others = chunk.columns["accuracy_floor"].tolist()
+        assert slow is None and "rounding of the spin" in others[-1]
+
+
 def test_what_the_batch_refuses_is_the_simulations_to_explain() -> None:
     spec = {
         "scene": "t_handle",
