@@ -43,10 +43,10 @@ ALLOWED = {
     ("base/addresses.py", "np.prod"): FRACTIONS,
     ("motion/surface.py", ".sum"): "of three numbers in compiled code: one after the other",
     ("motion/loads.py", "sum"): "asked only whether it is finite",
-    ("simulation/flight_arrays.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "**"): FRACTIONS,
     ("sweep/forms.py", "**"): "of decimal numbers, whose digits are fixed",
+    ("sweep/row_random.py", "np.random"): "SeedSequence and Philox, whole numbers",
     ("sweep/sampling.py", "np.random"): "SeedSequence, whole numbers, and Sobol's, which the golden hashes compare",
     **{(f"sweep/{name}.py", "sum"): FRACTIONS for name in ("cluster", "study", "run", "table")},
 }

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random numbers that belong to a row: the same whatever rows are drawn beside it, in which order and by whom.
 
-Row i's numbers are those of ``numpy.random.default_rng(SeedSequence(seed, spawn_key=(i,))).random(n)``, computed here
-without an object per row: SeedSequence is O'Neill's seed_seq (pcg-random.org, "Developing a seed_seq alternative",
-2015) and the generator PCG64 XSL RR (O'Neill, HMC-CS-2014-0905), both as NumPy's documentation fixes them.
+They come from a generator with a counter (Philox; Salmon, Moraes, Dror and Shaw, SC 2011), which is set to the row's
+own place in the sequence.
 """
 
 from __future__ import annotations
@@ -11,109 +10,27 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy import uint32, uint64
+from numpy import uint64
 
 from ..base.compilation import njit
 from ..base.elementary import exponential_of, logarithm, sine_cosine
 
-_POOL = 4
-_LOW = uint64(0xFFFFFFFF)
-_MULTIPLIER_HIGH, _MULTIPLIER_LOW = uint64(2549297995355413924), uint64(4865540595714422341)
+_WORDS = 4
+"""Of 64 bits that the generator gives a count."""
 
 
-@njit(cache=True)
-def _hashed(value: uint32, constant: uint32, multiplier: uint32) -> tuple[uint32, uint32]:
-    """The value hashed, and the next constant."""
-    value = uint32(value ^ constant)
-    constant = uint32(constant * multiplier)
-    value = uint32(value * constant)
-    return uint32(value ^ (value >> uint32(16))), constant
-
-
-@njit(cache=True)
-def _mixed(x: uint32, y: uint32) -> uint32:
-    result = uint32(uint32(x * uint32(0xCA01F9DD)) - uint32(y * uint32(0x4973F715)))
-    return uint32(result ^ (result >> uint32(16)))
-
-
-@njit(cache=True)
-def _fill_pool(entropy: np.ndarray, pool: np.ndarray) -> None:
-    constant = uint32(0x43B0D7E5)
-    for i in range(_POOL):
-        pool[i], constant = _hashed(entropy[i] if i < entropy.size else uint32(0), constant, uint32(0x931E8875))
-    for source in range(_POOL):
-        for target in range(_POOL):
-            if source != target:
-                value, constant = _hashed(pool[source], constant, uint32(0x931E8875))
-                pool[target] = _mixed(pool[target], value)
-    for source in range(_POOL, entropy.size):
-        for target in range(_POOL):
-            value, constant = _hashed(entropy[source], constant, uint32(0x931E8875))
-            pool[target] = _mixed(pool[target], value)
-
-
-@njit(cache=True)
-def _words(pool: np.ndarray, out: np.ndarray) -> None:
-    """Four 64-bit words of the sequence."""
-    constant = uint32(0x8B51F9DD)
-    for k in range(8):
-        value, constant = _hashed(pool[k % _POOL], constant, uint32(0x58F38DED))
-        out[k // 2] = uint64(value) if k % 2 == 0 else out[k // 2] | (uint64(value) << uint64(32))
-
-
-@njit(cache=True)
-def _times(a: uint64, b: uint64) -> tuple[uint64, uint64]:
-    """Upper and lower half of the 128-bit product of two 64-bit words."""
-    a0, a1, b0, b1 = a & _LOW, a >> uint64(32), b & _LOW, b >> uint64(32)
-    low, middle, other = a0 * b0, a0 * b1, a1 * b0
-    carry = (low >> uint64(32)) + (middle & _LOW) + (other & _LOW)
-    high = a1 * b1 + (middle >> uint64(32)) + (other >> uint64(32)) + (carry >> uint64(32))
-    return high, (low & _LOW) | (carry << uint64(32))
-
-
-@njit(cache=True)
-def _stepped(high: uint64, low: uint64, added_high: uint64, added_low: uint64) -> tuple[uint64, uint64]:
-    """state · multiplier + increment, modulo 2¹²⁸."""
-    product_high, product_low = _times(low, _MULTIPLIER_LOW)
-    product_high += low * _MULTIPLIER_HIGH + high * _MULTIPLIER_LOW
-    total = product_low + added_low
-    return product_high + added_high + (uint64(1) if total < product_low else uint64(0)), total
-
-
-@njit(cache=True)
-def row_uniforms(seed_words: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (n, k) with the first k uniform numbers in [0, 1) of each row (n,). seed_words: the seed
-    in 32-bit words.
-    """
-    length = max(seed_words.size, _POOL)
-    words, pool = np.zeros(4, np.uint64), np.zeros(_POOL, np.uint32)
-    for i in range(rows.size):
-        row = uint64(rows[i])
-        entropy = np.zeros(length + (1 if row <= _LOW else 2), np.uint32)
-        entropy[: seed_words.size] = seed_words
-        entropy[length] = uint32(row & _LOW)
-        if row > _LOW:
-            entropy[length + 1] = uint32(row >> uint64(32))
-        _fill_pool(entropy, pool)
-        _words(pool, words)
-        added_high = (words[2] << uint64(1)) | (words[3] >> uint64(63))
-        added_low = (words[3] << uint64(1)) | uint64(1)
-        low = added_low + words[1]
-        high = added_high + words[0] + (uint64(1) if low < added_low else uint64(0))
-        high, low = _stepped(high, low, added_high, added_low)
-        for k in range(out.shape[1]):
-            high, low = _stepped(high, low, added_high, added_low)
-            x, turn = high ^ low, high >> uint64(58)
-            x = (x >> turn) | (x << ((uint64(64) - turn) & uint64(63)))
-            out[i, k] = float(x >> uint64(11)) * (1.0 / 9007199254740992.0)
-
-
-def seed_words(seed: int) -> np.ndarray:
-    """A seed ≥ 0 in 32-bit words, lowest first, as SeedSequence takes it."""
-    words = [seed & 0xFFFFFFFF]
-    while seed := seed >> 32:
-        words.append(seed & 0xFFFFFFFF)
-    return np.array(words, np.uint32)
+def row_uniforms(seed: int, rows: np.ndarray, dimensions: int) -> np.ndarray:
+    """The first uniform numbers in [0, 1) of each row (n,): (n, dimensions)."""
+    key = np.random.SeedSequence(seed).generate_state(2, np.uint64)
+    counts = -(-dimensions // _WORDS)
+    out = np.empty((len(rows), dimensions))
+    # Runs of consecutive rows are drawn at once.
+    for part in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) != 1) + 1):
+        if len(part):
+            generator = np.random.Philox(key=key, counter=int(rows[part[0]]) * counts)
+            words = generator.random_raw(len(part) * counts * _WORDS).reshape(len(part), -1)
+            out[part] = (words[:, :dimensions] >> uint64(11)) * 2.0**-53
+    return out
 
 
 @njit(cache=True)

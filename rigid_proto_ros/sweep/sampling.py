@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.errors import InputError, is_missing
-from .row_random import latin_uniforms, row_uniforms, seed_words
+from .row_random import latin_uniforms, row_uniforms
 
 SAMPLERS = ("random", "latin_hypercube", "sobol")
 MAX_SOBOL = 1 << 30
@@ -22,13 +22,12 @@ MAX_SOBOL = 1 << 30
 def uniforms(sampler: str, seed: int, rows: np.ndarray, samples: int, dimensions: int) -> np.ndarray:
     """Uniform numbers (n, dimensions) in [0, 1) of rows (n,); each run of ``samples`` rows is one design.
 
-    ``random``: those of SeedSequence(seed, spawn_key=(row,)). ``latin_hypercube``: one number in each of ``samples``
+    ``random``: the row's own numbers (sweep/row_random.py). ``latin_hypercube``: one number in each of ``samples``
     strata per dimension; where in it, by the row's own numbers. ``sobol``: scrambled by the seed (scipy.stats.qmc).
     """
     if sampler == "sobol":
         return _sobol(seed, dimensions).points(rows % samples)
-    own = np.empty((len(rows), dimensions))
-    row_uniforms(seed_words(seed), rows, own)
+    own = row_uniforms(seed, rows, dimensions)
     if sampler == "random":
         return own
     out = np.empty_like(own)

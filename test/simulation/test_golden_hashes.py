@@ -34,7 +34,7 @@ from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.scene.sensor_noise import sensor_noise
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.sweep.chunk import run_chunk
-from rigid_proto_ros.sweep.row_random import row_uniforms, seed_words
+from rigid_proto_ros.sweep.row_random import row_uniforms
 
 FILE = Path(__file__).parents[1] / "golden_hashes.json"
 SECOND = 10**9
@@ -170,9 +170,7 @@ def rounded_cube(n: int) -> MeshMoments:
 @cache
 def arguments() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of elementary functions, (600,) each: of every size, near 0, and in −1 to 1."""
-    uniforms = np.empty((1, 1200))
-    row_uniforms(seed_words(5), np.zeros(1, np.int64), uniforms)
-    u = uniforms.reshape(2, 600)
+    u = row_uniforms(5, np.zeros(1, np.int64), 1200).reshape(2, 600)
     far = np.ldexp(u[0] + 0.5, (u[1] * 1800.0 - 900.0).astype(int))
     return far, np.ldexp(u[0] - 0.5, (u[1] * 60.0 - 50.0).astype(int)), 2.0 * u[0] - 1.0
 

@@ -10,7 +10,7 @@ from sweep_studies import POKES, STRUCTURE, study
 
 from rigid_proto_ros.base.bundled import body_names, study_names
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.sweep.row_random import normal_quantile, permuted, row_uniforms, seed_words
+from rigid_proto_ros.sweep.row_random import normal_quantile, permuted, row_uniforms
 from rigid_proto_ros.sweep.study import read_study
 from rigid_proto_ros.sweep.variation import variation
 
@@ -96,18 +96,25 @@ def test_grids_make_every_combination_and_lists_go_in_step() -> None:
     assert pairs == {("t_handle", "auto"), ("hammer", "rk4"), ("book", "dop853")}
 
 
-def test_the_seed_of_a_row_is_numpys_own_for_study_and_row() -> None:
-    rows = np.array([0, 1, 7, 2**31, 2**32 - 1, 2**32, 2**40 + 3], np.int64)
-    for seed in (0, 1, 2**32, 2**63 + 11, 2**127 + 5, 2**200 + 1):
-        found = np.empty((len(rows), 5))
-        row_uniforms(seed_words(seed), rows, found)
-        keys = [np.random.SeedSequence(seed, spawn_key=(int(row),)) for row in rows]
-        assert np.array_equal(found, [np.random.default_rng(key).random(5) for key in keys])
+def numpys(seed: int, row: int, count: int) -> np.ndarray:
+    """The same by numpy's own generator."""
+    key = np.random.SeedSequence(seed).generate_state(2, np.uint64)
+    return np.random.Generator(np.random.Philox(key=key, counter=row * -(-count // 4))).random(count)
+
+
+def test_the_numbers_of_a_row_are_the_same_whatever_rows_are_drawn_with_it() -> None:
+    rows = np.array([0, 1, 2, 7, 2**31, 2**32 - 1, 2**32, 5, 4, 2**40 + 3], np.int64)
+    for seed in (0, 1, 2**32, 2**63 + 11, 2**200 + 1):
+        for count in (1, 4, 5):
+            found = row_uniforms(seed, rows, count)
+            assert np.array_equal(found, [numpys(seed, int(row), count) for row in rows])
+    assert len(np.unique(row_uniforms(3, np.arange(1000), 3))) == 3000
 
 
 def test_a_row_draws_from_its_own_seed() -> None:
     own = study(POKES)
-    u = np.random.default_rng(np.random.SeedSequence(POKES["seed"], spawn_key=(11,))).random(2)
+    dimensions = sum(v.form.uniforms for v in own.vary if hasattr(v.form, "uniforms"))
+    u = numpys(POKES["seed"], 11, dimensions)
     values = variation(own, 11).parameters.named()
     assert values["mass"] == math.exp(math.log(0.1) + (math.log(1.0) - math.log(0.1)) * u[0])
     assert values["scale"] == [0.5 + 1.5 * u[1]]
