@@ -27,8 +27,3 @@ SESSION_BODY = "session/body"
 EVENTS = "events"
 COMMAND_LOG = "log/commands"
 REFUSAL_LOG = "log/refusals"
-
-
-def axis_ends(plot: str) -> str:
-    """Where the ends of a plot's value axis are logged, for viewers of a flight that goes on."""
-    return f"{plot}/axis_ends"

@@ -27,9 +27,6 @@ KINDS = (0, 1, 2, 3)
 
 REPAIR_TIMEOUT_S = 600.0
 
-INDEXED_BYTES = 256_000_000
-"""Half an hour of a usual flight. The whole recording is in memory while its index is made."""
-
 
 def whole_bytes(path: Path) -> tuple[int, bool]:
     """How many bytes from the start hold whole frames, and whether the stream was ended.
@@ -78,22 +75,6 @@ def repair_rrd(path: Path, repaired: Path) -> None:
         reason = _write_indexed(whole, repaired, REPAIR_TIMEOUT_S)
     if reason:
         raise InputError("--repair", str(repaired), f"a file that can be written from a readable recording ({reason})")
-
-
-def add_index(path: Path, timeout_s: float) -> str:
-    """Give a recording that was ended without one its index, in place and at once or not at all; returns
-    the reason for not.
-    """
-    if path.stat().st_size > INDEXED_BYTES:
-        return f"larger than {INDEXED_BYTES / 1e6:.0f} MB"
-    indexed = path.with_name(f".{path.stem}.indexed.rrd")
-    try:
-        reason = _write_indexed(path, indexed, timeout_s)
-        if not reason:
-            os.replace(indexed, path)
-        return reason
-    finally:
-        indexed.unlink(missing_ok=True)
 
 
 def _write_indexed(path: Path, indexed: Path, timeout_s: float) -> str:

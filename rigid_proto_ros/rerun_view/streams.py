@@ -104,7 +104,7 @@ class FileStream(Stream):
     """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
 
     open_ended: nobody knows how long the run will be, so the file is written without an index: the library would gather
-    that in memory, 3 kB for each piece that it writes, 200 MB an hour. ``add_index`` makes it from the finished file.
+    that in memory, 3 kB for each piece that it writes, 200 MB an hour. ``replay --repair`` makes a copy with one.
     """
 
     def __init__(self, path: Path, recording_id: str, name: str, open_ended: bool = False) -> None:
