@@ -150,6 +150,7 @@ class Page:
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
         self._scenes_seen = 0
+        self._undrawn = True
         self._unit = self.backend.unit
         self.readings = Readings()
         self._make_panel()
@@ -281,6 +282,10 @@ class Page:
                 times, rows = [], []
                 self._on(event)
         self._draw(times, rows)
+        if self._undrawn and self.live.paused:
+            # While time stands nothing is published.
+            state = self.live.state
+            self._draw([state.time_ns], [state.row])
 
     def _on(self, event: Event) -> None:
         match event:
@@ -361,6 +366,7 @@ class Page:
     def _reset(self) -> None:
         self._new_scene |= self.flight.scenes_begun != self._scenes_seen
         self._scenes_seen = self.flight.scenes_begun
+        self._undrawn = True
         self.picture.restart()
         self.backend.forget()
         self.poses.forget()
@@ -376,6 +382,7 @@ class Page:
         if not times:
             return
         last = rows[-1]
+        self._undrawn = False
         self.state = State(times[-1], last)
         self._follow(last[0:3])
         picture = self.picture

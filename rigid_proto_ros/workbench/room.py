@@ -42,7 +42,7 @@ class Theme:
         self.section = (72, 77, 84) if dark else (202, 202, 208)
         self.sky = (26, 28, 32) if dark else (250, 251, 253)
         self.shadow = 0.5 if dark else 0.32
-        self.ambient, self.sun = (0.45, 1.7) if dark else (0.5, 1.5)
+        self.ambient, self.sun = (0.35, 1.3) if dark else (0.35, 1.2)
 
 
 class Room:

@@ -24,7 +24,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "Forces": (style.LOADS,),
     "Angular momentum L": (style.MOMENTUM,),
     "Angular velocity ω": (style.OMEGA,),
-    "Ghost": (style.GHOST_MESH, style.GHOST_BOX),
+    "Ghost": (style.GHOST_MESH,),
     "Path of the COM": (style.COM_TRAIL,),
     "Path of a point": (style.TRAIL,),
 }

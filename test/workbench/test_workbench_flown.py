@@ -52,6 +52,8 @@ def test_a_lesson_asks_first_and_time_stands_until_it_is_answered(flown: FlownPa
     flown.set("Lesson", one.title)
     flown.until(lambda: flown.page.lessons._asked, "question")
     assert flown.live.paused
+    flown.until(lambda: flown.page.state.time_ns == 0, "body at its start")
+    assert np.array_equal(flown.page.state.row, flown.live.state.row)
     assert one.question in flown.page.lessons._text.content
     assert not any(sentence in flown.page.lessons._text.content for sentence in one.sentences)
     flown.press(f"A   {one.choices[0]}")
