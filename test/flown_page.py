@@ -98,13 +98,19 @@ class FlownPage:
                 assert not simulation.failure
             simulation.advance(end_ns)
 
+        self.wait_until_asked()
         self.do(fly)
         self.wait_until_still()
         return self.seen.rows
 
-    def wait_until_still(self) -> None:
-        """Until all that was asked for is done, and the page shows what the body does."""
+    def wait_until_asked(self) -> None:
+        """Until all that was asked for is done."""
+        self.do(lambda: asyncio.sleep(0.0))
         self.page.flight._worker.submit(int).result(PATIENCE_S)
+
+    def wait_until_still(self) -> None:
+        """The same, and until the page shows what the body does."""
+        self.wait_until_asked()
         page, rows = self.page, self.seen.rows
 
         def shown() -> bool:

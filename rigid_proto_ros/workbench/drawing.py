@@ -98,7 +98,7 @@ class ViserBackend(Backend):
     def forget(self) -> None:
         """A run begins, or the body is somewhere else at once: paths, labels and what acts begin anew."""
         self._paths.clear()
-        self._labels_of.clear()
+        self._labels_of = {name: of for name, of in self._labels_of.items() if name.startswith(style.BODY)}
         for name in list(self._there):
             if not name.startswith((style.BODY, style.GHOST)):
                 self._set_there(name, False)

@@ -15,7 +15,6 @@ from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
 from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
-from ..session.recorded_session import RecordedSession
 from .page import Page
 from .server import make_server, stop_server
 
@@ -25,8 +24,6 @@ LAST_MESSAGE_S = 0.2
 """[s] For the last message to reach the browsers."""
 
 ENDED = "the program has ended; this is the last state"
-
-Gltf = Callable[[RecordedSession, float], bytes]
 
 
 class Workbench:
@@ -43,7 +40,6 @@ class Workbench:
         host: str = LOOPBACK,
         lesson: str = "",
         anew: bool = False,
-        gltf: Gltf | None = None,
     ) -> None:
         default = Parameters().workbench_port
         name = "" if live.name == "rigid_body" else f" {live.name}"
@@ -52,7 +48,7 @@ class Workbench:
         if port is None and self._server.get_port() != default:
             # Another one runs already: its page and this one are to be told apart.
             self._server.gui.set_panel_label(f"{TITLE}{name} :{self._server.get_port()}")
-        self.page = Page(self._server, live, lesson, anew, gltf)
+        self.page = Page(self._server, live, lesson, anew)
         self._running = asyncio.run_coroutine_threadsafe(self.page.run(), self._server.get_event_loop())
 
     def close(self) -> None:
@@ -72,7 +68,6 @@ def serve(
     host: str,
     opens: bool,
     wait: Callable[[], None],
-    gltf: Gltf | None = None,
 ) -> None:
     """Fly a scenario with its page until ``wait`` returns. scene: its name; one of a lesson begins with its question.
 
@@ -80,7 +75,7 @@ def serve(
     """
     live = LiveSimulation(scenario)
     lesson = scene if scene in scene_names() else ""
-    workbench = Workbench(live, port, host, lesson, True, gltf)
+    workbench = Workbench(live, port, host, lesson, True)
     try:
         print(f"The workbench is at {workbench.address}   (Ctrl-C ends it)", flush=True)
         if opens and has_display():

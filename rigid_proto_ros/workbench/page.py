@@ -21,7 +21,6 @@ from ..motion.state import State
 from ..picture import style
 from ..picture.picture import Picture
 from ..scene.scenario import Scenario
-from ..session.recorded_session import RecordedSession
 from ..simulation.observer import (
     BodyChanged,
     Event,
@@ -111,7 +110,7 @@ class Told(Observer):
 
 class Page:
     """live: what flies. lesson: name of the bundled scene that it flies, or empty. anew: it begins anew when the first
-    browser is there to see it. gltf: as SessionTab has it.
+    browser is there to see it.
     """
 
     def __init__(
@@ -120,9 +119,7 @@ class Page:
         live: LiveSimulation,
         lesson: str = "",
         anew: bool = False,
-        gltf: Callable[[RecordedSession, float], bytes] | None = None,
     ) -> None:
-        self._gltf = gltf
         self._begins_anew = anew
         self.server = server
         self.loop = server.get_event_loop()
@@ -170,7 +167,7 @@ class Page:
         self.body_tab = BodyTab(gui, tabs, self.controls, flight, say, self._fly)
         self.physics_tab = PhysicsTab(gui, tabs, self.controls, self.tools, flight, say)
         self.readout_tab = ReadoutTab(gui, tabs, self.readings)
-        self.session_tab = SessionTab(gui, tabs, flight, say, self._gltf)
+        self.session_tab = SessionTab(gui, tabs, flight, say)
         self.show_tab = ShowTab(
             gui,
             tabs,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +14,12 @@ from typing import Any
 import viser
 
 from ..base.errors import InputError
-from ..session.recorded_session import RecordedSession
+from ..export.flight_record import FlightRecord, frames, source_of_session
+from ..export.gltf import write_gltf
+from ..export.tracks import tracks_of
+from ..scene.offline import notify_start
 from ..session.script_of_session import script_of_session
+from ..simulation.observer import Published
 from .flight import Flight
 
 STEP_S = 0.05
@@ -24,7 +29,7 @@ RATES = ("24", "25", "30", "60")
 
 
 class SessionTab:
-    """gltf(session, frames a second) gives the take as a binary glTF file."""
+    """The tab of what is kept of the run since the last reset."""
 
     def __init__(
         self,
@@ -32,12 +37,10 @@ class SessionTab:
         tabs: viser.GuiTabGroupHandle,
         flight: Flight,
         say: Callable[[str], None],
-        gltf: Callable[[RecordedSession, float], bytes] | None,
     ) -> None:
         self._gui = gui
         self._flight = flight
         self._say = say
-        self._gltf = gltf
         with tabs.add_tab("Record"):
             self._rewind_folder()
             self._save_folder()
@@ -91,9 +94,7 @@ class SessionTab:
                 "Save scene and script", hint="What was done by hand; reproduces the motion bit for bit (.zip)"
             )
             rate: Any = gui.add_dropdown("Frames a second", RATES, initial_value="30")
-            export = gui.add_button(
-                "Save as glTF", visible=self._gltf is not None, hint="For Blender and others (.glb)"
-            )
+            export = gui.add_button("Save as glTF", hint="For Blender and others (.glb)")
             self._saved = gui.add_markdown("")
 
         @save.on_click
@@ -131,6 +132,18 @@ class SessionTab:
         return packed.getvalue(), note
 
     def _motion(self, rate: float) -> tuple[bytes, str]:
-        assert self._gltf is not None
         session = self._flight.memory.session()
-        return self._gltf(session, rate), f"{session.end_ns * 1e-9:.2f} s at {rate:g} frames a second"
+        source = source_of_session(session)
+        assert source is not None
+        record = FlightRecord()
+        again = source(record)
+        notify_start(record, again.scenario)
+        again.simulation.announce()
+        for time_ns, row in zip(session.times.tolist(), session.rows, strict=True):
+            again.advance(time_ns)
+            record.on(Published(time_ns, row))
+        made, report = frames(record, source, rate)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "take.glb"
+            write_gltf(str(file), made, tracks_of(made, ("ghost", "string")))
+            return file.read_bytes(), report

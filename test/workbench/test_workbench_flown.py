@@ -117,6 +117,17 @@ def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path)
     assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
 
 
+def test_a_take_is_saved_as_gltf_with_a_key_for_each_frame(flown: FlownPage) -> None:
+    pygltflib = pytest.importorskip("pygltflib")
+    flown.fly(1.0)
+    content, _ = flown.page.session_tab._motion(25.0)
+    document = pygltflib.GLTF2().load_from_bytes(content)
+    assert document.meshes and len(document.animations) == 1
+    keys = document.accessors[document.animations[0].samplers[0].input]
+    assert keys.count == 26
+    assert keys.max == [pytest.approx(1.0)]
+
+
 def test_a_refused_upload_says_so_and_leaves_the_body_as_it_is(flown: FlownPage) -> None:
     before = flown.scenario
     flown.do(lambda: flown.page.body_tab.upload.take("x.obj", b"nothing"))
