@@ -23,14 +23,15 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 _ABSENT: Any = None
 """What Python takes for a module that isn't there."""
-# numba imports these wherever they are installed, a quarter of its own time: coverage is of use while something is
-# measured, and scipy for its version and for linear algebra, which no kernel here uses.
-_HIDDEN = [name for name in ("coverage", "scipy") if name not in sys.modules]
+# numba imports these wherever they are installed, a third of its own time: coverage is of use while something is
+# measured, scipy for its version and for linear algebra, and cffi for C functions, neither of which a kernel here uses.
+_HIDDEN = [name for name in ("coverage", "scipy", "cffi") if name not in sys.modules]
 sys.modules.update(dict.fromkeys(_HIDDEN, _ABSENT))
 try:
     import numba
     from numba import config
     from numba.core import event
+    from numba.core.typing import cffi_utils  # noqa: F401  # looks for cffi, at the first kernel if not here
     from numba.extending import intrinsic as numba_intrinsic
     from numba.np import arraymath  # looks for scipy's linear algebra, at the first kernel if not here
 finally:
