@@ -68,6 +68,11 @@ class LiveObservers:
         loop.watch(self.observer)
 
     @property
+    def recording_trouble(self) -> str:
+        """Why the last recording has stopped, or that the present one takes nothing; empty when all is well."""
+        return self.recording_error or getattr(self._recorder, "stalled", "")
+
+    @property
     def want_states(self) -> bool:
         """Whether one of them takes the states."""
         return Published in self.observer.takes

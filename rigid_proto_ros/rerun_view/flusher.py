@@ -31,6 +31,9 @@ FLUSH_PERIOD_S = 0.5
 TIMEOUT_S = 10.0
 """A disk that doesn't take what waits in this time is given up."""
 
+STALLED_S = 0.9
+"""A flush that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
+
 
 @dataclass(frozen=True)
 class _Record:
@@ -67,6 +70,7 @@ class Flusher:
         self._writer = SceneWriter(initial_view)
         self._ghost_block: Block | None = None
         self._ghost_sent = 0
+        self._flushing_since_s: float | None = None
         self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         self._thread.start()
 
@@ -76,6 +80,14 @@ class Flusher:
     def run_name(self) -> str:
         """The name of the present run's recording."""
         return self._name if self._run == 1 else f"{self._name}, run {self._run}"
+
+    @property
+    def stalled(self) -> str:
+        """Says that the file hasn't taken what was sent for longer than STALLED_S; empty while it does."""
+        since_s, file = self._flushing_since_s, self.file
+        if since_s is None or file is None or time.monotonic() < since_s + STALLED_S:
+            return ""
+        return f"recording {file.path}: nothing could be written for {time.monotonic() - since_s:.1f} s"
 
     def open_file(self, path: Any) -> None:
         """Record to ``path`` from now on; raises InputError where that can't be written."""
@@ -117,6 +129,7 @@ class Flusher:
     def _flush_until_closed(self) -> None:
         while True:
             closing = self.mailbox.closed
+            self._flushing_since_s = time.monotonic()
             try:
                 self._flush()
             except Exception as error:
@@ -124,6 +137,7 @@ class Flusher:
                 self._finish_file()
                 self._writer.streams.clear()
                 self._lost(f"recording stopped: {type(error).__name__}: {error}")
+            self._flushing_since_s = None
             if closing:
                 break
             self.mailbox.wait(FLUSH_PERIOD_S)
@@ -237,10 +251,12 @@ class Flusher:
                 self._lost(str(error))
 
     def _give_up_file(self, error: OSError) -> None:
+        # Told first: what the library does with a file that it can't write may take for ever.
+        self._lost(f"recording stopped: {error}")
+        end_without_waiting()
         for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
             self._writer.streams.remove(stream)
             stream.abandon()
-        self._lost(f"recording stopped: {error}")
 
     def _lost(self, message: str) -> None:
         self.file = None

@@ -164,6 +164,11 @@ class RerunObserver(Observer):
         """Why the last recording stopped, or ""."""
         return self._flusher.error if self._flusher is not None else ""
 
+    @property
+    def stalled(self) -> str:
+        """Says that the file takes nothing at present, or ""."""
+        return self._flusher.stalled if self._flusher is not None else ""
+
     def start_recording(self, path: str) -> None:
         """Record to this file from now on; one that was being written is finished first.
 

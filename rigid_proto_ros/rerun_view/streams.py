@@ -134,14 +134,18 @@ class FileStream(Stream):
         """Write the rest and the footer; raises RecordingLostError as ``flush`` does."""
         try:
             self.flush()
-        finally:
+        except RecordingLostError:
             self.abandon()
+            raise
+        super().close()
         if self.open_ended:
             end_without_index(self.path)
 
     def abandon(self) -> None:
-        """Let go of a file that can't be written."""
-        super().close()
+        """Let go of a file that can't be written, on a thread of its own: the library sometimes waits without limit for
+        its writer, which is gone.
+        """
+        threading.Thread(target=super().close, name="rerun leaving", daemon=True).start()
 
 
 class LiveStream(Stream):

@@ -6,10 +6,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 import rerun_flight as flight
 
 from rigid_proto_ros.base.errors import InputError
@@ -289,6 +292,35 @@ def test_a_file_that_cannot_grow_in_flight_stops_the_recording_and_keeps_what_is
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("hangs", ["flush", "disconnect"])
+def test_a_library_that_hangs_on_a_full_disk_is_told_of_within_two_seconds(tmp_path, states, monkeypatch, hangs):
+    """As Rerun does at times once the thread that writes its file has died."""
+    path, released = tmp_path / "session.rrd", threading.Event()
+    errors: list[str] = []
+    observer = RerunObserver(record=str(path), on_error=errors.append)
+    flight.fly(observer, states[:20])
+    flight.flush(observer)
+
+    def full(*_, **__) -> None:
+        if hangs == "flush":
+            released.wait(20.0)
+        raise RuntimeError("File-writer thread shut down prematurely")
+
+    monkeypatch.setattr(rr.RecordingStream, "flush", full)
+    if hangs == "disconnect":
+        monkeypatch.setattr(rr.RecordingStream, "disconnect", lambda _: released.wait(20.0))
+    deadline = time.monotonic() + 2.0
+    while not (observer.stalled or observer.error) and time.monotonic() < deadline:
+        observer.state(200_000_000, states[20])
+        time.sleep(0.05)
+    try:
+        assert str(path) in (observer.stalled if hangs == "flush" else observer.error)
+        assert observer.error or not errors
+    finally:
+        released.set()
+        observer.close()
 
 
 def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):

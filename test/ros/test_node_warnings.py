@@ -37,10 +37,11 @@ def test_real_time_that_is_given_up_is_warned_of_with_its_share_and_not_every_se
     assert rig.node_process.log.read_text().count(said) - before <= 2 + elapsed_s // WARNING_S
 
 
+@pytest.mark.parametrize("name", ["flight.mcap", "flight.rrd"])
 def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_another_begins(
-    ros_environment, tmp_path
+    ros_environment, tmp_path, name
 ):
-    path = tmp_path / "flight.mcap"
+    path = tmp_path / name
     node = NodeProcess(ros_environment, tmp_path / "node", {"record": str(path), "publish_rate": 1000.0})
     unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     try:
@@ -49,7 +50,10 @@ def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_a
             assert client.diagnostics()["recording"] == str(path)
             # As on a full disk: no file of this process grows beyond some kilobytes more.
             resource.prlimit(node.pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 50_000, unlimited[1]))
-            client.until(lambda: "recording stopped" in client.diagnostics()["message"], "a warning")
+            client.until(lambda: "recording" in client.diagnostics()["message"], "a warning")
+            # Half a second after the last write that went well comes one that doesn't.
+            assert client.diagnostics()["stamp_ns"] / 1e9 < path.stat().st_mtime + 0.5 + 2.0
+            client.until(lambda: "recording stopped" in client.diagnostics()["message"], "the end of the recording")
             report = client.diagnostics()
             assert (report["level"], report["recording"]) == (1, "")
             # The table of parameters follows what has happened.
