@@ -182,7 +182,7 @@ def flood(note, seconds: float) -> None:
         note(what, "cpu", share, "%")
         note(what, "sent", sent, "")
         note(what, "received", float(counters["wrench_received"]), "")
-        note(what, "gaps", float(counters["sequence_gaps"]), "")
+        note(what, "lost", float(counters["messages_lost"]), "")
         note(what, "lost time", float(counters["real_time_lost_s"]), "s")
         note(what, "rss growth", growth, "MB")
         note(f"{what}, publications", "rate", result_of(listener)["rate"], "1/s")

@@ -148,8 +148,8 @@ def _verdict(history: list[dict], sent: dict, counters: dict[str, str]) -> int:
         )
         < 5.0,
         f"{unheard} of {len(history)} listeners heard nothing": unheard == 0,
-        f"messages {received} received + {counters['sequence_gaps']} gaps of {sent['messages']} sent": received
-        + int(counters["sequence_gaps"])
+        f"messages {received} received + {counters['messages_lost']} lost of {sent['messages']} sent": received
+        + int(counters["messages_lost"])
         == sent["messages"],
         f"refused {counters['refused_total']} of {sent['bad']} bad ones": int(counters["refused_total"]) >= sent["bad"],
         f"real time lost {float(counters['real_time_lost_s']):.2f} s, overruns {counters['overruns']}, queue full "

@@ -377,7 +377,7 @@ class Commanded(RosClient):
     def gained(self, before: dict[str, int], *more: str) -> dict[str, int]:
         """Counters that rose since ``before``, of commands and refusals."""
         after = self.counters()
-        kinds = ("refused_", "late", "wall_stamp", "sequence_gaps", "queue_full", *more)
+        kinds = ("refused_", "late", "wall_stamp", "messages_lost", "queue_full", *more)
         return {k: v - before[k] for k, v in after.items() if k.startswith(kinds) and v != before.get(k)}
 
     def wait_event(self, kind: str, count: int = 1) -> list[dict]:

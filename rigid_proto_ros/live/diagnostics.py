@@ -9,10 +9,11 @@ from .command_receiver import TOPICS
 from .live_simulation import LiveSimulation
 
 REFUSAL_REASONS = (
-    *("frame", "nonfinite", "magnitude", "stamp", "ray_miss", "tensor", "integrator", "schedule", "thrusters"),
+    *("frame", "nonfinite", "magnitude", "stamp", "ray_miss"),
+    *("tensor", "integrator", "schedule", "thrusters", "state"),
 )
 
-COUNTED = ("refused_total", "sequence_gaps", "queue_full", "overruns", "real_time_lost_s")
+COUNTED = ("refused_total", "messages_lost", "queue_full", "overruns", "real_time_lost_s")
 """Keys of /diagnostics that only grow, and whose growth is warned of."""
 
 
@@ -38,7 +39,7 @@ def report(live: LiveSimulation) -> dict[str, object]:
         **{f"refused_{reason}": refused.get(reason, 0) for reason in REFUSAL_REASONS},
         "late": commands.late,
         "wall_stamp": commands.wall_stamp,
-        "sequence_gaps": live.endpoints.messages_lost,
+        "messages_lost": live.endpoints.messages_lost,
         "queue_full": live.endpoints.queue_full,
         "kinetic_energy": simulation.kinetic_energy,
         "potential_energy": simulation.potential_energy,
@@ -78,8 +79,10 @@ def command_warnings(before: Mapping[str, object], now: Mapping[str, object]) ->
         }
         named = ", ".join(f"{reason} {count}" for reason, count in reasons.items() if count)
         warnings.append(f"{refused} command{_s(refused)} refused" + (f" ({named})" if named else ""))
-    if lost := round(increase("sequence_gaps", before, now) + increase("queue_full", before, now)):
+    if lost := round(increase("messages_lost", before, now)):
         warnings.append(f"{lost} message{_s(lost)} lost on the way")
+    if increase("queue_full", before, now):
+        warnings.append("messages may have been lost: a queue of commands was full")
     return warnings
 
 

@@ -12,8 +12,8 @@ class Endpoints:
     """Null object, and the interface: override what is of interest. Called on the physics thread, except where it says
     otherwise.
 
-    queue_full: how often a queue of incoming messages was found full. messages_lost: messages that were sent and never
-    arrived.
+    messages_lost: how many messages were sent and never arrived. queue_full: how often a queue of incoming messages was
+    found full, so that more may have been lost, nobody knows how many.
     """
 
     queue_full = 0

@@ -200,11 +200,9 @@ class LiveSimulation:
 
     # Parameters
 
-    def set_parameters(self, changes: Mapping[str, object], counted: bool = True) -> None:
+    def set_parameters(self, changes: Mapping[str, object]) -> None:
         """Change parameters all at once, or none: raises InputError, and then all stays as it was. Setting density sets
         mass to 0.
-
-        counted: a refusal goes to the counters.
         """
         # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
         loop = self.loop
@@ -220,8 +218,7 @@ class LiveSimulation:
             try:
                 loop.check_change(scenario)
             except CommandRefused as refusal:
-                if counted:
-                    loop.simulation.refuse(refusal)
+                loop.simulation.refuse(refusal)
                 raise
             return scenario
 

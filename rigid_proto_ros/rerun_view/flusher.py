@@ -8,6 +8,7 @@ a recording of its own; see observer.py for what users see of that.
 from __future__ import annotations
 
 import threading
+import time
 import uuid
 from collections.abc import Callable
 from dataclasses import dataclass

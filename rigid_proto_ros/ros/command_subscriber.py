@@ -20,9 +20,6 @@ from .command_queue import CommandQueue, ManualCallbackGroup
 QUIET_NS = 4_000_000
 """How often topics are read that carried nothing lately [ns of wall time]."""
 
-PUBLISHERS_NS = 250_000_000
-"""How often it is noted who publishes on a topic that carries nothing [ns of wall time]."""
-
 ACTIVE_NS = 5_000_000_000
 """A topic is read in every tick for this long after a message [ns of wall time]."""
 
@@ -41,7 +38,6 @@ class CommandSubscriber:
     def __init__(self, node: Node, commands: CommandReceiver, has_thrusters: bool) -> None:
         self._commands = commands
         self._next_quiet_ns = 0
-        self._next_publishers_ns = 0
         group = ManualCallbackGroup()
         self._sources: list[tuple[CommandQueue, Callable[[bytes], None]]] = [
             (CommandQueue(node, message_type, topic, group), partial(self._stamped, topic))
@@ -58,9 +54,9 @@ class CommandSubscriber:
         return sum(queue.queue_full for queue, _ in self._sources)
 
     @property
-    def sequence_gaps(self) -> int:
-        """Messages that were sent and never arrived, as far as that can be known."""
-        return sum(queue.sequence_gaps for queue, _ in self._sources)
+    def messages_lost(self) -> int:
+        """How many messages the middleware has said to be lost."""
+        return sum(queue.messages_lost for queue, _ in self._sources)
 
     def take(self, wall_ns: int, all_topics: bool = False) -> bool:
         """Submit everything that has arrived; what is refused is counted and notified of, and the rest goes on.
@@ -72,12 +68,9 @@ class CommandSubscriber:
         read_quiet = all_topics or wall_ns >= self._next_quiet_ns
         if read_quiet:
             self._next_quiet_ns = wall_ns + QUIET_NS
-        note_publishers = read_quiet and wall_ns >= self._next_publishers_ns
-        if note_publishers:
-            self._next_publishers_ns = wall_ns + PUBLISHERS_NS
         for source, (queue, submit) in enumerate(self._sources):
             if read_quiet or wall_ns <= self._active_until_ns[source]:
-                for data in queue.take(note_publishers):
+                for data in queue.take():
                     self._active_until_ns[source] = wall_ns + ACTIVE_NS
                     try:
                         submit(data)

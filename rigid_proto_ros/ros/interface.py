@@ -94,7 +94,8 @@ INTERFACES = (
         PUBLISHED,
         "~/imu",
         "sensor_msgs/Imu",
-        "attitude, angular velocity and specific force in body axes, at the contact `imu_contact` or the COM",
+        "attitude, angular velocity and specific force in body axes, at the contact `imu_contact` (then `frame_id` is "
+        "`<body_frame>/<contact>`) or the COM",
     ),
     _topic(
         PUBLISHED,

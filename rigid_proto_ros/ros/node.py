@@ -46,7 +46,7 @@ class RigidBodyNode(Node):
         make_viewer: Callable[[Scenario, str], Observer | None] = lambda *_: None,
         node_name: str = NODE_NAME,
     ) -> None:
-        super().__init__(node_name, start_parameter_services=False)
+        super().__init__(node_name)
         scenario = make_scenario(declare_parameters(self, values))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
@@ -133,8 +133,8 @@ class RosEndpoints(Endpoints):
 
     @property
     def messages_lost(self) -> int:  # type: ignore[override]  # counted by the queues
-        """Messages that were sent and never arrived, as far as that can be known."""
-        return self.subscriber.sequence_gaps
+        """How many messages the middleware has said to be lost."""
+        return self.subscriber.messages_lost
 
     def parameters_changed(self) -> None:
         """The ROS parameters follow."""

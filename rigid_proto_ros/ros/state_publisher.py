@@ -66,6 +66,7 @@ class StatePublisher:
         self._twist_template = cdr.StampedTemplate(world_frame, 6)
         self._odom_template = cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame)
         self._imu = publisher(Imu, "imu")
+        self._imu_frame = body_frame
         self._clock: Publisher | None = None
         self._tf: Publisher | None = None
         self._made_clock: Publisher | None = None
@@ -76,7 +77,10 @@ class StatePublisher:
         self._has_covariances = False
 
     def configure(self, parameters: Parameters) -> None:
-        """Switch /clock, /tf and noise on and off; runs on the executor's thread."""
+        """Switch /clock, /tf and noise on and off, and put the IMU where it is mounted; on the executor's thread."""
+        # The frames of contacts have the body's axes.
+        contact = parameters.imu_contact
+        self._imu_frame = f"{self._frames[1]}/{contact}" if contact else self._frames[1]
         self._noise = sensor_noise(parameters)
         # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched
         # off.
@@ -167,7 +171,7 @@ class StatePublisher:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
         message = Imu()
         message.header.stamp.sec, message.header.stamp.nanosec = self._stamps.of(time_ns)
-        message.header.frame_id = self._frames[1]
+        message.header.frame_id = self._imu_frame
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
         o.x, o.y, o.z, o.w = self._with_noise("pose", time_ns, row)[3:7]
         noise, turns, force = self._noise, row[10:13], self._specific_force().tolist()

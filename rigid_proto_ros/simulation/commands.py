@@ -119,10 +119,10 @@ class SetState:
         for name, numbers in self.values.items():
             if name not in STATE_VALUES or len(numbers) != STATE_VALUES[name]:
                 accepted = ", ".join(f"{name} of {count} numbers" for name, count in STATE_VALUES.items())
-                raise CommandRefused("frame", "state", f"{name} of {len(numbers)} numbers", accepted)
+                raise CommandRefused("state", "state", f"{name} of {len(numbers)} numbers", accepted)
             _check_point(f"state, {name}", numbers)
         if not any(self.values.get("orientation_xyzw", (1.0,))):
-            raise CommandRefused("frame", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
+            raise CommandRefused("state", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
 
     @property
     def content(self) -> dict:

@@ -48,7 +48,7 @@ def test_examples_of_the_node_and_the_client_are_read_by_them():
         ("cli.main", "rigid_proto simulate book --set gyroscopic=", {"gyroscopic=true", "gyroscopic=false"}),
         ("cli.main", "rigid_proto simulate --set mesh=spinning", {"mesh=spinning_top"}),
         ("ros.poke_client", "poke_client wr", {"wrench"}),
-        ("ros.main", "rigid_body_node --bodies spin", {"spinning_top"}),
+        ("ros.main", "rigid_body_node --un", {"--until"}),
     ],
 )
 def test_the_shell_completes_commands_options_and_names(module, line, offered, tmp_path):

@@ -53,7 +53,7 @@ def test_the_imu_feels_the_exact_specific_force_at_its_contact_and_turns_at_the_
     assert sum(ns > SECOND // 2 for ns in moments) > 5
     for ns in moments:
         message = measured[ns]
-        assert message["header"]["frame_id"] == "rigid_body"
+        assert message["header"]["frame_id"] == "rigid_body/left"
         rate, attitude = numbers(message["angular_velocity"]), list(message["orientation"].values())
         assert message["angular_velocity"] == odometry[ns]["angular"]
         expected = felt(body, arm, attitude, rate, force if ns > SECOND // 2 else np.zeros(3))
