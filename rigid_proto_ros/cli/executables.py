@@ -11,6 +11,8 @@ import importlib
 import importlib.util
 import sys
 
+from ..base import interrupts
+
 NUMERICS = {"numba": "numba", "numpy": "numpy", "yaml": "PyYAML"}
 """Packages without which nothing runs, by the names that they are imported by."""
 
@@ -31,6 +33,7 @@ def poke_client() -> int:
 
 
 def _start(program: str, module: str, needs_ros: bool = False) -> int:
+    interrupts.end_at_once()
     remedy = _remedy(needs_ros)
     if remedy:
         print(f"{program}: {remedy}", file=sys.stderr)

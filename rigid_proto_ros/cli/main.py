@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """``rigid_proto``: one console command; each of its commands is a module of this folder.
 
-Exit status: 0 done, 1 a check failed, 2 the input was refused (one line on stderr).
+Exit status: 0 done, 1 a check failed, 2 the input was refused (one line on stderr), 130 ended by Ctrl-C (143 by
+SIGTERM); what stays until Ctrl-C ends by it with 0.
 """
 
 from __future__ import annotations
@@ -9,12 +10,12 @@ from __future__ import annotations
 import gc
 import importlib
 import os
-import signal
 import sys
 from types import SimpleNamespace
 from typing import Any
 
 from .. import __version__
+from ..base import interrupts
 from ..base.command_line import Parser, complete, completing
 from ..base.errors import InputError
 
@@ -31,6 +32,9 @@ COMMANDS = {
     "workbench": "a body and its interactive page, until Ctrl-C; needs no ROS",
 }
 
+UNTIL_INTERRUPTED = ("up", "workbench")
+"""Commands that stay until Ctrl-C: ended by it, they are done."""
+
 EXAMPLES = (
     ("rigid_proto inspect hammer", "mass, COM and inertia of a bundled mesh"),
     ("rigid_proto simulate t_handle --record out/flight.rrd", "simulate a bundled scene, recorded for Rerun"),
@@ -43,6 +47,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
     own_process = argv is None
     if own_process:
+        interrupts.end_at_once()
         gc.disable()  # what is imported stays: looking through it for garbage takes a tenth of a command's start
     argv = sys.argv[1:] if argv is None else argv
     parser = Parser(
@@ -67,19 +72,19 @@ def main(argv: list[str] | None = None) -> int:
             _without_unused_libraries()
         gc.freeze()
         gc.enable()
-    # SIGTERM ends a command as Ctrl-C does, through every finally; so does SIGINT where the shell that started it in
-    # the background had it ignored.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
     try:
-        return args.run(args)
+        if own_process:
+            interrupts.interrupt_once()
+        status = args.run(args)
+        if own_process:
+            interrupts.end_at_once()
+        return status
     except InputError as error:
         print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         # Asked to end, and ended: files are closed, children are gone.
-        print(f"rigid_proto {args.command}: stopped", file=sys.stderr)
-        return 0
+        return 0 if args.command in UNTIL_INTERRUPTED else interrupts.status()
     except BrokenPipeError:
         # The reader of our output went away, as `| head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

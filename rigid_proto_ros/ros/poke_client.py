@@ -5,29 +5,32 @@
     poke_client poke --at tip --push 5
     poke_client wrench --force 1 0 0 --for 2
 
-Exit status: 0 all sent, 1 something came late or was refused, 2 the input was refused or no node was found.
+Exit status: 0 all sent, 1 something came late or was refused, 2 the input was refused or no node was found, 130 ended
+by Ctrl-C (143 by SIGTERM): commands already sent still act.
 """
 
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
+from typing import TYPE_CHECKING
 
+from ..base import interrupts
 from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError
-from ..scene.command_codec import ScriptCommand
-from ..scene.script import MAX_TIME_S, parse_script, read_script
+
+if TYPE_CHECKING:
+    from ..scene.command_codec import ScriptCommand
 
 _ONE_LINE_COMMANDS = ("poke", "wrench")
 
 
 def main(argv: list[str] | None = None) -> int:
     """Send what the arguments say; returns the exit status."""
+    own_process = argv is None
+    if own_process:
+        interrupts.end_at_once()
     argv = sys.argv[1:] if argv is None else argv
-    # Python's own handler: the middleware's would end the context under the clean-up.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
     own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
     try:
         args = _arguments(own)
@@ -36,13 +39,15 @@ def main(argv: list[str] | None = None) -> int:
         if args.dry_run:
             _print_plan(script)
             return 0
-        return _send(script, args, argv)
+        status = _send(script, args, argv, own_process)
+        if own_process:
+            interrupts.end_at_once()
+        return status
     except InputError as error:
         print(f"poke_client: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("poke_client: stopped; commands already sent still act", file=sys.stderr)
-        return 0
+        return interrupts.status()
 
 
 EXAMPLES = (
@@ -55,6 +60,8 @@ EXAMPLES = (
 
 
 def _arguments(argv: list[str]) -> argparse.Namespace:
+    from ..scene.script import MAX_TIME_S
+
     parser = Parser(
         prog="poke_client",
         description="Send a poke script, or one command, to a running rigid_body node.",
@@ -95,6 +102,8 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
 
 
 def _script(args: argparse.Namespace) -> list[ScriptCommand]:
+    from ..scene.script import parse_script, read_script
+
     if args.what not in _ONE_LINE_COMMANDS:
         return read_script(args.what)
     import yaml
@@ -142,12 +151,15 @@ def _print_plan(script: list[ScriptCommand]) -> None:
         print(f"{command.t_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 
-def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]) -> int:
+def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str], own_process: bool) -> int:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from .script_sender import ScriptSender
 
+    if own_process:
+        interrupts.interrupt_once()
+    # The middleware's own handler would end the context under the clean-up.
     rclpy.init(args=[sys.argv[0], *argv], signal_handler_options=SignalHandlerOptions.NO)
     sender = None
     try:

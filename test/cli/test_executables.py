@@ -4,13 +4,25 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 import subprocess
 import sys
 
 import pytest
 
+from rigid_proto_ros.base import interrupts
 from rigid_proto_ros.cli import executables
 from rigid_proto_ros.cli.main import main
+
+
+@pytest.fixture(autouse=True)
+def signals_as_before():
+    """The handlers of signals, which executables set for their process."""
+    before = {number: signal.getsignal(number) for number in interrupts.NUMBERS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
 
 START = {name: getattr(executables, name) for name in ("rigid_proto", "rigid_body_node", "poke_client")}
 
