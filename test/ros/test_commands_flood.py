@@ -2,6 +2,7 @@
 """Floods of commands: all received, or the loss told."""
 
 import signal
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -117,7 +118,7 @@ def test_with_the_node_held_up_the_loss_of_one_publisher_is_counted_exactly(rig)
     rig.sent += gained["poke_received"]
 
 
-def test_with_the_node_held_up_the_losses_of_two_publishers_are_counted_exactly(rig):
+def test_with_the_node_held_up_the_losses_of_two_publishers_are_counted_exactly_or_a_full_queue_is_told(rig):
     other = RosClient(rig.environment, rig.node)
     try:
         other.advertise("poke")
@@ -133,9 +134,17 @@ def test_with_the_node_held_up_the_losses_of_two_publishers_are_counted_exactly(
         for client in (other, rig):
             client.do("acknowledged", topic=rig.name("poke"))
             push(client, 1)
-        gained = told(rig, before, lambda gained: gained["poke_received"] + gained["messages_lost"] >= 13_004)
-        assert gained["poke_received"] + gained["messages_lost"] == 13_004
-        assert gained["messages_lost"] > 0
+        told(
+            rig,
+            before,
+            lambda gained: gained["queue_full"] or gained["poke_received"] + gained["messages_lost"] >= 13_004,
+        )
+        time.sleep(1.0)
+        gained = told(rig, before, lambda gained: True)
+        known = gained["poke_received"] + gained["messages_lost"]
+        # Both at once may be more than the node's own queue holds: what that drops is said without a number.
+        assert known == 13_004 or (known < 13_004 and gained["queue_full"] > 0)
+        assert gained["messages_lost"] > 0 or gained["queue_full"] > 0
     finally:
         other.close()
     rig.sent += gained["poke_received"]
