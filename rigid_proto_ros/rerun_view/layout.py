@@ -133,9 +133,10 @@ class Layout:
         else:
             names = [style.ANGULAR_VELOCITY_PRINCIPAL, style.ANGULAR_MOMENTUM, style.ENERGY]
         plots = [self._plot(name) for name in names if self._shows(name)]
-        views = [flight, command_view()] if self._finished is None or self._finished.commanded else [flight]
+        if self._finished is None or self._finished.commanded:
+            flight = rrb.Vertical(flight, command_view(), row_shares=[5, 1])
         return rrb.Horizontal(
-            rrb.Vertical(*views, row_shares=[5, 1][: len(views)]),
+            flight,
             # Nearly equal shares: a smaller plot has no room for the four lines of a legend.
             rrb.Vertical(*poinsot, *plots, row_shares=[5] * len(poinsot) + [4] * len(plots)),
             column_shares=[3, 2],
@@ -144,14 +145,15 @@ class Layout:
 
     def _debugging(self, flight: Any) -> Any:
         """Everything that is logged: every plot, the state line, the event lines as they are."""
-        logs = [rrb.TextDocumentView(origin=e.SCENE, name="Scene")]
+        # A container of one view would be taken for the view by the viewer, but not by who looks for it by name.
+        logs = rrb.TextDocumentView(origin=e.SCENE, name="Scene")
         if self._finished is None or self._finished.commanded:
-            logs = [rrb.TextLogView(origin=e.EVENTS, name="Events"), command_view(), *logs]
+            logs = rrb.Tabs(rrb.TextLogView(origin=e.EVENTS, name="Events"), command_view(), logs)
         return rrb.Horizontal(
             rrb.Vertical(
                 flight,
                 rrb.StateTimelineView(origin=e.STATUS, name="State"),
-                rrb.Tabs(*logs),
+                logs,
                 row_shares=[9, 9, 4],
             ),
             rrb.Grid(*(self._plot(name) for name in TITLES if self._shows(name)), grid_columns=2),

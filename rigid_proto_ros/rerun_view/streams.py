@@ -53,6 +53,9 @@ class Stream(ABC):
     missed = False
     """Whether something was left out while it was behind: kept by who sends."""
 
+    shown_from_start = True
+    """Whether somebody may look at it before it is finished: otherwise it has one layout, that of a finished run."""
+
     subject: Subject | None = None
     """What the layout is for that its viewers were sent."""
 
@@ -88,6 +91,8 @@ class Stream(ABC):
         """
         if finished is None and self.subject is not None and self.subject.ghost == subject.ghost:
             return
+        if finished is None and not self.shown_from_start:
+            return
         self.subject = subject
         send_blueprint(APPLICATION_ID, Layout(subject, finished).blueprint(initial_view), self.recording)
 
@@ -109,7 +114,7 @@ class FileStream(Stream):
 
     def __init__(self, path: Path, recording_id: str, name: str, open_ended: bool = False) -> None:
         self.path = path
-        self.open_ended = open_ended
+        self.open_ended = self.shown_from_start = open_ended
         if path.suffix != ".rrd":
             raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
         output_file("record", path)
