@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
     if args.lump is not None:
         return lump(args)
     if args.compare is not None:
-        return compare(args, meshes[0] if meshes else None, scale, given_mass, given_density)
+        return compare(args, meshes, scale, given_mass, given_density)
     if given_mass.by_link or given_density.by_link:
         named = next(iter({**given_mass.by_link, **given_density.by_link}))
         raise InputError("--mass" if given_mass.by_link else "--density", f"{named}= needs --compare ROBOT")

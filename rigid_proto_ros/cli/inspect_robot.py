@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from ..base.errors import InputError
 from ..base.files import whole_file
 from ..mass.tensor import principal_axes, six_from_tensor
 from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links, print_lump
+from .terminal import line
 
 if TYPE_CHECKING:
     from ..robots.composite_inertia import Lump
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 _COMPARES = ("link", "fix", "all", "total_mass", "tolerance")
 _LUMPS = ("joint", "as_scene")
+ROBOT_SUFFIXES = (".urdf", ".sdf", ".xacro", ".xml", ".mjcf")
 
 
 @dataclass(frozen=True)
@@ -106,36 +109,70 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
     for word in args.xacro:
         if ":=" not in word:
             raise InputError("--xacro", word, "NAME:=VALUE, as xacro takes it")
-    if args.compare is not None and len(meshes) > 1:
-        raise InputError("--compare", " ".join(meshes), "one MESH, or none for all links")
+    if args.compare is not None and len(meshes) > 1 and not _are_robots(meshes):
+        raise InputError("--compare", " ".join(meshes), "one MESH, or none for all links, or further robots")
+    if args.compare is not None and _are_robots(meshes) and args.fix is not None:
+        raise InputError("--fix", args.fix, "one robot")
     if args.lump is not None and (args.compare is not None or meshes):
         raise InputError("--lump", "can't be combined with MESH or --compare")
 
 
-def compare(args: argparse.Namespace, mesh: str | None, scale: list[float], mass: Given, density: Given) -> int:
-    """``inspect [MESH] --compare ROBOT``: 1 when a link's inertial is wrong, otherwise 0; with a mesh or a tolerance
-    also 1 for one that differs from the uniform solid, and when nothing could be compared.
+def compare(args: argparse.Namespace, meshes: list[str], scale: list[float], mass: Given, density: Given) -> int:
+    """``inspect [MESH] --compare ROBOT``, or with several robots: 1 when a link's inertial is wrong, otherwise 0; with
+    a mesh or a tolerance also 1 for one that differs from the uniform solid, and when nothing could be compared.
     """
-    from ..robots.diagnosis import NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
-
+    robots = [args.compare, *meshes] if _are_robots(meshes) else [args.compare]
+    mesh = meshes[0] if meshes and len(robots) == 1 else None
     _check(args, mesh, scale)
     chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
     options = _options(args, mass, density)
     if args.fix is not None:
         return _fix(args, options)
-    diagnoses = compare_robot(Path(args.compare), options, mesh=mesh, scale=chosen, link=args.link)
+    if len(robots) == 1:
+        status, report = _judge(args, args.compare, options, mesh, chosen)
+        if args.json:
+            print(json.dumps(report))
+        return status
+    found = [_judge_one_of_several(args, robot, options) for robot in robots]
     if args.json:
-        print(json.dumps({"compare": args.compare, "links": [d.as_dict() for d in diagnoses]}))
-    elif args.tolerance is not None:
+        print(json.dumps({"robots": [report for _, report in found]}))
+    return max(status for status, _ in found)
+
+
+def _are_robots(names: list[str]) -> bool:
+    """Whether names given where a mesh may stand are those of further robots."""
+    return bool(names) and all(Path(name).suffix in ROBOT_SUFFIXES for name in names)
+
+
+def _judge_one_of_several(args: argparse.Namespace, robot: str, options: Options) -> tuple[int, dict]:
+    """Exit status and JSON object of one robot, 2 where it is refused; the others are judged none the less."""
+    if not args.json:
+        line((robot, "bold"), ":")
+    try:
+        return _judge(args, robot, options, None, None)
+    except InputError as error:
+        print(f"rigid_proto inspect: {robot}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2, {"compare": robot, "links": None, "refused": str(error)}
+
+
+def _judge(
+    args: argparse.Namespace, robot: str, options: Options, mesh: str | None, scale: np.ndarray | None
+) -> tuple[int, dict]:
+    """Exit status and JSON object of one robot, printed but for JSON."""
+    from ..robots.diagnosis import NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
+
+    diagnoses = compare_robot(Path(robot), options, mesh=mesh, scale=scale, link=args.link)
+    if not args.json and args.tolerance is not None:
         print_diagnosis_lines(diagnoses)
-    else:
+    elif not args.json:
         print_diagnoses(diagnoses)
     strict = mesh is not None or args.tolerance is not None
     counted = (*WRONG, NOT_UNIFORM) if strict else WRONG
     with_shapes = [d for d in diagnoses if d.mesh]
     # A comparison of nothing must not look like one that found nothing.
     nothing = strict and with_shapes and all(d.status == UNKNOWN for d in with_shapes)
-    return 1 if nothing or any(d.status in counted for d in diagnoses) else 0
+    status = 1 if nothing or any(d.status in counted for d in diagnoses) else 0
+    return status, {"compare": robot, "links": [d.as_dict() for d in diagnoses]}
 
 
 def lump(args: argparse.Namespace) -> int:
