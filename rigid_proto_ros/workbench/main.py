@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import time
 import webbrowser
 from collections.abc import Callable
@@ -19,6 +20,9 @@ from .page import Page
 from .server import make_server, stop_server
 
 TITLE = "rigid_proto workbench"
+
+TURN_S = 2e-4
+"""[s] Python's own 5 ms are longer than the period of a body that is published at 1 kHz."""
 
 LAST_MESSAGE_S = 0.2
 """[s] For the last message to reach the browsers."""
@@ -41,6 +45,8 @@ class Workbench:
         lesson: str = "",
         anew: bool = False,
     ) -> None:
+        # The physics thread shares the interpreter with the page: it waits this long for its turn at most.
+        sys.setswitchinterval(TURN_S)
         default = Parameters().workbench_port
         name = "" if live.name == "rigid_body" else f" {live.name}"
         self._server = make_server(f"{TITLE}{name}", host, port, default)
