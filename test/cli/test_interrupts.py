@@ -4,12 +4,8 @@
 from __future__ import annotations
 
 import importlib.util
-import os
-import signal
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
@@ -82,19 +78,3 @@ def test_during_imports(module, command) -> None:
 def test_while_it_works_and_again_while_it_closes() -> None:
     done = ended(AT_THE_END)
     assert (done.returncode, done.stdout, done.stderr) == (130, "closed\n", "")
-
-
-def test_at_moments_of_a_simulation(tmp_path: Path) -> None:
-    """From the interpreter's own start on, which nobody can keep from its traceback, to the end."""
-    command = [sys.executable, "-m", "rigid_proto_ros.cli.main", "simulate", "t_handle", "--duration", "1e5"]
-    for wait_s in (0.0, 0.1, 0.4, 1.0, 2.0):
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        deadline = time.monotonic() + 60.0
-        while "numba" not in Path(f"/proc/{process.pid}/maps").read_text():
-            assert process.poll() is None and time.monotonic() < deadline
-            time.sleep(0.01)
-        time.sleep(wait_s)
-        for _ in range(2):
-            os.kill(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=60.0)
-        assert (process.returncode, out, err) == (130, "", ""), wait_s
