@@ -197,7 +197,7 @@ def crossing_components(
     """Which of the pairs of components marked in ``asked`` (k, k) have triangles that cross, (k, k), and whether
     WORK_LIMIT comparisons sufficed.
     """
-    wanted = np.nonzero(np.any(asked[component], axis=1))[0]
+    wanted = np.nonzero(np.isin(component, np.nonzero(asked)[0]))[0]
     if not len(wanted):
         return np.zeros_like(asked), True
     left = asked.copy()
