@@ -78,13 +78,13 @@ def mesh_body(
             done = (*done, joined) if joined else done
         known, remember = {}, None
         if done:
-            verdict, _ = check_surface(vertices, triangles, polygon_starts)
+            verdict, _ = check_surface(vertices, triangles)
             verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
     effect = verdict.hole_effect
     if not verdict.closed and effect is not None and effect <= accept_open:
         triangles, polygon_starts = close_surface(vertices, triangles, polygon_starts)
         reason = verdict.reason
-        verdict, _ = check_surface(vertices, triangles, polygon_starts)
+        verdict, _ = check_surface(vertices, triangles)
         message = f"closed with flat caps, on which at most {effect:.2g} of volume and tensor depend: {reason}"
         verdict.findings.insert(0, Finding("open_accepted", WARNING, message))
         known, remember = {}, None
@@ -166,13 +166,13 @@ def _checked(mesh: Mesh) -> _Checked:
 
 
 def _checked_anew(mesh: Mesh) -> _Checked:
-    verdict, topology = check_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
+    verdict, topology = check_surface(mesh.vertices, mesh.triangles)
     if topology is not None and verdict.usable and len(topology.boundary):
         triangles, starts, done = weld_cracks(mesh.vertices, mesh.triangles, mesh.polygon_starts)
         if done:
             # Vertices that others now stand for belong to faces all the same.
             spare = [finding for finding in verdict.findings if finding.code == UNREFERENCED]
-            verdict, _ = check_surface(mesh.vertices, triangles, starts)
+            verdict, _ = check_surface(mesh.vertices, triangles)
             verdict.findings[:] = spare + [finding for finding in verdict.findings if finding.code != UNREFERENCED]
             verdict.findings.insert(0, Finding("welded", INFO, f"{done}, less than {CRACK:g} of the diagonal"))
             return _Checked(verdict, triangles, starts, True, {})

@@ -8,8 +8,6 @@ subtracting it from a vertex never rounds. Far from the origin a mesh is therefo
 from __future__ import annotations
 
 import math
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,17 +15,13 @@ import numpy as np
 from ..base.compilation import njit
 from ..base.errors import MeshError
 from ..base.exact_arithmetic import pair_add, pair_divide, pair_multiply
-from .moments_solid import blocked_sums, compensated_sums, joined_sums
+from .moments_solid import blocked_sums, compensated_sums
 
 SMALL_MESH = 1024
 """Up to this many triangles the compensated sums cost well under a millisecond, so they are always taken."""
 ROUNDING_LIMIT = 5e-14
 """Above this estimated relative rounding of the volume the compensated sums take over; typical errors are 10 times
 smaller than the estimate on meshes of more than SMALL_MESH triangles."""
-PART = 65536
-"""Triangles a thread sums at a time; meshes of more than two parts are worth the threads' start, some 0.1 ms."""
-MAX_WORKERS = 8
-"""Beyond this many threads the memory is the limit."""
 _UNIT_ROUNDOFF = 2.0**-53
 
 _Bounds = tuple[float, float, float, float, float, float]
@@ -231,7 +225,7 @@ def _solid(
     if status != _DONE:
         return status, False, reference, np.zeros(13)
     if try_blocked:
-        total, low = blocked_sums(vertices, triangles, 0, triangles.shape[0], reference, factor)
+        total, low = blocked_sums(vertices, triangles, reference, factor)
         if total[10] < 0.0:
             return _NO_SUCH_VERTEX, False, reference, np.zeros(13)
         if only_blocked or _is_good(total, factor, size):
@@ -249,33 +243,6 @@ def _compensated(
     return _DONE, True, reference, _central(sums, low, factor, 6.0, 24.0, 120.0)
 
 
-def _large_solid(
-    vertices: np.ndarray, triangles: np.ndarray, only_blocked: bool
-) -> tuple[int, bool, np.ndarray, np.ndarray]:
-    """As ``_solid``, its parts of PART triangles summed by as many threads as there are processors.
-
-    Parts and the order in which they are joined depend on the mesh alone, so the result is the same on any number.
-    """
-    status, reference, factor, size = _prepared(vertices)
-    if status != _DONE:
-        return status, False, reference, np.zeros(13)
-    count = len(triangles)
-    workers = min(os.cpu_count() or 1, MAX_WORKERS)
-
-    def part(first: int) -> tuple[np.ndarray, np.ndarray]:
-        return blocked_sums(vertices, triangles, first, min(first + PART, count), reference, factor)
-
-    with ThreadPoolExecutor(workers) as pool:
-        (total, low), *others = pool.map(part, range(0, count, PART))
-    for more, more_low in others:
-        joined_sums(total, low, more, more_low)
-    if total[10] < 0.0:
-        return _NO_SUCH_VERTEX, False, reference, np.zeros(13)
-    if only_blocked or _is_good(total, factor, size):
-        return _DONE, False, reference, _central(total, low, factor, 6.0, 24.0, 120.0)
-    return _compensated(vertices, triangles, reference, factor)
-
-
 def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
     """Moments of the solid that ``triangles`` (m, 3) over ``vertices`` (n, 3) bound, exact to about 1e-14.
 
@@ -286,10 +253,7 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "a
     """
     vertices, triangles = as_arrays(vertices, triangles, check=False)
     try_blocked = path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH)
-    if try_blocked and len(triangles) > 2 * PART:
-        status, compensated, reference, numbers = _large_solid(vertices, triangles, path == "blocked")
-    else:
-        status, compensated, reference, numbers = _solid(vertices, triangles, try_blocked, path == "blocked")
+    status, compensated, reference, numbers = _solid(vertices, triangles, try_blocked, path == "blocked")
     if status == _NOT_FINITE:
         raise MeshError("mesh", "a vertex coordinate is not finite")
     if status == _ONE_POINT:

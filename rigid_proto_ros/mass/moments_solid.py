@@ -91,9 +91,9 @@ def _block_sums(w: np.ndarray, count: int, total: np.ndarray, carry: np.ndarray)
 
 @njit(cache=True, nogil=True)
 def blocked_sums(
-    vertices: np.ndarray, triangles: np.ndarray, first: int, last: int, reference: np.ndarray, factor: float
+    vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The ten sums over triangles first to last in plain doubles, block by block; blocks are combined without error.
+    """The ten sums in plain doubles, block by block; blocks are combined without error.
 
     vertices (n, 3), triangles (m, 3), reference (3,), factor a power of two: corners enter as (v − reference)·factor.
     Returns (sums (11,), their low parts (11,)), the eleventh being Σ(|b − a|² + |c − a|²), which measures how much d
@@ -104,8 +104,8 @@ def blocked_sums(
     total = np.zeros(11)
     carry = np.zeros(11)
     w = np.empty((9, BLOCK))
-    for start in range(first, last, BLOCK):
-        size = min(BLOCK, last - start)
+    for start in range(0, len(triangles), BLOCK):
+        size = min(BLOCK, len(triangles) - start)
         for t in range(size):
             for corner in range(3):
                 i = triangles[start + t, corner]
@@ -120,17 +120,6 @@ def blocked_sums(
         w[:, size:whole] = 0.0  # triangles without an extent
         _block_sums(w, whole, total, carry)
     return total, carry
-
-
-@njit(cache=True, nogil=True)
-def joined_sums(total: np.ndarray, carry: np.ndarray, more: np.ndarray, more_carry: np.ndarray) -> None:
-    """Add the sums of further triangles to ``total`` and ``carry`` (11,), in place, without error; −1 stays −1."""
-    missing = total[10] < 0.0 or more[10] < 0.0
-    for k in range(11):
-        _accumulate(total, carry, k, more[k])
-        carry[k] += more_carry[k]
-    if missing:
-        total[10] = -1.0
 
 
 @njit(cache=True, nogil=True)

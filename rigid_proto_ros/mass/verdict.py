@@ -12,7 +12,6 @@ from ..base.errors import MeshError
 from ..mesh.crossing import self_crossings
 from ..mesh.holes import fan, rims
 from ..mesh.nesting import Nesting, component_nesting
-from ..mesh.planarity import polygon_planarity
 from ..mesh.topology import (
     Components,
     Topology,
@@ -37,8 +36,6 @@ THIN = 1e-6
 """V/diagonal³ below which a body is called thin: a 1 x 1 x 1e-5 plate has 4e-6, a needle less."""
 NO_VOLUME = 1e-14
 """V/(area·diagonal) below which the surface encloses nothing: both sides coincide to rounding."""
-NONPLANAR = 1e-9
-"""Largest distance of a corner from its polygon's plane, over the mesh's diagonal, that counts as planar."""
 SIZE_RANGE = 1e-60, 1e60
 """Longest sides of surfaces that are judged: moments grow with the fifth power, and doubles end at 1e308."""
 SMALL_HOLES = 0.1
@@ -309,22 +306,8 @@ def _check_size(verdict: Verdict, side: float) -> None:
         verdict.add("size", ERROR, f"the mesh is {side:.3g} across; moments are finite for sizes {sizes}")
 
 
-def _check_polygons(verdict: Verdict, planarity: tuple[float, float], diagonal: float) -> None:
-    deviation, spread = planarity
-    if deviation > NONPLANAR * diagonal:
-        off = f"corners lie up to {deviation:.2g} off the plane"
-        other = f"other triangulations would change the volume by up to {spread:.2g}"
-        message = f"non-planar polygons, triangulated from their first corner: {off}; {other}"
-        verdict.add("nonplanar_polygons", INFO, message)
-
-
-def check_surface(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
-) -> tuple[Verdict, Topology | None]:
-    """The verdict on triangles (m, 3) over vertices (n, 3), and the topology it rests on (None when unusable).
-
-    polygon_starts (p + 1,) as in a mesh: which fan triangles make up a polygon; None when each is its own.
-    """
+def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[Verdict, Topology | None]:
+    """The verdict on triangles (m, 3) over vertices (n, 3), and the topology it rests on (None when unusable)."""
     verdict = Verdict()
     extent = referenced_extent(vertices, triangles)
     if len(triangles) == 0 or extent.not_finite:
@@ -367,8 +350,6 @@ def check_surface(
         if crossings:
             message = f"the surface passes through itself ({counted(crossings, 'pair')} of triangles)"
             verdict.add(SELF_CROSSING, WARNING, f"{message}; what it encloses twice counts twice")
-    if polygon_starts is not None:
-        _check_polygons(verdict, polygon_planarity(vertices, triangles, polygon_starts, middle), diagonal)
     return verdict, topology
 
 

@@ -50,9 +50,9 @@ def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tm
 
 SUMS = """
 import numpy as np
-from package.mass.moments_solid import joined_sums as kernel
-sums = [np.zeros(11) for _ in range(4)]
-kernel(*sums)
+from package.mass.moments_solid import _accumulate as kernel
+sums = [np.zeros(11) for _ in range(2)]
+kernel(*sums, 1, 0.0)
 print(sums[0][1], sum(kernel.stats.cache_hits.values()))
 """
 

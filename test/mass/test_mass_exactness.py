@@ -11,7 +11,7 @@ from reference_mirtich import mirtich_moments
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.exact_moments import exact_solid_moments, relative_errors
 from rigid_proto_ros.mass.from_mesh import mesh_body
-from rigid_proto_ros.mass.moments import PART, solid_moments
+from rigid_proto_ros.mass.moments import solid_moments
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mesh.reading import load_mesh
 
@@ -133,17 +133,6 @@ def test_both_paths_agree_where_both_are_good():
     careful = solid_moments(vertices + 0.3, triangles, path="compensated")
     assert plain.measure == pytest.approx(careful.measure, rel=1e-15 * 8)
     assert plain.second == pytest.approx(careful.second, rel=1e-14, abs=1e-15)
-
-
-def test_the_number_of_processors_is_of_no_matter(monkeypatch):
-    vertices, triangles = sphere(200, (1.0, 0.7, 0.4))
-    assert len(triangles) > 2 * PART  # summed by threads
-    bits = set()
-    for processors in (1, 2, 5):
-        monkeypatch.setattr("os.cpu_count", lambda n=processors: n)
-        moments = solid_moments(vertices, triangles)
-        bits.add((moments.measure, moments.center.tobytes(), moments.second.tobytes()))
-    assert len(bits) == 1
 
 
 def test_a_vertex_that_is_not_there_is_refused_by_every_path():

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mass_solids import box, inward, moved, rotation, sphere, together
-from mesh_files import CUBE_QUADS, CUBE_VERTICES, moebius, obj
+from mesh_files import moebius
 
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
 from rigid_proto_ros.mass.repair import RepairedSurface
-from rigid_proto_ros.mass.verdict import check_surface, unit_suspicion
+from rigid_proto_ros.mass.verdict import unit_suspicion
 from rigid_proto_ros.mesh import nesting as mesh_topology_nesting
 from rigid_proto_ros.mesh.hull import box_surface, convex_hull
 from rigid_proto_ros.mesh.reading import Mesh, load_mesh
@@ -180,7 +180,6 @@ def test_repair_turns_polygons_as_a_whole(meshes):
     repaired, whole = mesh_body(broken, repair=True), mesh_body(mesh)
     assert solid_volume(repaired) == solid_volume(whole)
     assert repaired.moments.moments("shell").measure == pytest.approx(whole.moments.moments("shell").measure, rel=1e-14)
-    assert codes(repaired)["nonplanar_polygons"] == "info"
 
 
 def test_repair_drops_copies_and_back_sides():
@@ -325,17 +324,6 @@ def test_the_box_surface_is_outward():
     vertices, triangles = box_surface(np.zeros(3), np.array([1.0, 2.0, 3.0]))
     assert solid_moments(vertices, triangles).measure == 6.0
     assert mesh_topology(vertices, triangles).unbalanced == 0
-
-
-def test_nonplanar_polygons_say_how_far_and_how_much(tmp_path):
-    lifted = CUBE_VERTICES.copy()
-    lifted[7, 2] += 0.3
-    (tmp_path / "q.obj").write_bytes(obj(lifted, CUBE_QUADS))
-    mesh = load_mesh(str(tmp_path / "q.obj"))
-    verdict, _ = check_surface(mesh.vertices, mesh.triangles, mesh.polygon_starts)
-    (finding,) = [f for f in verdict.findings if f.code == "nonplanar_polygons"]
-    # The lifted corner and its neighbours' diagonal span a tetrahedron of 0.3·1·1/6.
-    assert "by up to 0.05" in finding.message
 
 
 @pytest.mark.parametrize(("side", "suspect"), [(400.0, True), (1.8, False), (0.02, False), (1e-4, True)])
