@@ -163,6 +163,7 @@ def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
     from rigid_proto_ros.rerun_view.session_files import read_runs
     from rigid_proto_ros.scene.offline import OfflineRun, read_scene
     from rigid_proto_ros.scene.script import read_script
+    from rigid_proto_ros.simulation.observer import BodyChanged, MeshChanged, Started
 
     mesh, script, recording = tmp_path / "two.obj", tmp_path / "repair.yaml", tmp_path / "flight.rrd"
     mesh.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
@@ -181,8 +182,10 @@ def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
         flight.advance(time_ns)
         row, body = flight.simulation.state.row, flight.simulation.setup.body
         places.append(row[:3] - matrix_from_quaternion(row[3:7]) @ body.center_of_mass)
-    assert [len(drawn.triangles) for drawn in record.meshes] == [24, len(flight.simulation.setup.surface.triangles)]
-    assert [drawn.mesh for drawn in record.bodies[-2:]] == [0, 1]
-    assert record.bodies[-1].body.mass == pytest.approx(8000.0)
+    drawn = [event for event in record.changes if isinstance(event, (Started, MeshChanged))]
+    surface = flight.simulation.setup.surface
+    assert [len(event.triangles) for event in drawn] == [24, len(surface.triangles)]
+    (_, before), (_, after) = record.bodies(BodyChanged)[-2:]
+    assert after.mass == pytest.approx(8000.0)
     assert np.abs(places[1] - places[0]).max() < 1e-8
-    assert np.linalg.norm(record.bodies[-1].body.center_of_mass - record.bodies[-2].body.center_of_mass) > 0.01
+    assert np.linalg.norm(after.center_of_mass - before.center_of_mass) > 0.01
