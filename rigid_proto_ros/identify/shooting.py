@@ -316,8 +316,9 @@ def linearized(segment: ShootingInterval, start: np.ndarray, variations: Variati
         kind, in_body, _ = piece.sensor
         fill_shift_columns(kind, in_body, samples[0], own, seconds, rate, start, piece.scale, columns, first)
         first += 3 * len(own)
+    present = {piece.topic for piece in segment.pieces}
     for k, (name, topic) in enumerate(unknowns.slots):
-        if name == "offsets":
+        if name == "offsets" and topic in present:
             _fill_offset(segment, start, variations, topic, columns[START + k])
     return columns
 
@@ -331,8 +332,6 @@ def _fill_offset(
         offsets = list(values.offsets)
         offsets[topic] += sign * OFFSET_STEP_S
         times, where = _times(segment, offsets, topic)
-        if not len(times):
-            return
         samples, _ = tr.fly_rows(row, times, segment.wrenches)
         sides.append([samples[0, own] for own in where])
     first = 0

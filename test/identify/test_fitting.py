@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import calibration_study as study
 import measured_flights as mf
 import numpy as np
@@ -53,6 +55,25 @@ def test_derivatives_agree_with_extrapolated_differences() -> None:
         expected = (4.0 * narrow - wide) / 3.0
         # Measured 2e-3 and less: a rotation vector bends by part of its noise.
         assert np.abs(jacobian[:, k] - expected).max() < 1e-2 * max(np.abs(expected).max(), 1e-9), k
+
+
+def test_a_segment_without_samples_of_a_topic_says_nothing_about_its_clock() -> None:
+    truth = _body((0.05, 1e-4), 2)
+    flight = mf.with_imu(truth, mf.tumbling(), np.random.default_rng(1), 1.0, offset_s=0.2)
+    late = [
+        dataclasses.replace(series, times_ns=series.times_ns[100:], values=series.values[100:])
+        if series.is_imu
+        else series
+        for series in flight.series
+    ]
+    flight = dataclasses.replace(flight, series=tuple(late))
+    topics = ["/mocap/pose", "/imu"]
+    segments = sh.cut([flight], 0.2, topics, lambda _: 1.0, lambda s: np.ones(len(s.times_ns)))
+    assert {piece.topic for piece in segments[0].pieces} == {0}
+    unknowns = make_unknowns(GROUPS, topics)
+    columns = sh.linearized(segments[0], mf.tumbling(), sh.Variations(truth, unknowns))
+    own = next(sh.START + k for k, (name, _) in enumerate(unknowns.slots) if name == "offsets")
+    assert not columns[own].any() and columns[: sh.START].any()
 
 
 def test_a_poked_throw_tells_all_ten_parameters() -> None:
