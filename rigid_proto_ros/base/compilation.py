@@ -94,7 +94,8 @@ def kernel_folder(file: str) -> str:
 
     It lies in NUMBA_CACHE_DIR, in the user's cache folder, or, where neither can be written to, beside the package.
     """
-    module = os.path.relpath(file, PACKAGE).removesuffix(".py").replace(os.sep, ".")
+    # With the package's own name, which compiled code refers to.
+    module = os.path.relpath(file, os.path.dirname(PACKAGE)).removesuffix(".py").replace(os.sep, ".")
     base = os.environ.get("XDG_CACHE_HOME", "")
     user = base if os.path.isabs(base) else os.path.join(os.path.expanduser("~"), ".cache")
     usual = (os.path.join(user, "rigid_proto_ros", "kernels"), os.path.join(PACKAGE, "__pycache__", "kernels"))

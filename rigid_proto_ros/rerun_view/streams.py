@@ -22,7 +22,7 @@ from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from ..picture.backend import DrawnMesh
 from .layout import Finished, Layout, Subject
-from .ports import LOOPBACK, PortTakenError
+from .ports import LOOPBACK, PortTakenError, listens
 from .rerun_internals import send_blueprint
 from .rrd_file import end_without_index
 
@@ -179,6 +179,7 @@ class LiveServer:
     """A gRPC server on loopback with bounded memory; viewers come and go without the sender noticing."""
 
     def __init__(self, port: int, memory_limit: str) -> None:
+        self._port = port
         self._sink = rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=memory_limit)
         self._host: LiveStream | None = None
         self._leaving: list[threading.Thread] = []
@@ -191,10 +192,18 @@ class LiveServer:
         """
         if self._host is None:
             host = LiveStream(recording_id, self._sink, name)
+            deadline = time.monotonic() + FLUSH_TIMEOUT_S
             try:
-                # A server that can't listen says so to nobody but who waits for what was sent.
-                host.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+                # A server that can't listen says so to nobody but who waits for what was sent, and not at once.
+                while True:
+                    host.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+                    if listens(os.getpid(), self._port):
+                        break
+                    if time.monotonic() > deadline:
+                        raise RuntimeError(f"nothing serves on port {self._port}")
+                    time.sleep(0.02)
             except RuntimeError as error:
+                host.layout.close()
                 host.close()
                 raise PortTakenError(_last_line(error)) from error
             self._host = host

@@ -83,7 +83,6 @@ def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_h
 
 
 def test_a_copy_elsewhere_finds_the_kernels_of_the_same_sources_and_old_ones_are_removed(tmp_path):
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
     said = []
     for checkout, added in (("one", 1), ("two", 1), ("two", 2), ("one", 1)):
         base = tmp_path / checkout / "package" / "base"
@@ -92,7 +91,9 @@ def test_a_copy_elsewhere_finds_the_kernels_of_the_same_sources_and_old_ones_are
         (base / "inner.py").write_text(INNER.format(added))
         call = CALL.replace("outer", "inner")
         command = [sys.executable, "-B", "-c", call]
-        ran = subprocess.run(command, cwd=base.parents[1], env=environment, capture_output=True, text=True, check=True)
+        ran = subprocess.run(
+            command, cwd=base.parents[1], env=own_cache(tmp_path), capture_output=True, text=True, check=True
+        )
         said.append(ran.stdout.split())
     # Value, and whether it came from the disk: neither of two versions drives out the other.
     assert said == [["2", "0"], ["2", "1"], ["3", "0"], ["2", "1"]]
@@ -101,7 +102,7 @@ def test_a_copy_elsewhere_finds_the_kernels_of_the_same_sources_and_old_ones_are
     for folder in kept:
         os.utime(folder, (1.0, time.time() - compilation.UNUSED_S - 60.0))
     (base / "inner.py").write_text(INNER.format(3))
-    subprocess.run(command, cwd=base.parents[1], env=environment, check=True, capture_output=True)
+    subprocess.run(command, cwd=base.parents[1], env=own_cache(tmp_path), check=True, capture_output=True)
     assert len(list(kept[0].parent.iterdir())) == 1
 
 
