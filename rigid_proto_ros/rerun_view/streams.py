@@ -203,7 +203,6 @@ class LiveServer:
                         raise RuntimeError(f"nothing serves on port {self._port}")
                     time.sleep(0.02)
             except RuntimeError as error:
-                host.layout.close()
                 host.close()
                 raise PortTakenError(_last_line(error)) from error
             self._host = host
