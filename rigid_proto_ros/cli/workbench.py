@@ -12,7 +12,6 @@ from .options import add_mesh, add_scene
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
     ("rigid_proto workbench --mesh part.obj", "your own mesh"),
-    ("rigid_body_node -p viewer:=workbench", "the same page beside a node's topics"),
 )
 
 

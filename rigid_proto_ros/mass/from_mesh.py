@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,7 +63,8 @@ def mesh_body(
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
     checked = _checked(mesh)
-    verdict, known = checked.verdict, checked.moments
+    # What is found of a repair or a stand-in is of this call, and no part of what is kept of the surface.
+    verdict, known = replace(checked.verdict, findings=list(checked.verdict.findings)), checked.moments
     vertices, triangles, polygon_starts = mesh.vertices, checked.triangles, checked.polygon_starts
     if verdict.usable and not np.isfinite(vertices).all():  # vertices that no face uses
         vertices = np.where(np.isfinite(vertices).all(axis=1)[:, None], vertices, vertices[triangles[0, 0]])
