@@ -13,12 +13,18 @@ from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, Rank, ReleaseString, WrenchCommand
+from rigid_proto_ros.simulation.observer import Reset
 from rigid_proto_ros.simulation.simulation import Simulation
 
 
 class _LinesSinceReset(EventLines):
-    def reset(self) -> None:
-        self.timed.clear()
+    takes = EventLines.takes | {Reset}
+
+    def on(self, event) -> None:
+        if isinstance(event, Reset):
+            self.timed.clear()
+        else:
+            super().on(event)
 
 
 class HandSession:

@@ -58,7 +58,6 @@ def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(pro
         (["snapshot", "session.mcap", "--at", "1", "-o", "x.png"], "PIL", "rigid_proto_ros[rerun]"),
         (["snapshot", "session.rrd", "--at", "1", "-o", "x.png"], "rerun", "rigid_proto_ros[rerun]"),
         (["workbench"], "viser", "rigid_proto_ros[workbench]"),
-        (["workbench"], "rclpy", "rigid_proto_ros[ros]"),
         (["simulate", "t_handle", "--record", "x.rrd"], "rerun", "rigid_proto_ros[rerun]"),
     ],
 )

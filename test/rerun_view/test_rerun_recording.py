@@ -313,7 +313,7 @@ def test_a_library_that_hangs_on_a_full_disk_is_told_of_within_two_seconds(tmp_p
         monkeypatch.setattr(rr.RecordingStream, "disconnect", lambda _: released.wait(20.0))
     deadline = time.monotonic() + 2.0
     while not (observer.stalled or observer.error) and time.monotonic() < deadline:
-        observer.state(200_000_000, states[20])
+        observer.on(Published(200_000_000, states[20]))
         time.sleep(0.05)
     try:
         assert str(path) in (observer.stalled if hangs == "flush" else observer.error)

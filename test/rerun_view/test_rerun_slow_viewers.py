@@ -16,6 +16,7 @@ import pytest
 import rerun_flight as flight
 from rerun.chunk import RrdReader
 
+from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import RerunObserver, viewers
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session
@@ -123,10 +124,16 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
                 # Or viewers would be spared most of it, and nothing would have to be dropped.
                 flight.flush(observer)
         watcher = viewers.ViewerProcess("--connect", observer.live_address, "--save", str(saved))
-        _wait_for(lambda: e.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
+        _wait_for(lambda: style.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
         seen = _entities(saved)
         assert min(seen[e.STATE]) > 0, "nothing was dropped, so nothing is shown"
-        for entity in (e.BODY_MESH, e.INERTIA_BOX, e.INERTIA_ELLIPSOID, e.BOUNDING_BOX, e.POINSOT_ELLIPSOID):
+        for entity in (
+            style.BODY_MESH,
+            style.INERTIA_BOX,
+            style.INERTIA_ELLIPSOID,
+            style.BOUNDING_BOX,
+            style.POINSOT_ELLIPSOID,
+        ):
             assert any(at >= 0 for at in seen[entity]), entity
     finally:
         if watcher is not None:

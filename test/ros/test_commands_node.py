@@ -168,7 +168,7 @@ def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_sinc
     rig.schedule(
         "{t: 0.0, set: {gravity: [0.0, 0.0, -1.0]}}", "{t: 0.0, string: release}", "{t: 0, service: clear_wrench}"
     )
-    rig.set(mass=1.0, linear_damping=0.001)
+    rig.set(atomically=True, mass=1.0, linear_damping=0.001)
     rig.trigger("clear_wrench")
     rig.trigger("string/release")
     rig.pause(True)

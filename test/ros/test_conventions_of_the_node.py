@@ -68,7 +68,7 @@ def test_all_topics_have_their_private_names_and_standard_types(rig):
 
 
 def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
-    for name in TYPES:
+    for name in TYPES.keys() - {"thrusters"}:  # of bodies that have some
         side = "sub" if name in COMMANDS else "pub"
 
         def of_the_node(name=name, side=side) -> list:

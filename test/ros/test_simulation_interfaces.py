@@ -8,6 +8,7 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from flights import EventLines
 
 pytest.importorskip("rclpy")
 
@@ -238,12 +239,9 @@ def test_without_the_package_nothing_is_offered(monkeypatch):
 
 def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services):
     from rigid_proto_ros.session.replay import Resimulation
-    from rigid_proto_ros.simulation.observer import Observer
 
     answer, node = services
-    entity, lines = answer._entity, []
-    told = Observer()
-    told.event = lambda _time_ns, line: lines.append(line)
+    entity, told = answer._entity, EventLines()
     node.call(lambda: node.loop.watch(told))
     wanted = entity_state((1.0, 2.0, 3.0), (0.0, 0.0, 3.0, 4.0), (0.5, 0.0, 0.0), (0.0, 0.0, 2.0))
     pose = SimpleNamespace(**vars(asked(state=wanted)) | {"set_pose": True})
@@ -258,7 +256,7 @@ def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services)
     heard = entity.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})).state
     assert heard.header.frame_id == "map" and heard.header.stamp.nanosec == 200_000_000
     assert heard.pose.position.x == pytest.approx(1.05) and heard.twist.linear.x == 0.5
-    again = Resimulation(node.loop.scenario, lines)
+    again = Resimulation(node.loop.scenario, told.lines)
     assert again.advance(200_000_000).tobytes() == node.loop.simulation.state.row.tobytes()
     broken = SimpleNamespace(**vars(asked(state=entity_state(orientation=(0.0,) * 4))) | {"set_pose": True})
     assert entity.set_entity_state(broken, response()).result.result == INVALID_POSE
