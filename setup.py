@@ -31,7 +31,7 @@ SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
 # Mass and tensor from recorded motion; zstandard comes with mcap.
-IDENTIFY = ["scipy>=1.11", "rosbags>=0.10", *MCAP]
+IDENTIFY = ["scipy>=1.11", *MCAP]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 # COLLADA files, the hull, and the union of overlapping parts.
@@ -82,7 +82,7 @@ setup(
         *((f"{SHARE}/{folder}", found) for folder in ("launch",) if (found := sorted(glob(f"{folder}/*.py")))),
     ],
     python_requires=">=3.11",
-    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", "msgspec>=0.19"],
+    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0"],
     extras_require={
         "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
         "ros": ROS,
