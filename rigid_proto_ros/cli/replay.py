@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,7 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--repair", metavar="FILE", help="write a readable file with all that is complete in a damaged session"
     )
     parser.add_argument("--at", type=float, metavar="T", help="simulated time [s], for --as-scene")
-    parser.add_argument("--as-scene", metavar="FILE.yaml", help="write the scene that begins at --at")
+    parser.add_argument(
+        "--as-scene",
+        metavar="FILE.yaml",
+        help="write the scene that begins at --at, and a script of what still acts then as FILE_script.yaml",
+    )
     parser.add_argument("--publish", choices=("states", "commands"), help="publish it over ROS")
     parser.add_argument("--speed", type=float, metavar="X", help="speed factor of --publish states (default 1)")
     add_exports(parser)
@@ -219,7 +224,12 @@ def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
     branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)
     scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")
-    print(f"  scene at {args.at:g} s: {scene}")
+    words = ["rigid_proto", "simulate", str(scene)]
+    if branch.entries:
+        script = scene.with_name(f"{scene.stem}_script.yaml")
+        script.write_text(branch.script, encoding="utf-8")
+        words += ["--script", str(script)]
+    print(f"  scene at {args.at:g} s: {shlex.join(words)}")
     for note in branch.notes:
         print(f"  {note}")
 

@@ -38,8 +38,6 @@ def session_flight(
         raise InputError(
             "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are supported"
         )
-    if setup.in_flight is not None and setup.in_flight.acts:
-        raise InputError("session", f"{name} continues a flight whose loads still act; identify that one")
     if not setup.gyroscopic:
         raise InputError(
             "session", f"{name} was simulated with gyroscopic: false, which isn't the motion of a rigid body"

@@ -69,7 +69,6 @@ def compile_flight(setup: Setup) -> None:
         gravity=np.zeros(3),
         string=StringSettings(),
         thrusters={},
-        in_flight=None,
         gyroscopic=True,
         integrator=INTEGRATORS["auto"],
     )

@@ -145,7 +145,7 @@ INTERFACES = (
     _service(
         "~/reset",
         "Trigger",
-        "time 0 and the initial state; wrench, pulses and schedule are dropped; `initial.flight` acts again",
+        "time 0 and the initial state; wrench, pulses and schedule are dropped",
     ),
     _service(
         "~/pause",

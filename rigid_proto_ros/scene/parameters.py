@@ -86,12 +86,6 @@ class InitialState:
         upper=HUGE,
         changes=AT_RESET,
     )
-    flight: str = text(
-        "",
-        "What continues from an earlier flight at time 0, bit for bit: its segment's start, loads, string, thrusters; "
-        "written by replay --as-scene and by the page's rewind, empty for none.",
-        changes=AT_RESET,
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,13 +22,10 @@ from ..motion.integrators import integrator_named
 from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
-from ..simulation.checks import check_in_flight
-from ..simulation.in_flight import InFlight
+from ..simulation.checks import check_start
 from ..simulation.setup import Setup
 from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
-from .in_flight_text import NAME as IN_FLIGHT
-from .in_flight_text import read_in_flight
 from .parameters import Parameters, convert_all, parameter_named
 from .yaml_text import yaml_value
 
@@ -157,12 +154,11 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
         integrator=ghost.integrator or parameters.integrator,
     )
     setup, _ = _setup(own, body_mesh)
-    if ghost.integrator or setup.in_flight:
+    if ghost.integrator:
         try:
-            check_in_flight(setup)
+            check_start(setup)
         except CommandRefused as refusal:
-            name = "ghost.integrator" if ghost.integrator else "ghost.inertia_model"
-            raise InputError(name, refusal.received, refusal.accepted) from None
+            raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
     return setup
 
 
@@ -219,19 +215,8 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
             )
             for name, numbers in sorted(parameters.thrusters.items())
         },
-        in_flight=_in_flight(parameters),
     )
     return setup, tuple(properties.warnings)
-
-
-def _in_flight(parameters: Parameters) -> InFlight | None:
-    flight = read_in_flight(parameters.initial.flight)
-    if flight is not None:
-        named = {*flight.thrusters, *(going.thruster for going in flight.loads if going.load is None)}
-        if unknown := named - parameters.thrusters.keys():
-            known = ", ".join(sorted(parameters.thrusters)) or "the body has none"
-            raise InputError(f"{IN_FLIGHT}, thrusters", min(unknown), f"a thruster of the body ({known})")
-    return flight
 
 
 def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: np.ndarray) -> MassProperties:

@@ -19,6 +19,11 @@ from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
 from .yaml_text import compose_yaml, read_text, scalar
 
+DROPPED: dict[str, object] = {"initial.flight": ""}
+"""Parameters of earlier versions, which recordings hold, and their defaults: a scene that names one with any other
+value is refused.
+"""
+
 
 def scene_file(name: str) -> Path:
     """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
@@ -84,6 +89,9 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
         scene.values.update(values)
         if name != "/**":
             named |= values.keys()
+    for name in DROPPED.keys() & scene.values.keys():
+        if scene.values.pop(name) != DROPPED[name]:
+            raise InputError(f"{path}, {name}", "it was a parameter of earlier versions, and has no successor")
     scene.wildcard = scene.values.keys() - named
     return scene
 

@@ -1,43 +1,62 @@
 # SPDX-License-Identifier: MIT
-"""A what-if from any moment of a session: the scene that begins there, with what was acting."""
+"""A what-if from any moment of a session: a scene that begins with the state there, and a script of what still acts.
+
+A branch is a session of its own: its time begins at 0, and its steps with it, so that it follows the session it left
+within ``accuracy``, and not to the very bits.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..messages.session_messages import PROJECTIONS
-from ..scene.in_flight_text import NAME as IN_FLIGHT
-from ..scene.in_flight_text import in_flight_text
 from ..scene.scenario import Scenario, make_scenario
+from ..scene.yaml_text import flow
+from ..simulation.commands import slot_name
+from ..simulation.flight import HELD_WRENCH, NEVER, UNNAMED_SLOT
+from ..simulation.flight_arrays import ActingLoad
+from ..simulation.simulation import Simulation
 from .recorded_session import RecordedSession
 from .replay import Resimulation, mesh_finder, session_scenario
+
+Entry = dict[str, object]
 
 
 @dataclass(frozen=True)
 class Branch:
-    """scene: parameter-file text; notes: what differs."""
+    """scene: parameter-file text; entries: of a poke script; notes: what differs."""
 
     scene: str
-    notes: list[str]
+    entries: list[Entry] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def script(self) -> str:
+        """The entries as a poke script's text, empty where nothing acts."""
+        return "".join(f"- {flow(entry)}\n" for entry in self.entries)
 
 
 def branch_at(session: RecordedSession, time_ns: int) -> Branch:
-    """The scene that goes on from the session's state at ``time_ns`` as the session does, to the bit, under the same
-    commands.
+    """The scene that begins with the session's state at ``time_ns``, to its last bit, and what still acts there, for
+    the time that is left.
 
-    Those that act at that very time or later are left out. Raises InputError where the session doesn't reach it.
+    Commands that act at that very time or later are left out. Raises InputError where the session doesn't reach it.
     """
     last_ns = max([session.end_ns, *(event_ns for event_ns, _ in session.events)])
     if not 0 <= time_ns <= last_ns:
         raise InputError("--at", time_ns / 1e9, f"a time of the session, 0 to {last_ns / 1e9:.9g} s")
     again = Resimulation(session_scenario(session), session.lines, None, mesh_finder(session), session.node_name)
     row = again.advance(time_ns)
-    if again.simulation.failure:
-        raise InputError("--at", time_ns / 1e9, f"a time before the motion failed: {again.simulation.failure}")
-    return Branch(_scene(again.scenario, row, in_flight_text(again.simulation.in_flight)).text, [])
+    simulation = again.simulation
+    if simulation.failure:
+        raise InputError("--at", time_ns / 1e9, f"a time before the motion failed: {simulation.failure}")
+    scene = _scene(again.scenario, row, _string_parameters(simulation))
+    entries = [*_load_entries(simulation), *_thruster_entries(simulation), *_string_entries(simulation)]
+    return Branch(scene.text, entries)
 
 
 def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) -> Branch:
@@ -47,14 +66,14 @@ def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) 
         raise InputError("--at", time_ns / 1e9, f"a time from the first state, {_first(session)}, on")
     k = before[np.argmax(session.times[before])]
     notes = [f"the state is the one recorded at {session.times[k] / 1e9:.9g} s; what acted then isn't recorded"]
-    return Branch(_scene(scenario, session.rows[k], "").text, notes)
+    return Branch(_scene(scenario, session.rows[k], {}).text, notes=notes)
 
 
 def _first(session: RecordedSession) -> str:
     return f"at {session.times.min() / 1e9:.9g} s" if len(session.times) else "of which there is none"
 
 
-def _scene(scenario: Scenario, row: np.ndarray, flight: str) -> Scenario:
+def _scene(scenario: Scenario, row: np.ndarray, string: dict[str, object]) -> Scenario:
     numbers = row.tolist()
     velocities = PROJECTIONS["twist"](numbers)
     values = {
@@ -63,7 +82,73 @@ def _scene(scenario: Scenario, row: np.ndarray, flight: str) -> Scenario:
         "initial.orientation_xyzw": numbers[3:7],
         "initial.linear_velocity": velocities[:3],
         "initial.angular_velocity": velocities[3:],
-        IN_FLIGHT: flight,
         "record": "",
+        **string,
     }
     return make_scenario(values, scenario.body_mesh.mesh if scenario.body_mesh else None)
+
+
+def _string_parameters(simulation: Simulation) -> dict[str, object]:
+    tied = simulation.string
+    if tied is None:
+        return {"string.attached": False, "string.attach": list(simulation.attach)}
+    return {
+        "string.attached": True,
+        "string.attach": list(tied.attach),
+        "string.target": tied.free_end(simulation.time_ns).tolist(),
+        "initial.string_mass": tied.effective_mass,
+    }
+
+
+def _string_entries(simulation: Simulation) -> Iterator[Entry]:
+    tied, now_ns = simulation.string, simulation.time_ns
+    if tied is None:
+        return
+    if tied.end_ns > now_ns:
+        # A target is reached over the time since the one before it, here since time 0: so when it would have been.
+        yield {"t": (tied.end_ns - now_ns) // 2 / 1e9, "string": {"target": tied.target.tolist()}}
+    if tied.release_ns is not None:
+        yield {"t": (tied.release_ns - now_ns) / 1e9, "string": "release"}
+
+
+def _load_entries(simulation: Simulation) -> Iterator[Entry]:
+    timeout_ns, now_ns = simulation.setup.wrench_timeout_ns, simulation.time_ns
+    for acting in simulation.acting:
+        if acting.thruster >= 0:
+            continue
+        entry: Entry = _load_entry(acting)
+        endless = acting.kind == HELD_WRENCH and not timeout_ns
+        if not endless:
+            entry["duration"] = (acting.end_ns - now_ns) / 1e9
+        if endless or acting.end_ns > now_ns:
+            yield {"t": 0.0, "wrench": entry} if _is_wrench(acting) else {"t": 0.0, **entry}
+
+
+def _is_wrench(acting: ActingLoad) -> bool:
+    return acting.kind == HELD_WRENCH or acting.slot == UNNAMED_SLOT
+
+
+def _load_entry(acting: ActingLoad) -> Entry:
+    load = acting.load
+    entry: Entry = {"at": "com" if load.mesh_point is None else {"point": list(load.mesh_point)}}
+    if load.axes == "normal":
+        entry["push"] = load.force[0]
+    else:
+        entry |= {"force": list(load.force), "torque": list(load.torque), "axes": load.axes}
+    if acting.slot > UNNAMED_SLOT:
+        entry["slot"] = slot_name(acting.slot)
+    return entry
+
+
+def _thruster_entries(simulation: Simulation) -> Iterator[Entry]:
+    """What the thrusters push with, and again without those that stop by their least on-time or the timeout."""
+    control, now_ns = simulation.thrusters, simulation.time_ns
+    pushes = control.pushes
+    if not any(push.force for push in pushes):
+        return
+    ends = [push.off_ns for push in pushes]
+    if control.times_out:
+        ends = [min(end_ns, control.last_ns + simulation.setup.wrench_timeout_ns) for end_ns in ends]
+    for time_ns in (now_ns, *sorted({end_ns for end_ns in ends if end_ns != NEVER})):
+        forces = [push.force if end_ns > time_ns else 0.0 for push, end_ns in zip(pushes, ends, strict=True)]
+        yield {"t": (time_ns - now_ns) / 1e9, "thrusters": forces}

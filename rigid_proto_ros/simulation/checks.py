@@ -65,18 +65,11 @@ def check_load_supported(command: WrenchCommand, load: Load, setup: Setup) -> No
         check_supported(setup.integrator, needs_of_load(load))
 
 
-def check_in_flight(setup: Setup) -> None:
-    """Raises CommandRefused where body or integrator can't take what acts at time 0."""
-    in_flight = setup.in_flight
-    tied = setup.string.attached or (in_flight is not None and in_flight.is_tied)
-    loads = [going.load for going in in_flight.loads if going.load is not None] if in_flight else []
-    for load in loads:
-        load.check_magnitude(setup.body)
-    if in_flight is not None and in_flight.thrusters:
-        loads += [thruster.load(1.0) for thruster in setup.thrusters.values()]
-    check_supported(setup.integrator, needs_of(setup, loads, tied))
-    going = in_flight.string.tied if in_flight is not None and in_flight.string is not None else None
-    check_rates(setup, going.attach if going is not None else setup.string.attach if tied else None)
+def check_start(setup: Setup) -> None:
+    """Raises CommandRefused where the integrator can't take the parameters, or the string that is tied at time 0."""
+    tied = setup.string.attached
+    check_supported(setup.integrator, needs_of(setup, (), tied))
+    check_rates(setup, setup.string.attach if tied else None)
 
 
 def check_rates(setup: Setup, knot: Vector | None) -> None:

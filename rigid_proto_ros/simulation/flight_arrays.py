@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -226,33 +226,6 @@ class FlightArrays:
         if tied is not None:
             self.tie(tied)
         self._begin(self._at)
-
-    def go_on(self, setup: Setup, tied: Tied | None, loads: Sequence[ActingLoad], segment: State | None) -> bool:
-        """Time 0 with loads that act already, from the initial state; or from the state at the start of a segment
-        before that, flown up to time 0: then whether the motion didn't fail. What that takes isn't counted.
-        """
-        self.start_over(setup, tied)
-        flight = self.flight
-        if len(loads) > self._held.rows:
-            self._make_tables(2 * len(loads))
-        flight.acting = len(loads)
-        for row, acting in zip(self._loads, loads, strict=False):
-            flight.load_ids += 1
-            row.at_ns, row.duration_ns, row.kind, row.slot = acting.begin_ns, -1, acting.kind, acting.slot
-            row.end_ns, row.id = acting.end_ns, flight.load_ids
-            row.load[:] = acting.load.row
-            share_of(row.load, flight.body, row.share)
-        if segment is not None:
-            flight.row[:] = flight.start[:] = segment.row
-            flight.now_ns = flight.start_ns = segment.time_ns
-        flight.segments = 0
-        self._begin(self._at)
-        if segment is None:
-            return True
-        reached = self.fly(0)
-        flight.steps_before, flight.evaluations_before = -self.steps, -self.evaluations
-        flight.work_before, flight.lost_before = -flight.work, -flight.lost
-        return reached
 
     def tie(self, tied: Tied | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""

@@ -9,13 +9,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..base.rotation import Numbers, cross, dot, length, times, transposed_times
+from ..base.rotation import Numbers, Vector, cross, dot, length, times, transposed_times
 from ..motion.loads import LoadSum
 from ..motion.state import State
 from ..motion.string import Tied
-from .flight import FLOOR_KINDS, HELD_WRENCH, NEVER
+from .flight import FLOOR_KINDS
 from .flight_arrays import ActingLoad, FlightArrays
-from .in_flight import GoingLoad, InFlight
 from .segment import Segment
 from .setup import Setup
 from .string_control import StringControl
@@ -56,20 +55,6 @@ class Readings:
     def acting(self) -> list[ActingLoad]:
         """The loads that act now: in the order in which they began."""
         return list(self._arrays.acting())
-
-    @property
-    def in_flight(self) -> InFlight:
-        """What a flight brings along that goes on from here; what is yet to act is no part of it."""
-        now_ns, setup, start = self.time_ns, self.setup, self._segment.start
-        names = list(setup.thrusters)
-        return InFlight(
-            start.time_ns - now_ns,
-            tuple(start.row.tolist()),
-            tuple(_going_load(acting, now_ns, names) for acting in self.acting),
-            self._string.going_on(setup, now_ns),
-            self.thrusters.pushes(now_ns),
-            self.thrusters.last_ns - now_ns,
-        )
 
     @property
     def _segment(self) -> Segment:
@@ -141,6 +126,11 @@ class Readings:
         return self._string.tied
 
     @property
+    def attach(self) -> Vector:
+        """Where the next target ties the string, in mesh coordinates."""
+        return self._string.attach
+
+    @property
     def hand_work(self) -> float:
         """What the hand at the string's free end has worked since start or reset [J]."""
         return self._arrays.hand_work
@@ -207,12 +197,3 @@ class Readings:
 
     def _load_sum(self) -> LoadSum:
         return LoadSum(self._arrays.sums)
-
-
-def _going_load(acting: ActingLoad, now_ns: int, thrusters: list[str]) -> GoingLoad:
-    begin_ns = acting.begin_ns - now_ns
-    if acting.thruster >= 0:
-        return GoingLoad(begin_ns, thruster=thrusters[acting.thruster])
-    held = acting.kind == HELD_WRENCH
-    end_ns = NEVER if held else acting.end_ns - now_ns
-    return GoingLoad(begin_ns, acting.load, held, acting.slot, end_ns)

@@ -22,7 +22,6 @@ from ..motion.problem import PROBLEM, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from .flight import FLIGHT
-from .in_flight import InFlight
 from .thrusters import Thruster
 
 
@@ -45,7 +44,6 @@ class Setup:
     s]. wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps.
     initial (13,): the state row at time 0. initial_string_mass [kg]: from what stiffness and damping follow of a
     string that is tied at time 0; 0 for the effective mass of the body as it is then. thrusters: by name, in its order.
-    in_flight: what of an earlier flight goes on at time 0.
     """
 
     body: Body
@@ -68,7 +66,6 @@ class Setup:
     string: StringSettings = StringSettings()
     initial_string_mass: float = 0.0
     thrusters: Mapping[str, Thruster] = field(default_factory=dict)
-    in_flight: InFlight | None = None
 
     @property
     def length(self) -> float:

@@ -9,11 +9,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from heapq import heappop, heappush
 from typing import Protocol
-
-import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.rotation import cross, times
@@ -22,7 +19,7 @@ from ..motion.integrators.integrator import MAX_SPEED, STRING
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
 from . import flight as fl
-from .checks import check_command, check_in_flight, check_load_supported, check_rates, check_thrust, load_row, needs_of
+from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (
     Change,
     ClearWrench,
@@ -39,8 +36,7 @@ from .commands import (
     slot_name,
 )
 from .event_log import EventLog, OtherEvent
-from .flight_arrays import TIMEOUTS, ActingLoad, FlightArrays
-from .in_flight import GoingLoad, InFlight, initial_row_of
+from .flight_arrays import TIMEOUTS, FlightArrays
 from .notifier import EventNotifier, snapshot
 from .observer import Applied, BodySnapshot, LoadEnded, Logged, MeshChanged, Observer, Refused, Reset
 from .readings import Readings
@@ -77,7 +73,7 @@ class Simulation(Readings):
         self._arrivals = 0
         self.listed: Listed | None = None
         self.logs_timeouts = True
-        check_in_flight(setup)
+        check_start(setup)
         self._arrays = FlightArrays(setup)
         self._start_over()
 
@@ -163,11 +159,6 @@ class Simulation(Readings):
         self.events.reset()
         before = self.setup
         self.setup = setup or self.setup
-        try:
-            check_in_flight(self.setup)
-        except CommandRefused as refusal:
-            self.refuse(refusal)
-            self.setup = replace(self.setup, in_flight=None)
         self._start_over()
         self.log("reset", {})
         if self.setup is not before:
@@ -403,32 +394,9 @@ class Simulation(Readings):
         self._string = StringControl(self.setup, self.state)
         self.thrusters = ThrusterControl(self.setup.thrusters)
         self._arrays.start_over(self.setup, self._string.tied)
-        if self.setup.in_flight is not None:
-            self._go_on(self.setup.in_flight)
         self._notifier.start_over()
         self._notifier.loads(self)
         self._notifier.string(self)
-
-    def _go_on(self, in_flight: InFlight) -> None:
-        """Time 0 of a flight that goes on: by the segment that it was in, where that leads to the initial state."""
-        setup, arrays = self.setup, self._arrays
-        self.thrusters.go_on(in_flight.thrusters, in_flight.thrusters_last_ns, setup.wrench_timeout_ns)
-        loads = [self._going_load(going) for going in in_flight.loads]
-        segment = State(in_flight.began_ns, np.array(in_flight.start))
-        leads_here = arrays.go_on(setup, self._string.tied, loads, segment)
-        if not (leads_here and initial_row_of(arrays.state).tobytes() == setup.initial.tobytes()):
-            arrays.go_on(setup, self._string.tied, loads, None)
-        self.state = arrays.state
-        if self._string.catch_up(setup, self.state):
-            arrays.tie(self._string.tied)
-            arrays.cut_segment()
-
-    def _going_load(self, going: GoingLoad) -> ActingLoad:
-        if going.load is not None:
-            end_ns = going.ends_ns(self.setup.wrench_timeout_ns)
-            return ActingLoad(going.load, going.began_ns, end_ns, 0, going.kind, going.slot)
-        number, load = self.thrusters.load(going.thruster)
-        return ActingLoad(load, going.began_ns, _UNTIL_REPLACED_NS, 0, fl.PULSE, -1 - number)
 
     def _stop_in_last_good_state(self, due: Sequence[Pending]) -> State:
         """The motion failed on the way; of these commands those that hadn't acted yet go on waiting."""

@@ -15,7 +15,6 @@ from ..motion.state import State
 from ..motion.string import Tied, tie
 from .checks import check_rates
 from .commands import MoveString, TieString
-from .in_flight import GoingString, body_hash
 from .setup import Setup
 
 
@@ -26,42 +25,9 @@ class StringControl:
         settings = setup.string
         self.attach = settings.attach
         self.tied: Tied | None = None
-        if setup.in_flight is not None and setup.in_flight.string is not None:
-            self._go_on(setup.in_flight.string, setup, state)
-        elif settings.attached:
+        if settings.attached:
             mass = setup.initial_string_mass
             self.tied = tie(settings, settings.attach, settings.target, setup.body, state, 0, mass)
-
-    def _go_on(self, string: GoingString, setup: Setup, state: State) -> None:
-        self.attach, self.tied = string.attach, string.tied
-        if self.tied is not None:
-            # Of another body, k and c would be others, too.
-            mass = self.tied.effective_mass if string.body == body_hash(setup.body) else 0.0
-            self.tied = self.tied.with_spring(string.settings_before(setup.string), setup.body, state, mass)
-
-    def going_on(self, setup: Setup, now_ns: int) -> GoingString | None:
-        """The string as a flight brings it along that goes on from now; None where the parameters tell of it."""
-        tied = self.tied
-        if tied is None and not setup.string.attached and self.attach == setup.string.attach:
-            return None
-        if tied is not None:
-            tied = replace(
-                tied,
-                begin_ns=tied.begin_ns - now_ns,
-                end_ns=tied.end_ns - now_ns,
-                last_target_ns=tied.last_target_ns - now_ns,
-                release_ns=None if tied.release_ns is None else tied.release_ns - now_ns,
-            )
-        return GoingString(setup.string, self.attach, tied, body_hash(setup.body))
-
-    def catch_up(self, setup: Setup, state: State) -> bool:
-        """At time 0, what the parameters say otherwise than the flight that goes on; whether anything."""
-        string = setup.in_flight.string if setup.in_flight else None
-        before = None if string is None else string.settings_before(setup.string)
-        if before is None or before == setup.string:
-            return False
-        self.change(replace(setup, string=before), setup, state)
-        return True
 
     def end_due(self, now_ns: int) -> bool:
         """Whether the free end arrived at this very time, or the string let go."""

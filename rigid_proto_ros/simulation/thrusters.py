@@ -73,35 +73,18 @@ class Push(NamedTuple):
 
 @dataclass
 class ThrusterControl:
-    """The thrusters of a running simulation. due_ns: when something becomes of them by itself."""
+    """The thrusters of a running simulation. due_ns: when something becomes of them by itself. pushes: what
+    each pushes with, in the order of their names.
+    """
 
     thrusters: Mapping[str, Thruster]
     due_ns: int = NEVER
     last_ns: int = 0
     times_out: bool = False
-    _pushes: list[Push] = field(default_factory=list)
+    pushes: list[Push] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.clear()
-
-    def pushes(self, now_ns: int) -> dict[str, Push]:
-        """What those at work are at, by name, times from ``now_ns`` on."""
-        return {
-            name: Push(push.force, push.on_ns - now_ns, push.off_ns if push.off_ns == NEVER else push.off_ns - now_ns)
-            for name, push in zip(self.thrusters, self._pushes, strict=True)
-            if push.force
-        }
-
-    def go_on(self, pushes: Mapping[str, Push], last_ns: int, timeout_ns: int) -> None:
-        """Be at these at time 0, the others at rest."""
-        self._pushes = [pushes.get(name, Push()) for name in self.thrusters]
-        self.last_ns = last_ns
-        self.change(timeout_ns, 0)
-
-    def load(self, name: str) -> tuple[int, Load]:
-        """The number of the thruster of this name, and what it pushes with now."""
-        number = list(self.thrusters).index(name)
-        return number, self.thrusters[name].load(self._pushes[number].force)
 
     def command(self, forces: Iterable[float], now_ns: int, timeout_ns: int) -> list[tuple[int, Load]]:
         """Push with these forces; returns what each pushes with from now on, by its number, but for those that have to
@@ -110,42 +93,42 @@ class ThrusterControl:
         self.last_ns = now_ns
         loads = []
         for number, (thruster, force) in enumerate(zip(self.thrusters.values(), forces, strict=True)):
-            force, before = thruster.within(force), self._pushes[number]
+            force, before = thruster.within(force), self.pushes[number]
             off_ns = before.on_ns + thruster.minimum_on_ns
             if before.force and not force and now_ns < off_ns:
-                self._pushes[number] = before._replace(off_ns=off_ns)
+                self.pushes[number] = before._replace(off_ns=off_ns)
                 continue
-            self._pushes[number] = Push(force, before.on_ns if before.force else now_ns)
+            self.pushes[number] = Push(force, before.on_ns if before.force else now_ns)
             loads.append((number, thruster.load(force)))
-        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self._pushes)
+        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self.pushes)
         self._find_due(timeout_ns)
         return loads
 
     def end_due(self, now_ns: int, timeout_ns: int) -> tuple[list[tuple[int, Load]], bool]:
         """What pushes otherwise from now on by itself, and whether it is that the last command has timed out."""
         loads = []
-        for number, (thruster, push) in enumerate(zip(self.thrusters.values(), self._pushes, strict=True)):
+        for number, (thruster, push) in enumerate(zip(self.thrusters.values(), self.pushes, strict=True)):
             if push.off_ns <= now_ns:
-                self._pushes[number] = Push()
+                self.pushes[number] = Push()
                 loads.append((number, thruster.load(0.0)))
         timed_out = self.times_out and now_ns >= self.last_ns + timeout_ns
         if timed_out:
-            loads += self.command([0.0] * len(self._pushes), now_ns, timeout_ns)
+            loads += self.command([0.0] * len(self.pushes), now_ns, timeout_ns)
         self._find_due(timeout_ns)
         return loads, timed_out
 
     def clear(self) -> None:
         """Nothing pushes any more, at once."""
-        self._pushes = [Push()] * len(self.thrusters)
+        self.pushes = [Push()] * len(self.thrusters)
         self.due_ns, self.times_out = NEVER, False
 
     def change(self, timeout_ns: int, now_ns: int) -> None:
         """The timeout is another one from now on."""
-        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self._pushes)
+        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self.pushes)
         self._find_due(timeout_ns)
         self.due_ns = max(self.due_ns, now_ns)
 
     def _find_due(self, timeout_ns: int) -> None:
-        self.due_ns = min((push.off_ns for push in self._pushes), default=NEVER)
+        self.due_ns = min((push.off_ns for push in self.pushes), default=NEVER)
         if self.times_out:
             self.due_ns = min(self.due_ns, self.last_ns + timeout_ns)

@@ -125,7 +125,7 @@ def constants_of(parameters: Parameters, body_mesh: BodyMesh | None) -> np.ndarr
 
 def checked_integrator(parameters: Parameters, loads: list[Load]) -> Integrator:
     """The integrator, if it supports these loads; raises NotBatchable."""
-    if parameters.initial.flight or (parameters.string.attached and parameters.initial.string_mass):
+    if parameters.string.attached and parameters.initial.string_mass:
         raise NotBatchable
     integrator = integrator_named(parameters.integrator)
     needs = set().union(*map(needs_of_load, loads))

@@ -320,10 +320,12 @@ class Flight:
 
         def branch() -> bool:
             values: dict[str, object] = {}
-            values.update(read_scene_text(branch_at(past, moment_ns).scene).values)
+            branch = branch_at(past, moment_ns)
+            values.update(read_scene_text(branch.scene).values)
             values.update(self._kept)
-            start: dict[str, object] = {name: value for name, value in before.items() if name.startswith("initial.")}
-            self._begin(make_scenario(values), "", False)
+            start: dict[str, object] = {name: before[name] for name in before if name.startswith("initial.")}
+            start |= {name: before[name] for name in ("string.attached", "string.attach", "string.target")}
+            self._begin(make_scenario(values), json.dumps(branch.entries) if branch.entries else "", False)
             self._start = self._start or start
             self.left, self._left_ns = past, moment_ns
             return True
