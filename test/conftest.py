@@ -29,7 +29,7 @@ collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 
 LONG = (
-    *("workbench_page", "time_in_flight", "readme", "poke_client", "sweep_runs", "session_crash"),
+    *("msg_examples", "workbench_page", "time_in_flight", "readme", "poke_client", "sweep_runs", "session_crash"),
     *(
         "conventions_of_the_node",
         "replay_publish",

@@ -38,12 +38,12 @@ def study_names() -> list[str]:
 
 
 def example_path(name: str) -> Path:
-    """Poke script or message ``msg_examples/<name>.yaml``. Raises InputError naming the examples there are."""
+    """Poke script ``msg_examples/<name>.yaml``. Raises InputError naming the examples there are."""
     return _named("example", name, _files(_shared("msg_examples"), ".yaml"))
 
 
 def example_names() -> list[str]:
-    """Names of the bundled examples, sorted."""
+    """Names of the bundled poke scripts, sorted."""
     return sorted(_files(_shared("msg_examples"), ".yaml"))
 
 

@@ -8,7 +8,7 @@
             flight.step(0.02)
 
 Commands are entries of a poke script without their ``t``, and the motion is the one that the node flies: a recording
-replays to the bit. docs/python.md tunes a controller over 10,000 flights.
+replays to the bit. msg_examples/06_python_flight.py tunes a controller.
 """
 
 from __future__ import annotations

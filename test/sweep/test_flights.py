@@ -1,11 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Flights from Python: commanded, stepped and recorded as scripts and the node do it, one by one and on all cores."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
@@ -13,7 +8,6 @@ from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene
 
-EXAMPLE = Path(__file__).parents[2] / "msg_examples" / "tune_controller.py"
 SCRIPT = [
     {"t": 0.0, "at": "tip", "push": 0.05, "duration": 0.2},
     {"t": 0.1, "wrench": {"torque": [0.0, 0.0, 1e-4], "duration": 0.3, "slot": "wheel"}},
@@ -61,14 +55,3 @@ def final_height(spin: float) -> float:
 def test_many_flights_come_back_in_the_order_of_their_values() -> None:
     heights = list(fly_all(final_height, [float(k) for k in range(5)], workers=2))
     assert heights == pytest.approx([k - 4.905 for k in range(5)])
-
-
-def test_the_example_tunes_a_controller() -> None:
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLE), "--side", "2", "--starts", "1"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONPATH": str(EXAMPLE.parents[1])},
-    )
-    assert "4 flights of 2 s" in done.stdout and "best: stiffness" in done.stdout

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""The numbered examples are short, run as they stand, and do what their first lines say."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from command_rig import NodeProcess, RosClient
+from ros_process import MODULES, READY_S, SOURCE, from_source
+
+from rigid_proto_ros.base.bundled import scene_path
+
+EXAMPLES = sorted((SOURCE / "msg_examples").glob("[0-9]*"))
+
+
+@pytest.fixture
+def environment(ros_environment: dict[str, str], tmp_path: Path) -> dict[str, str]:
+    """With our executables, and a stand-in for ``ros2`` where there is none, on the path."""
+    programs = {name: f"-m {module}" for name, module in MODULES.items()}
+    if shutil.which("ros2") is None:
+        programs["ros2"] = str(SOURCE / "test" / "ros2_stand_in.py")
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    for name, started in programs.items():
+        (folder / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {started} "$@"\n')
+        (folder / name).chmod(0o755)
+    return from_source({**ros_environment, "PATH": f"{folder}:{ros_environment['PATH']}"})
+
+
+def run(number: int, environment: dict[str, str], folder: Path) -> str:
+    """Run an example in a folder; its output."""
+    path = EXAMPLES[number - 1]
+    assert path.name.startswith(f"{number:02}_")
+    interpreter = "sh" if path.suffix == ".sh" else sys.executable
+    done = subprocess.run(
+        [interpreter, str(path)],
+        env=environment,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=READY_S,
+        check=False,
+    )
+    assert done.returncode == 0, (path.name, done.stdout, done.stderr)
+    return done.stdout
+
+
+def test_there_are_ten_of_5_to_40_lines() -> None:
+    assert [path.name[:2] for path in EXAMPLES] == [f"{k:02}" for k in range(1, 11)]
+    for path in EXAMPLES:
+        assert 5 <= len(path.read_text("utf-8").splitlines()) <= 40, path.name
+
+
+def test_messages_a_script_a_string_and_a_change_of_mass_reach_the_node(environment, tmp_path) -> None:
+    pytest.importorskip("rclpy")
+    node = NodeProcess(
+        environment, tmp_path / "node", {"real_time_factor": 10.0}, "--params-file", scene_path("t_handle")
+    )
+    try:
+        with RosClient(environment) as client:
+            node.wait_for("is simulating")
+            client.listen("events", "pose", "twist")
+            client.watch_diagnostics()
+
+            def kinds() -> list[str]:
+                found = [event["kind"] for event in client.events()]
+                client.forget("events")
+                return found
+
+            run(1, environment, tmp_path)
+            client.until(lambda: sum(e["kind"] == "wrench" for e in client.events()) == 6, "both held wrenches")
+            heard = kinds()
+            assert heard[0] == "reset" and heard.count("poke") == 3
+            assert "0 late, 0 refused" in run(2, environment, tmp_path)
+            assert set(kinds()) >= {"reset", "poke", "wrench"}
+            run(3, environment, tmp_path)
+            client.until(lambda: sum(e["kind"] == "string_target" for e in client.events()) == 42, "all targets")
+            kinds()
+            run(4, environment, tmp_path)
+            assert client.get("density", "ballast.tip") == {"density": 15700.0, "ballast.tip": [0.03, 0.0, 0.0, 0.07]}
+            assert int(client.diagnostics()["refused_total"]) == 0
+    finally:
+        assert node.stop() == 0, node.errors
+
+
+def test_many_simulations_from_python_find_the_gains(environment, tmp_path) -> None:
+    assert "best of 25: 0.01 N m, 0.0032 N m s" in run(6, environment, tmp_path)
+
+
+def test_a_sweep_writes_its_table_and_its_plot(environment, tmp_path) -> None:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("matplotlib")
+    assert "3000 rows" in run(7, environment, tmp_path)
+    assert (tmp_path / "out" / "box_error.svg").stat().st_size > 10_000
+
+
+def test_the_doctor_names_the_cause_and_corrects_it(environment, tmp_path) -> None:
+    said = run(8, environment, tmp_path)
+    assert "cause: axes x and y exchanged" in said
+    assert "explained -> uniform" in said
+
+
+def test_a_recording_verifies_and_is_converted_and_continued(environment, tmp_path) -> None:
+    for package in ("mcap", "pygltflib"):
+        pytest.importorskip(package)
+    assert "every command and state is reproduced bit for bit" in run(9, environment, tmp_path)
+    assert len((tmp_path / "out" / "flight.csv").read_text("utf-8").splitlines()) == 1002
+
+
+def test_a_filter_is_compared_with_the_truth(environment, tmp_path) -> None:
+    pytest.importorskip("rclpy")
+    bias = {"imu_noise.gyroscope_bias": [0.02, -0.02, 0.01], "real_time_factor": 10.0}
+    assert all(name in EXAMPLES[9].read_text("utf-8") for name in bias if "noise" in name)
+    node = NodeProcess(environment, tmp_path / "node", bias, "--params-file", scene_path("plumb_line"))
+    try:
+        node.wait_for("is simulating")
+        alone, filtered = re.findall(r"([\d.e-]+) rad", run(10, environment, tmp_path))
+        # Measured 0.77 and 0.0026 rad.
+        assert float(filtered) < 0.02 < 0.5 < float(alone)
+    finally:
+        assert node.stop() == 0, node.errors
