@@ -1,8 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Ten numbers of a mesh: measure, first and second moments at unit density, for each way to spread mass over it.
 
-All models but the last are sums over triangles about a reference point near the bounding box's centre, chosen so that
-subtracting it from a vertex never rounds. Far from the origin a mesh is therefore as exact as at the origin.
+All models but the box are sums over vertices or triangles about a reference point near the bounding box's centre,
+chosen so that subtracting it from a vertex never rounds. Far from the origin a mesh is therefore as exact as at the
+origin. With the reference point as the fourth corner, a triangle (a, b, c) spans a tetrahedron of signed volume d/6,
+where d = a · (b − a) × (c − a), and with s = a + b + c (Tonon, J. Math. Stat. 1, 2005; Eberly, "Polyhedral mass
+properties", 2002)
+
+    ∫ 1 = d/6,   ∫ x = d/24 s,   ∫ x xᵀ = d/120 (s sᵀ + a aᵀ + b bᵀ + c cᵀ).
+
+Over the triangle itself, of area A, the integrals are A, A/3 s and A/12 times the same bracket. d is taken from the
+edges, not from the corners: its rounding error then falls with the triangle's area and doesn't add up over a fine
+mesh.
+
+Sums stand in the order 1, x, y, z, xx, xy, xz, yy, yz, zz, each a pair of doubles: its value and what that lacks.
 """
 
 from __future__ import annotations
@@ -14,17 +25,25 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import MeshError
-from ..base.exact_arithmetic import pair_add, pair_divide, pair_multiply
-from .moments_solid import blocked_sums, compensated_sums
+from ..base.exact_arithmetic import pair_add, pair_divide, pair_multiply, two_sum
+from ..base.simd import Packed, filled, load, number
 
 SMALL_MESH = 1024
 """Up to this many triangles the compensated sums cost well under a millisecond, so they are always taken."""
 ROUNDING_LIMIT = 5e-14
 """Above this estimated relative rounding of the volume the compensated sums take over; typical errors are 10 times
 smaller than the estimate on meshes of more than SMALL_MESH triangles."""
+PATHS = ("auto", "blocked", "compensated")
+"""How a solid is summed up: in doubles, block by block, in pairs of doubles, or in pairs where doubles don't do."""
+_BLOCK = 256
+"""Triangles whose plain sum is added to the total without error; their corners, 18 KB, stay in the nearest cache."""
+_LANES = 8
+"""Triangles side by side in vector registers; a compiler left to choose their order would choose it by processor."""
 _UNIT_ROUNDOFF = 2.0**-53
 
-_Bounds = tuple[float, float, float, float, float, float]
+_Pair = tuple[float, float]  # the nearest double, and what it lacks
+_Pairs = tuple[_Pair, _Pair, _Pair]
+_Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -62,71 +81,35 @@ class Moments:
         return cls(measure=float(value["measure"]), path=str(value["path"]), **arrays)
 
 
-# Without NaN in mind a minimum vectorises; the sum of v·0 in the other function is what finds NaN and infinities.
-@njit(cache=True, nogil=True, fastmath={"nnan", "nsz", "reassoc"})
-def _bounds_of_finite(points: np.ndarray, first: int, last: int, bounds: _Bounds) -> _Bounds:
-    x0, y0, z0, x1, y1, z1 = bounds
-    for i in range(first, last):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
-        x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
-    return x0, y0, z0, x1, y1, z1
-
-
-@njit(cache=True, nogil=True, fastmath={"reassoc"})
-def _zero_if_finite(points: np.ndarray, first: int, last: int) -> float:
-    total = 0.0
-    for i in range(first, last):
-        total += points[i, 0] * 0.0 + points[i, 1] * 0.0 + points[i, 2] * 0.0
-    return total
-
-
 @njit(cache=True, nogil=True)
-def _bounds(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Lower and upper corner (3,) and whether all coordinates are finite; the corners mean nothing otherwise."""
-    bounds = (np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf)
-    zero = 0.0
-    for first in range(0, points.shape[0], 512):  # both passes over a part while it is in the cache
-        last = min(first + 512, points.shape[0])
-        bounds = _bounds_of_finite(points, first, last, bounds)
-        zero += _zero_if_finite(points, first, last)
-    return np.array(bounds[:3]), np.array(bounds[3:]), zero == 0.0
+def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
+    """Lower and upper corner and whether all coordinates are finite; the corners mean nothing otherwise."""
+    x0 = y0 = z0 = np.inf
+    x1 = y1 = z1 = -np.inf
+    zero = 0.0  # or NaN
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        x0, y0, z0 = x if x < x0 else x0, y if y < y0 else y0, z if z < z0 else z0
+        x1, y1, z1 = x if x > x1 else x1, y if y > y1 else y1, z if z > z1 else z1
+        zero += (x - x) + (y - y) + (z - z)
+    return (x0, y0, z0), (x1, y1, z1), zero == 0.0
 
 
-def as_arrays(vertices: np.ndarray, triangles: np.ndarray, *, check: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for what is no mesh."""
+def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh."""
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
-    if check and (int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]):
-        raise _out_of_range(vertices)
     return vertices, triangles
 
 
-def _out_of_range(vertices: np.ndarray) -> MeshError:
-    return MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
+def _check_vertex_numbers(vertices: np.ndarray, triangles: np.ndarray) -> None:
+    if int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]:
+        raise MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
 
 
-@njit(cache=True, nogil=True)
-def _reference(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """As ``exact_reference``: (reference (3,), factor, size); size 0 when the box is a point."""
-    reference = np.zeros(3)
-    size = 0.0
-    extent = 0.0
-    for k in range(3):
-        middle = 0.5 * lower[k] + 0.5 * upper[k]
-        half = 0.5 * upper[k] - 0.5 * lower[k]
-        if half <= 0.25 * abs(middle):
-            reference[k] = middle
-        extent = max(extent, half)
-        size = max(size, abs(lower[k] - reference[k]), abs(upper[k] - reference[k]))
-    if not extent > 0.0:
-        return reference, 1.0, 0.0
-    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
-
-
-def exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
+def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
     """A point near the bounding box's centre from which no vertex differs by more than a double holds exactly.
 
     Per axis: the centre c if the box's half extent is at most |c|/4, since v − c is then exact (Sterbenz), otherwise
@@ -136,131 +119,252 @@ def exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
     lower, upper, finite = _bounds(vertices)
     if not finite:
         raise MeshError("mesh", "a vertex coordinate is not finite")
-    reference, factor, size = _reference(lower, upper)
-    if size == 0.0:
+    if lower == upper:
         raise MeshError("mesh", "all vertices lie in one point")
-    return reference, factor, size
+    reference, size = np.zeros(3), 0.0
+    for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
+        middle = 0.5 * low + 0.5 * high
+        if 0.5 * high - 0.5 * low <= 0.25 * abs(middle):
+            reference[k] = middle
+        size = max(size, abs(low - reference[k]), abs(high - reference[k]))
+    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
 @njit(cache=True, nogil=True)
 def _central(
-    sums: np.ndarray,
-    low: np.ndarray,
-    factor: float,
-    measure_divisor: float,
-    first_divisor: float,
-    second_divisor: float,
-) -> np.ndarray:
-    """Measure, centroid from the reference with its low part, and second moments about it, from raw sums: (13,).
+    sums: np.ndarray, factor: float, measure_divisor: float, first_divisor: float, second_divisor: float
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Measure, centroid (3, 2) from the reference and second moments (6,) about it, from the raw sums (10, 2) of
+    (v − reference)·factor, each to be divided by its divisor; all but the measure are still in units of 1/factor.
 
-    The subtraction that cancels is done in pair arithmetic. A measure of 0 leaves the rest undefined.
+    The subtraction that cancels is done in pairs. A measure of 0 leaves the rest undefined.
     """
-    out = np.zeros(13)
-    volume, volume_low = pair_divide(sums[0], low[0], measure_divisor, 0.0)
-    if volume == 0.0:
-        return out
-    inverse = 1.0 / factor
-    cubed = inverse * inverse * inverse
-    out[0] = volume * cubed
-    first = np.empty((3, 2))
-    center = np.empty((3, 2))
+    center, first, second = np.zeros((3, 2)), np.zeros((3, 2)), np.zeros(6)
+    measure, measure_low = pair_divide(sums[0, 0], sums[0, 1], measure_divisor, 0.0)
+    if measure == 0.0:
+        return 0.0, center, second
     for k in range(3):
-        first[k, 0], first[k, 1] = pair_divide(sums[1 + k], low[1 + k], first_divisor, 0.0)
-        center[k, 0], center[k, 1] = pair_divide(first[k, 0], first[k, 1], volume, volume_low)
-        out[1 + k] = center[k, 0] * inverse
-        out[4 + k] = center[k, 1] * inverse
+        first[k] = pair_divide(sums[1 + k, 0], sums[1 + k, 1], first_divisor, 0.0)
+        center[k] = pair_divide(first[k, 0], first[k, 1], measure, measure_low)
     slot = 0
     for i in range(3):
         for j in range(i, 3):
-            raw, raw_low = pair_divide(sums[4 + slot], low[4 + slot], second_divisor, 0.0)
+            raw, raw_low = pair_divide(sums[4 + slot, 0], sums[4 + slot, 1], second_divisor, 0.0)
             moved, moved_low = pair_multiply(first[i, 0], first[i, 1], center[j, 0], center[j, 1])
-            out[7 + slot] = pair_add(raw, raw_low, -moved, -moved_low)[0] * cubed * inverse * inverse
+            second[slot] = pair_add(raw, raw_low, -moved, -moved_low)[0]
             slot += 1
-    return out
+    return measure, center / factor, second / factor / factor
 
 
-def central_moments(
+def _moments(
     sums: np.ndarray,
-    low: np.ndarray,
     reference: np.ndarray,
     factor: float,
     divisors: tuple[float, float, float],
-    path: str,
+    dimension: int,
+    path: str = "closed form",
 ) -> Moments:
-    """Moments about the centroid from raw sums of 1, x and x xᵀ, taken as (v − reference)·factor, each to be divided by
-    its divisor. Raises MeshError when the measure is zero."""
-    return _moments(_central(sums, low, factor, *divisors), reference, path)
-
-
-def _moments(out: np.ndarray, reference: np.ndarray, path: str) -> Moments:
-    if out[0] == 0.0:
-        raise MeshError("mesh", "the surface encloses no volume")
-    return Moments(float(out[0]), reference, out[1:4], out[4:7], out[7:], path)
-
-
-_DONE, _NOT_FINITE, _ONE_POINT, _NO_SUCH_VERTEX = 0, 1, 2, 3
+    """From raw sums as ``_central`` takes them; mass is spread over what has a measure of that dimension."""
+    measure, center, second = _central(sums, factor, *divisors)
+    if measure == 0.0:
+        raise MeshError("mesh", "the surface encloses no volume" if dimension == 3 else "the surface has no area")
+    unit = factor**-dimension
+    return Moments(measure * unit, reference, center[:, 0].copy(), center[:, 1].copy(), second * unit, path)
 
 
 @njit(cache=True, nogil=True)
-def _is_good(total: np.ndarray, factor: float, size: float) -> bool:
-    """Whether the blocked sums' volume is within ROUNDING_LIMIT by the estimate ε·size·Σ|edge|²/V."""
-    return _UNIT_ROUNDOFF * (size * factor) * 0.5 * total[10] <= ROUNDING_LIMIT * abs(total[0])
+def _across(lanes: Packed) -> float:
+    """The sum of eight numbers, by halves."""
+    even = (number(lanes, 0) + number(lanes, 4)) + (number(lanes, 2) + number(lanes, 6))
+    return even + ((number(lanes, 1) + number(lanes, 5)) + (number(lanes, 3) + number(lanes, 7)))
 
 
 @njit(cache=True, nogil=True)
-def _prepared(vertices: np.ndarray) -> tuple[int, np.ndarray, float, float]:
-    """(status, reference (3,), factor, size) of the vertices."""
-    lower, upper, finite = _bounds(vertices)
-    reference, factor, size = _reference(lower, upper)
-    status = _NOT_FINITE if not finite else (_ONE_POINT if size == 0.0 else _DONE)
-    return status, reference, factor, size
-
-
-@njit(cache=True, nogil=True)
-def _solid(
-    vertices: np.ndarray, triangles: np.ndarray, try_blocked: bool, only_blocked: bool
-) -> tuple[int, bool, np.ndarray, np.ndarray]:
-    """Returns (status, whether the compensated sums were taken, reference (3,), numbers (13,) as ``_central``)."""
-    status, reference, factor, size = _prepared(vertices)
-    if status != _DONE:
-        return status, False, reference, np.zeros(13)
-    if try_blocked:
-        total, low = blocked_sums(vertices, triangles, reference, factor)
-        if total[10] < 0.0:
-            return _NO_SUCH_VERTEX, False, reference, np.zeros(13)
-        if only_blocked or _is_good(total, factor, size):
-            return _DONE, False, reference, _central(total, low, factor, 6.0, 24.0, 120.0)
-    return _compensated(vertices, triangles, reference, factor)
-
-
-@njit(cache=True, nogil=True)
-def _compensated(
+def _blocked_sums(
     vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
-) -> tuple[int, bool, np.ndarray, np.ndarray]:
-    sums, low, there = compensated_sums(vertices, triangles, reference, factor)
-    if not there:
-        return _NO_SUCH_VERTEX, True, reference, np.zeros(13)
-    return _DONE, True, reference, _central(sums, low, factor, 6.0, 24.0, 120.0)
+) -> tuple[np.ndarray, float, bool]:
+    """The solid's ten sums (10, 2) in plain doubles, block by block; blocks are combined without error.
+
+    Also Σ(|b − a|² + |c − a|²), which measures how much d can round, and whether every vertex named is there.
+    """
+    known = np.uint64(vertices.shape[0])
+    rx, ry, rz = reference[0], reference[1], reference[2]
+    sums = np.zeros((10, 2))
+    edges = 0.0
+    corners = np.zeros((9, _BLOCK))  # a, b and c of triangles side by side
+    zero = filled(0.0, _LANES)
+    for start in range(0, triangles.shape[0], _BLOCK):
+        v0, vx, vy, vz, size = zero, zero, zero, zero, zero
+        xx, xy, xz, yy, yz, zz = zero, zero, zero, zero, zero, zero
+        count = min(_BLOCK, triangles.shape[0] - start)
+        for t in range(count):
+            for corner in range(3):
+                i = triangles[start + t, corner]
+                if np.uint64(i) >= known:  # negative numbers wrap to large ones
+                    return sums, edges, False
+                for k in range(3):
+                    corners[3 * corner + k, t] = vertices[i, k]
+        whole = -(-count // _LANES) * _LANES
+        corners[3:6, count:whole] = corners[:3, count:whole]  # triangles without an extent
+        corners[6:, count:whole] = corners[:3, count:whole]
+        for t in range(0, whole, _LANES):
+            ax = (load(corners, t, zero) - rx) * factor
+            ay = (load(corners, _BLOCK + t, zero) - ry) * factor
+            az = (load(corners, 2 * _BLOCK + t, zero) - rz) * factor
+            bx = (load(corners, 3 * _BLOCK + t, zero) - rx) * factor
+            by = (load(corners, 4 * _BLOCK + t, zero) - ry) * factor
+            bz = (load(corners, 5 * _BLOCK + t, zero) - rz) * factor
+            cx = (load(corners, 6 * _BLOCK + t, zero) - rx) * factor
+            cy = (load(corners, 7 * _BLOCK + t, zero) - ry) * factor
+            cz = (load(corners, 8 * _BLOCK + t, zero) - rz) * factor
+            ux, uy, uz = bx - ax, by - ay, bz - az
+            wx, wy, wz = cx - ax, cy - ay, cz - az
+            d = ax * (uy * wz - uz * wy) + ay * (uz * wx - ux * wz) + az * (ux * wy - uy * wx)
+            sx, sy, sz = ax + bx + cx, ay + by + cy, az + bz + cz
+            v0 = v0 + d
+            vx = vx + d * sx
+            vy = vy + d * sy
+            vz = vz + d * sz
+            xx = xx + d * (sx * sx + ax * ax + bx * bx + cx * cx)
+            xy = xy + d * (sx * sy + ax * ay + bx * by + cx * cy)
+            xz = xz + d * (sx * sz + ax * az + bx * bz + cx * cz)
+            yy = yy + d * (sy * sy + ay * ay + by * by + cy * cy)
+            yz = yz + d * (sy * sz + ay * az + by * bz + cy * cz)
+            zz = zz + d * (sz * sz + az * az + bz * bz + cz * cz)
+            size = size + (ux * ux + uy * uy + uz * uz + wx * wx + wy * wy + wz * wz)
+        block = (v0, vx, vy, vz, xx, xy, xz, yy, yz, zz)
+        for k in range(10):
+            sums[k, 0], error = two_sum(sums[k, 0], _across(block[k]))
+            sums[k, 1] += error
+        edges += _across(size)
+    return sums, edges, True
+
+
+@njit(cache=True, nogil=True)
+def _plus(p: _Pair, q: _Pair) -> _Pair:
+    return pair_add(p[0], p[1], q[0], q[1])
+
+
+@njit(cache=True, nogil=True)
+def _times(p: _Pair, q: _Pair) -> _Pair:
+    return pair_multiply(p[0], p[1], q[0], q[1])
+
+
+@njit(cache=True, nogil=True)
+def _minor(p: _Pair, q: _Pair, r: _Pair, s: _Pair) -> _Pair:
+    """p q − r s."""
+    moved, moved_low = _times(r, s)
+    return _plus(_times(p, q), (-moved, -moved_low))
+
+
+@njit(cache=True, nogil=True)
+def _point(points: np.ndarray, i: int) -> _Point:
+    return points[i, 0], points[i, 1], points[i, 2]
+
+
+@njit(cache=True, nogil=True)
+def _sum(a: _Point, b: _Point, sign: float) -> _Pairs:
+    """a + sign·b, exactly."""
+    return two_sum(a[0], sign * b[0]), two_sum(a[1], sign * b[1]), two_sum(a[2], sign * b[2])
+
+
+@njit(cache=True, nogil=True)
+def _compensated_sums(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that a double's products round too
+    much; ``points`` (n, 3) are vertices less the reference, exactly."""
+    sums = np.zeros((10, 2))
+    for t in range(triangles.shape[0]):
+        a, b, c = _point(points, triangles[t, 0]), _point(points, triangles[t, 1]), _point(points, triangles[t, 2])
+        u, w = _sum(b, a, -1.0), _sum(c, a, -1.0)
+        d = _times(_minor(u[1], w[2], u[2], w[1]), (a[0], 0.0))
+        d = _plus(d, _times(_minor(u[2], w[0], u[0], w[2]), (a[1], 0.0)))
+        d = _plus(d, _times(_minor(u[0], w[1], u[1], w[0]), (a[2], 0.0)))
+        p, q, r = _sum(a, b, 1.0), _sum(b, c, 1.0), _sum(c, a, 1.0)
+        sums[0] = _plus((sums[0, 0], sums[0, 1]), d)
+        slot = 4
+        for i in range(3):
+            moved = _times(d, _plus(p[i], (c[i], 0.0)))
+            sums[1 + i] = _plus((sums[1 + i, 0], sums[1 + i, 1]), moved)
+            for j in range(i, 3):
+                # s sᵀ + a aᵀ + b bᵀ + c cᵀ as (a + b)(a + b)ᵀ + (b + c)(b + c)ᵀ + (c + a)(c + a)ᵀ.
+                bracket = _plus(_plus(_times(p[i], p[j]), _times(q[i], q[j])), _times(r[i], r[j]))
+                sums[slot] = _plus((sums[slot, 0], sums[slot, 1]), _times(d, bracket))
+                slot += 1
+    return sums
 
 
 def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
     """Moments of the solid that ``triangles`` (m, 3) over ``vertices`` (n, 3) bound, exact to about 1e-14.
 
     Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles;
-    where the estimated rounding ε·size·Σ|edge|²/V is too large (thin bodies, few triangles) a second path in pair
-    arithmetic takes over. ``path`` "blocked" or "compensated" asks for one of them. Source: ``moments_solid``.
-    Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or zero volume.
+    where the estimated rounding ε·size·Σ|edge|²/V is too large (thin bodies, few triangles) one in pairs takes over.
+    ``path``: one of PATHS. Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or zero
+    volume.
     """
-    vertices, triangles = as_arrays(vertices, triangles, check=False)
-    try_blocked = path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH)
-    status, compensated, reference, numbers = _solid(vertices, triangles, try_blocked, path == "blocked")
-    if status == _NOT_FINITE:
-        raise MeshError("mesh", "a vertex coordinate is not finite")
-    if status == _ONE_POINT:
-        raise MeshError("mesh", "all vertices lie in one point")
-    if status == _NO_SUCH_VERTEX:
-        raise _out_of_range(vertices)
-    return _moments(numbers, reference, "compensated" if compensated else "blocked")
+    vertices, triangles = _surface(vertices, triangles)
+    reference, factor, size = _exact_reference(vertices)
+    if path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH):
+        sums, edges, all_there = _blocked_sums(vertices, triangles, reference, factor)
+        if not all_there:
+            _check_vertex_numbers(vertices, triangles)
+        rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
+        if path == "blocked" or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]):
+            return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3, "blocked")
+    _check_vertex_numbers(vertices, triangles)
+    sums = _compensated_sums((vertices - reference) * factor, triangles)
+    return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3, "compensated")
+
+
+@njit(cache=True, nogil=True)
+def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
+    """The triangle's normal, twice its area long."""
+    a, b, c = _point(points, triangle[0]), _point(points, triangle[1]), _point(points, triangle[2])
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+
+
+@njit(cache=True, nogil=True)
+def _shell_sums(points: np.ndarray, triangles: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Ten sums (10, 2) over polygons, of which the triangles from one number in ``starts`` to the next are the fans."""
+    sums = np.zeros((10, 2))
+    for polygon in range(starts.shape[0] - 1):
+        mx = my = mz = 0.0  # twice the Newell normal: the fan triangles' normals add up to it
+        for t in range(starts[polygon], starts[polygon + 1]):
+            nx, ny, nz = _normal(points, triangles[t])
+            mx, my, mz = mx + nx, my + ny, mz + nz
+        for t in range(starts[polygon], starts[polygon + 1]):
+            nx, ny, nz = _normal(points, triangles[t])
+            area = 0.5 * math.sqrt(nx * nx + ny * ny + nz * nz)
+            if mx * nx + my * ny + mz * nz < 0.0:
+                area = -area
+            a, b, c = _point(points, triangles[t, 0]), _point(points, triangles[t, 1]), _point(points, triangles[t, 2])
+            s = (a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2])
+            sums[0] = pair_add(sums[0, 0], sums[0, 1], area, 0.0)
+            slot = 4
+            for i in range(3):
+                sums[1 + i] = pair_add(sums[1 + i, 0], sums[1 + i, 1], area * s[i], 0.0)
+                for j in range(i, 3):
+                    bracket = s[i] * s[j] + a[i] * a[j] + b[i] * b[j] + c[i] * c[j]
+                    sums[slot] = pair_add(sums[slot, 0], sums[slot, 1], area * bracket, 0.0)
+                    slot += 1
+    return sums
+
+
+def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None) -> Moments:
+    """Moments of the surface as a thin shell of uniform thickness; the measure is its area.
+
+    vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles make up a polygon, None that
+    each triangle is one. A fan triangle of a concave polygon that lies outside it counts negative: its sign is that of
+    its normal against the polygon's Newell normal. Raises MeshError for an empty mesh, non-finite vertices, or zero
+    area.
+    """
+    vertices, triangles = _surface(vertices, triangles)
+    _check_vertex_numbers(vertices, triangles)
+    reference, factor, _ = _exact_reference(vertices)
+    starts = np.arange(len(triangles) + 1) if polygon_starts is None else np.asarray(polygon_starts, np.int64)
+    sums = _shell_sums((vertices - reference) * factor, triangles, starts)
+    return _moments(sums, reference, factor, (1.0, 3.0, 12.0), 2)
 
 
 def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -271,53 +375,41 @@ def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarr
 
 
 @njit(cache=True, nogil=True)
-def _point_sums(points: np.ndarray, reference: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
-    total = np.zeros(10)
-    low = np.zeros(10)
-    for i in range(points.shape[0]):
-        x = (
-            (points[i, 0] - reference[0]) * factor,
-            (points[i, 1] - reference[1]) * factor,
-            (points[i, 2] - reference[2]) * factor,
-        )
-        total[0] += 1.0
+def _point_sums(points: np.ndarray) -> np.ndarray:
+    sums = np.zeros((10, 2))
+    sums[0, 0] = points.shape[0]
+    for t in range(points.shape[0]):
+        x = _point(points, t)
         slot = 4
-        for row in range(3):
-            total[1 + row], low[1 + row] = pair_add(total[1 + row], low[1 + row], x[row], 0.0)
-            for column in range(row, 3):
-                total[slot], low[slot] = pair_add(total[slot], low[slot], x[row] * x[column], 0.0)
+        for i in range(3):
+            sums[1 + i] = pair_add(sums[1 + i, 0], sums[1 + i, 1], x[i], 0.0)
+            for j in range(i, 3):
+                sums[slot] = pair_add(sums[slot, 0], sums[slot, 1], x[i] * x[j], 0.0)
                 slot += 1
-    return total, low
+    return sums
 
 
 def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
-    vertices, triangles = as_arrays(vertices, triangles)
+    vertices, triangles = _surface(vertices, triangles)
+    _check_vertex_numbers(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
-    reference, factor, _ = exact_reference(points)
-    sums, low = _point_sums(points, reference, factor)
-    moments = central_moments(sums, low, reference, factor, (1.0, 1.0, 1.0), "closed form")
-    return Moments(
-        float(points.shape[0]),
-        reference,
-        moments.center,
-        moments.center_low,
-        moments.second * (factor * factor * factor),
-        "closed form",
-    )
+    reference, factor, _ = _exact_reference(points)
+    return _moments(_point_sums((points - reference) * factor), reference, factor, (1.0, 1.0, 1.0), 0)
 
 
 def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
-    vertices, triangles = as_arrays(vertices, triangles)
+    vertices, triangles = _surface(vertices, triangles)
+    _check_vertex_numbers(vertices, triangles)
     lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))
     if not finite:
         raise MeshError("mesh", "a vertex coordinate is not finite")
-    side = upper - lower
+    low, high = np.array(lower), np.array(upper)
+    side = high - low
     volume = float(side[0] * side[1] * side[2])
-    middle = 0.5 * lower + 0.5 * upper
     second = np.zeros(6)
     # A flat box has no volume but a distribution all the same: a unit measure then stands for its mass.
     measure = volume if volume > 0.0 else 1.0
     second[[0, 3, 5]] = measure * (side * side) / 12.0
-    return Moments(measure, middle, np.zeros(3), np.zeros(3), second, "closed form")
+    return Moments(measure, 0.5 * low + 0.5 * high, np.zeros(3), np.zeros(3), second, "closed form")

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import InputError, MeshError, TensorError
 from .closed_form import given_mass, is_plainly_good, spread_mass
-from .moments import Moments, box_moments, point_moments, solid_moments
-from .moments_shell import shell_moments
+from .moments import Moments, box_moments, point_moments, shell_moments, solid_moments
 from .tensor import check_tensor, tensor_from_six
 
 INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")

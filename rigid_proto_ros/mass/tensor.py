@@ -10,7 +10,6 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import TensorError
-from .slender_axes import SLENDER, slender_axes
 
 TRIANGLE_SLACK_GIVEN = 1e-5
 """Given tensors may miss A + B ≥ C by this much of C: published ones are rounded to five or six digits."""
@@ -77,8 +76,9 @@ def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Cyclic Jacobi rotations until every off-diagonal is below rounding of its own two diagonals: for a well-scaled
     positive definite tensor each moment then has high relative accuracy (Demmel and Veselić, SIAM J. Matrix Anal.
-    Appl. 13, 1992), the smallest one too. Of a slender body in axes other than its own that isn't enough
-    (mass/slender_axes.py). The axes form a proper rotation: the largest component of the first and second column is
+    Appl. 13, 1992), the smallest one too. The tensor of a slender body in axes other than its own holds the smallest
+    moment, and the difference of the others, to ε times the largest alone: flights say so where it matters
+    (simulation/flight.py). The axes form a proper rotation: the largest component of the first and second column is
     positive, the third completes the right hand.
     """
     a = inertia.copy()
@@ -90,11 +90,6 @@ def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                 turned = _rotate(a, v, p, q) or turned
         if not turned:
             break
-    largest, smallest = max(a[0, 0], a[1, 1], a[2, 2]), min(a[0, 0], a[1, 1], a[2, 2])
-    if largest > SLENDER * smallest and math.isfinite(largest) and largest > 0.0:
-        diagonal, v = slender_axes(inertia)
-        for k in range(3):
-            a[k, k] = diagonal[k]
     order = np.array([0, 1, 2])
     for p in range(2):  # three numbers: a selection sort
         for q in range(p + 1, 3):

@@ -50,16 +50,15 @@ def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tm
 
 SUMS = """
 import numpy as np
-from package.mass.moments_solid import _accumulate as kernel
-sums = [np.zeros(11) for _ in range(2)]
-kernel(*sums, 1, 0.0)
-print(sums[0][1], sum(kernel.stats.cache_hits.values()))
+from package.mass.moments import _sum as kernel
+zero = (0.0, 0.0, 0.0)
+print(kernel(zero, zero, 1.0)[0][0], sum(kernel.stats.cache_hits.values()))
 """
 
 
 def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_has_changed(tmp_path):
     base, mass = tmp_path / "package" / "base", tmp_path / "package" / "mass"
-    for folder, names in ((base, ("compilation", "exact_arithmetic", "simd")), (mass, ("moments_solid",))):
+    for folder, names in ((base, ("compilation", "errors", "exact_arithmetic", "simd")), (mass, ("moments",))):
         folder.mkdir(parents=True)
         for name in names:
             shutil.copy(PACKAGE / folder.name / f"{name}.py", folder)

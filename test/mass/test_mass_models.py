@@ -6,8 +6,7 @@ import pytest
 from mass_solids import box, circle, moved, prism, sphere
 
 from rigid_proto_ros.base.errors import InputError, MeshError, TensorError
-from rigid_proto_ros.mass.moments import Moments, point_moments, solid_moments
-from rigid_proto_ros.mass.moments_shell import shell_moments
+from rigid_proto_ros.mass.moments import Moments, point_moments, shell_moments, solid_moments
 from rigid_proto_ros.mass.properties import INERTIA_MODELS, MeshMoments, explicit_mass_properties
 
 COMPUTED = ("solid", "shell", "points", "bounding_box")
