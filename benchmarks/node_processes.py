@@ -100,7 +100,9 @@ class Process:
 def node(*parameters: str, wait_s: float = 1.0) -> Process:
     """Our node on the T-handle with ``name:=value`` parameters, running."""
     arguments = [word for parameter in parameters for word in ("-p", parameter)]
-    process = Process("-m", "rigid_proto_ros.ros.main", "--ros-args", "-p", "mesh:=t_handle", *arguments)
+    process = Process(
+        "-m", "rigid_proto_ros.cli.executables", "rigid_body_node", "--ros-args", "-p", "mesh:=t_handle", *arguments
+    )
     try:
         process.wait_until_flying()
     except RuntimeError:

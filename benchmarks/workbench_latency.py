@@ -186,7 +186,9 @@ def main() -> None:
         FOLDER / "results" / "workbench_latency.csv",
         ("event", "events", "p50_ms", "p95_ms", "max_ms", "frames_per_s", "load"),
     )
-    with Process("-m", "rigid_proto_ros.ros.main", "--ros-args", "-p", "mesh:=teapot") as node:
+    with Process(
+        "-m", "rigid_proto_ros.cli.executables", "rigid_body_node", "--ros-args", "-p", "mesh:=teapot"
+    ) as node:
         node.wait_until_flying()
         frames = measure(lambda found: tell_latencies(found, table))
     for name, (rate, how) in frames.items():

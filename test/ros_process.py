@@ -16,12 +16,6 @@ from pathlib import Path
 from rigid_proto_ros.base.child_processes import end_with_this_thread
 
 SOURCE = Path(__file__).resolve().parent.parent
-MODULES = {
-    "rigid_body_node": "rigid_proto_ros.ros.main",
-    "often_reporting_node": "often_reporting_node",
-    "poke_client": "rigid_proto_ros.ros.poke_client",
-    "rigid_proto": "rigid_proto_ros.cli.main",
-}
 READY_S = 180.0
 """Longer than a first start with all kernels to compile on a loaded machine; every wait's end."""
 
@@ -35,7 +29,8 @@ LOOPBACK = (
 
 def command(name: str, *arguments: object) -> list[str]:
     """How to start one of the package's executables with this interpreter."""
-    return [sys.executable, "-m", MODULES[name], *map(str, arguments)]
+    module = ["often_reporting_node"] if name == "often_reporting_node" else ["rigid_proto_ros.cli.executables", name]
+    return [sys.executable, "-m", *module, *map(str, arguments)]
 
 
 def from_source(environment: dict[str, str]) -> dict[str, str]:

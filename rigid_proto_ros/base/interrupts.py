@@ -1,40 +1,113 @@
 # SPDX-License-Identifier: MIT
-"""SIGINT and SIGTERM end a command at any moment, quietly, with 128 + their number; a second one changes nothing."""
+"""SIGINT and SIGTERM end a command at any moment, quietly, with 128 + their number; a second one changes nothing.
+
+A signal that comes before Python has run our first line ends the interpreter as Python does: with a traceback.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
+import weakref
+from collections.abc import Callable
+from typing import Any
 
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
-_received = signal.SIGINT
+AGAIN_S = 0.5
+"""How soon an interrupt is raised anew where a library's code has swallowed it [s]."""
+
+_received = 0
 
 
-def end_at_once() -> None:
-    """From now on a signal ends the process right away: for as long as there is nothing to close, as while modules are
-    imported, and when all is closed.
+class Interrupted(KeyboardInterrupt):
+    """What the first signal raises.
+
+    A class of its own: where KeyboardInterrupt itself leaves a text that is executed, as when a dataclass is made,
+    `python -m` takes it for unhandled, and ends by SIGINT whatever becomes of it (CPython 3.11 to 3.14).
     """
+
+
+def end_at_once(status: int | None = None) -> None:
+    """From now on a signal ends the process right away, with this status: for as long as there is nothing to close, as
+    while modules are imported.
+    """
+    _stop_raising()
     for number in NUMBERS:
-        signal.signal(number, lambda got, _: os._exit(128 + got))
+        signal.signal(number, lambda got, _: os._exit(128 + got if status is None else status))
 
 
-def interrupt_once() -> None:
-    """From now on the first signal raises KeyboardInterrupt in the main thread, and those that follow change nothing,
-    so that what is being closed is closed.
+def run(work: Callable[[], int], tell: Callable[[Exception], int]) -> int:
+    """What ``work`` returns, or ``tell`` of what it raises. The first signal raises KeyboardInterrupt in it, and
+    128 + the signal's number is returned; those that follow change nothing, so that what is being closed is closed.
     """
+    try:
+        _interrupt_once()
+        try:
+            status = work()
+        except Exception as error:
+            if _received:
+                # A library that is imported, or has files open, takes an interrupt for an error of its own.
+                raise KeyboardInterrupt from error
+            status = tell(error)
+        done()  # in here: a signal that comes now is handled, too
+        return status
+    except KeyboardInterrupt:
+        done()
+        return 128 + _received
+
+
+def _interrupt_once() -> None:
+    unraisable = sys.unraisablehook
+
+    def quiet(ignored: Any) -> None:
+        """Where no exception can leave, as from a finalizer, Python prints it and goes on."""
+        if not isinstance(ignored.exc_value, Interrupted):
+            unraisable(ignored)
 
     def interrupt(got: int, _: object) -> None:
         global _received
-        for number in NUMBERS:
-            signal.signal(number, signal.SIG_IGN)
-        _received = signal.Signals(got)
-        raise KeyboardInterrupt
+        _ignore()
+        _received = got
+        sys.unraisablehook = quiet
+        _raise()
 
     for number in NUMBERS:
         signal.signal(number, interrupt)
 
 
-def status() -> int:
-    """The exit status of a command that a KeyboardInterrupt has ended."""
-    return 128 + _received
+def _raise() -> None:
+    """Raise Interrupted, and again for as long as nobody handles it: only who handles an exception keeps it."""
+    error = Interrupted()
+    handled = weakref.ref(error)
+
+    def look(*_: object) -> None:
+        if handled() is None:
+            _raise()
+
+    signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+    try:
+        raise error
+    finally:
+        del error  # the traceback holds this frame, which would hold the exception
+
+
+def done() -> None:
+    """From now on no signal changes anything: the exit status is decided, and the interpreter ends.
+
+    Python itself forgets its handlers before it ends, and would be killed by the signal then.
+    """
+    _stop_raising()
+    _ignore()
+
+
+def _ignore() -> None:
+    for number in NUMBERS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _stop_raising() -> None:
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)

@@ -2,7 +2,8 @@
 """What the installed executables start: where a package is missing that each of them needs, one line says what to
 install.
 
-Nothing of ours but this is imported before that is known.
+Nothing of ours but this is imported before that is known, and before a signal ends the process quietly.
+`python -m rigid_proto_ros.cli.executables PROGRAM ...` starts them, too.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ def rigid_proto() -> int:
 
 
 def rigid_body_node() -> int:
-    """The node."""
-    return _start("rigid_body_node", "ros.main", needs_ros=True)
+    """The node, which ends when it is asked to: launch reports any other status than 0 as a death."""
+    return _start("rigid_body_node", "ros.main", needs_ros=True, interrupted=0)
 
 
 def poke_client() -> int:
@@ -32,14 +33,17 @@ def poke_client() -> int:
     return _start("poke_client", "ros.poke_client", needs_ros=True)
 
 
-def _start(program: str, module: str, needs_ros: bool = False) -> int:
-    interrupts.end_at_once()
+def _start(program: str, module: str, needs_ros: bool = False, interrupted: int | None = None) -> int:
+    """Import and run a program. interrupted: its exit status after a signal; None: 128 + the signal's number."""
+    interrupts.end_at_once(interrupted)
     remedy = _remedy(needs_ros)
     if remedy:
         print(f"{program}: {remedy}", file=sys.stderr)
         return 2
     package = __package__.rpartition(".")[0]
-    return importlib.import_module(f"{package}.{module}").main()
+    status = importlib.import_module(f"{package}.{module}").main()
+    interrupts.done()
+    return status
 
 
 def _remedy(needs_ros: bool) -> str:
@@ -56,3 +60,8 @@ def _remedy(needs_ros: bool) -> str:
             "/opt/ros/jazzy/setup.bash, or without one: pip install 'rigid_proto_ros[ros]'"
         )
     return ""
+
+
+if __name__ == "__main__":
+    PROGRAMS = {program.__name__: program for program in (rigid_proto, rigid_body_node, poke_client)}
+    sys.exit(PROGRAMS[sys.argv.pop(1)]())

@@ -2,7 +2,7 @@
 """``rigid_proto``: one console command; each of its commands is a module of this folder.
 
 Exit status: 0 done, 1 a check failed, 2 the input was refused (one line on stderr), 130 ended by Ctrl-C (143 by
-SIGTERM); what stays until Ctrl-C ends by it with 0.
+SIGTERM).
 """
 
 from __future__ import annotations
@@ -32,9 +32,6 @@ COMMANDS = {
     "workbench": "a body and its interactive page, until Ctrl-C; needs no ROS",
 }
 
-UNTIL_INTERRUPTED = ("up", "workbench")
-"""Commands that stay until Ctrl-C: ended by it, they are done."""
-
 EXAMPLES = (
     ("rigid_proto inspect hammer", "mass, COM and inertia of a bundled mesh"),
     ("rigid_proto simulate t_handle --record out/flight.rrd", "simulate a bundled scene, recorded for Rerun"),
@@ -47,7 +44,6 @@ def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
     own_process = argv is None
     if own_process:
-        interrupts.end_at_once()
         gc.disable()  # what is imported stays: looking through it for garbage takes a tenth of a command's start
     argv = sys.argv[1:] if argv is None else argv
     parser = Parser(
@@ -72,26 +68,23 @@ def main(argv: list[str] | None = None) -> int:
             _without_unused_libraries()
         gc.freeze()
         gc.enable()
+        return interrupts.run(lambda: args.run(args), lambda error: _tell(args.command, error))
     try:
-        if own_process:
-            interrupts.interrupt_once()
-        status = args.run(args)
-        if own_process:
-            interrupts.end_at_once()
-        return status
-    except InputError as error:
-        print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        # Asked to end, and ended: files are closed, children are gone.
-        return 0 if args.command in UNTIL_INTERRUPTED else interrupts.status()
-    except BrokenPipeError:
+        return args.run(args)
+    except Exception as error:
+        return _tell(args.command, error)
+
+
+def _tell(command: str, error: Exception) -> int:
+    """One line on stderr of what was refused, and the exit status; anything else is raised again."""
+    if isinstance(error, BrokenPipeError):
         # The reader of our output went away, as `| head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:
-        print(f"rigid_proto {args.command}: {_one_line(error)}", file=sys.stderr)
+    if isinstance(error, InputError | OSError):
+        print(f"rigid_proto {command}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    raise error
 
 
 def _without_unused_libraries() -> None:
@@ -116,11 +109,3 @@ def _without_unused_libraries() -> None:
         extensions.init_all()
     finally:
         extensions.importlib_metadata = metadata
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
-
-
-if __name__ == "__main__":
-    sys.exit(main())

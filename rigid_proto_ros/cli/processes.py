@@ -5,20 +5,14 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import signal
 import subprocess
 import sys
-from typing import Any
 
 from ..base.child_processes import end_with_this_thread, with_this_package
 from ..base.errors import InputError, is_missing
 
-_MODULES = {
-    "rigid_body_node": "rigid_proto_ros.ros.main",
-    "poke_client": "rigid_proto_ros.ros.poke_client",
-}
 GRACE_S = 5.0
-"""A process that doesn't end within this time of SIGINT is killed."""
+"""A process that doesn't end within this time of SIGTERM is killed."""
 
 
 def check_rclpy(field: str) -> None:
@@ -33,7 +27,7 @@ def own_executable(name: str) -> list[str]:
     InputError where they lack ROS.
     """
     check_rclpy(name)
-    return [sys.executable, "-m", _MODULES[name]]
+    return [sys.executable, "-m", "rigid_proto_ros.cli.executables", name]
 
 
 def text_parameter(name: str, text: str) -> list[str]:
@@ -46,16 +40,13 @@ class Processes:
 
     def __init__(self) -> None:
         self._running: list[subprocess.Popen] = []
-        self._handler: Any = None
 
     def __enter__(self) -> Processes:
-        self._handler = signal.signal(signal.SIGTERM, signal.default_int_handler)
         return self
 
     def __exit__(self, *_: object) -> None:
         for process in reversed(self._running):
             self.end(process)
-        signal.signal(signal.SIGTERM, self._handler)
 
     def start(self, command: list[str]) -> subprocess.Popen:
         """Start a process in a session of its own: a Ctrl-C at the terminal reaches this command alone,
@@ -68,11 +59,13 @@ class Processes:
         return process
 
     def end(self, process: subprocess.Popen) -> int:
-        """SIGINT, then after a while SIGKILL; returns the status."""
+        """SIGTERM, of which Python dies quietly where it has no handler yet, then after a while SIGKILL; returns the
+        status.
+        """
         if process in self._running:
             self._running.remove(process)
         if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
             try:
                 process.wait(GRACE_S)
             except subprocess.TimeoutExpired:

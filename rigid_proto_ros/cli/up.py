@@ -50,4 +50,4 @@ def run(args: argparse.Namespace) -> int:
     from ..ros.main import main
 
     ros_arguments = ["--ros-args", "--params-file", str(scene_file(args.scene)), "-p", f"viewer:={viewer}", *overrides]
-    return main(["rigid_body_node", *ros_arguments])
+    return main(["rigid_body_node", *ros_arguments], as_job=True)

@@ -43,5 +43,5 @@ def run(args: argparse.Namespace) -> int:
         port = scenario.parameters.workbench_port
     name = "" if args.mesh else scene
     with Shutdown() as shutdown:
-        serve(scenario, name, port, args.host or LOOPBACK, not args.no_browser, shutdown.wait)
-    return 0
+        number = serve(scenario, name, port, args.host or LOOPBACK, not args.no_browser, shutdown.wait)
+    return 128 + number

@@ -52,9 +52,9 @@ class Shutdown:
         """Whether the shutdown was requested."""
         return bool(select.select([self._waited], [], [], 0.0)[0])
 
-    def wait(self) -> None:
-        """Return when the shutdown was requested."""
-        select.select([self._waited], [], [])
+    def wait(self) -> int:
+        """Return when the shutdown was requested: the number of the signal that did it, or 0."""
+        return self._waited.recv(1, socket.MSG_PEEK)[0]
 
 
 def begin_closing() -> None:

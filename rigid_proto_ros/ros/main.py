@@ -21,20 +21,22 @@ LAST_START_S = 0.2
 """How long a start that is nearly done is waited for at the end; one that compiles is left alone."""
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run the node; returns 2 when the input was refused (one line on stderr), else ends the process: with 0 after a
-    signal.
+def main(argv: list[str] | None = None, as_job: bool = False) -> int:
+    """Run the node; returns 2 when the input was refused (one line on stderr), else ends the process: after a signal
+    with 0, since launch reports any other status as a death, or as a job's with 128 + its number.
     """
     try:
         with Shutdown() as shutdown:
             start = _Start(sys.argv if argv is None else argv, shutdown)
             start.start()
-            shutdown.wait()
+            number = shutdown.wait()
             status = start.end()
+            if as_job and number:
+                status = status or 128 + number
+            leave(status)
     except InputError as error:
         print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
-    return leave(status)
 
 
 class _Start(threading.Thread):
@@ -77,7 +79,3 @@ class _Start(threading.Thread):
             begin_teardown(status)
             self._process.leave_ros()
         return status
-
-
-if __name__ == "__main__":
-    sys.exit(main())

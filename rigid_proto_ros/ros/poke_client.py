@@ -12,6 +12,7 @@ by Ctrl-C (143 by SIGTERM): commands already sent still act.
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 from typing import TYPE_CHECKING
 
@@ -28,8 +29,6 @@ _ONE_LINE_COMMANDS = ("poke", "wrench")
 def main(argv: list[str] | None = None) -> int:
     """Send what the arguments say; returns the exit status."""
     own_process = argv is None
-    if own_process:
-        interrupts.end_at_once()
     argv = sys.argv[1:] if argv is None else argv
     own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
     try:
@@ -39,15 +38,21 @@ def main(argv: list[str] | None = None) -> int:
         if args.dry_run:
             _print_plan(script)
             return 0
-        status = _send(script, args, argv, own_process)
+        # Half a second, in which there is nothing to close yet.
+        importlib.import_module(".script_sender", __package__)
         if own_process:
-            interrupts.end_at_once()
-        return status
+            return interrupts.run(lambda: _send(script, args, argv), _tell)
+        return _send(script, args, argv)
     except InputError as error:
-        print(f"poke_client: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return interrupts.status()
+        return _tell(error)
+
+
+def _tell(error: Exception) -> int:
+    """What was refused, in one line on stderr, and the exit status; anything else is raised again."""
+    if not isinstance(error, InputError):
+        raise error
+    print(f"poke_client: {' '.join(str(error).split())}", file=sys.stderr)
+    return 2
 
 
 EXAMPLES = (
@@ -151,14 +156,12 @@ def _print_plan(script: list[ScriptCommand]) -> None:
         print(f"{command.t_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 
-def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str], own_process: bool) -> int:
+def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]) -> int:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from .script_sender import ScriptSender
 
-    if own_process:
-        interrupts.interrupt_once()
     # The middleware's own handler would end the context under the clean-up.
     rclpy.init(args=[sys.argv[0], *argv], signal_handler_options=SignalHandlerOptions.NO)
     sender = None
@@ -173,7 +176,3 @@ def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]
     for line in report.told:
         print(f"  {line}")
     return 0 if report.all_in_time else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

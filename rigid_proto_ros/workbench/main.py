@@ -73,9 +73,10 @@ def serve(
     port: int | None,
     host: str,
     opens: bool,
-    wait: Callable[[], None],
-) -> None:
-    """Fly a scenario with its page until ``wait`` returns. scene: its name; one of a lesson begins with its question.
+    wait: Callable[[], int],
+) -> int:
+    """Fly a scenario with its page until ``wait`` returns, and return what it did. scene: its name; one of a lesson
+    begins with its question.
 
     Raises InputError as Workbench does.
     """
@@ -88,7 +89,7 @@ def serve(
             webbrowser.open(workbench.address)
         live.announce()
         workbench.page.flight.prepare(lambda: warm_up(scenario.setup), live.start)
-        wait()
+        return wait()
     finally:
         workbench.close()
         live.stop()

@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import pytest
+from ros_process import command as start_of
 from ros_process import from_source
 
 from rigid_proto_ros.base.command_line import Parser
@@ -40,18 +41,18 @@ def test_examples_of_the_node_and_the_client_are_read_by_them():
 
 
 @pytest.mark.parametrize(
-    ("module", "line", "offered"),
+    ("line", "offered"),
     [
-        ("cli.main", "rigid_proto si", {"simulate"}),
-        ("cli.main", "rigid_proto simulate book --set string.freq", {"string.frequency="}),
-        ("cli.main", "rigid_proto simulate book --set inertia_model=b", {"inertia_model=bounding_box"}),
-        ("cli.main", "rigid_proto simulate book --set gyroscopic=", {"gyroscopic=true", "gyroscopic=false"}),
-        ("cli.main", "rigid_proto simulate --set mesh=spinning", {"mesh=spinning_top"}),
-        ("ros.poke_client", "poke_client wr", {"wrench"}),
-        ("ros.main", "rigid_body_node --un", {"--until"}),
+        ("rigid_proto si", {"simulate"}),
+        ("rigid_proto simulate book --set string.freq", {"string.frequency="}),
+        ("rigid_proto simulate book --set inertia_model=b", {"inertia_model=bounding_box"}),
+        ("rigid_proto simulate book --set gyroscopic=", {"gyroscopic=true", "gyroscopic=false"}),
+        ("rigid_proto simulate --set mesh=spinning", {"mesh=spinning_top"}),
+        ("poke_client wr", {"wrench"}),
+        ("rigid_body_node --un", {"--until"}),
     ],
 )
-def test_the_shell_completes_commands_options_and_names(module, line, offered, tmp_path):
+def test_the_shell_completes_commands_options_and_names(line, offered, tmp_path):
     pytest.importorskip("argcomplete")
     answer = tmp_path / "completions"
     asked = {
@@ -64,7 +65,7 @@ def test_the_shell_completes_commands_options_and_names(module, line, offered, t
         "_ARGCOMPLETE_IFS": "\n",
     }
     subprocess.run(
-        [sys.executable, "-m", f"rigid_proto_ros.{module}"],
+        start_of(line.split()[0]),
         env={**from_source(dict(os.environ)), **asked},
         cwd=tmp_path,
         check=True,

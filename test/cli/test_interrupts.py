@@ -6,8 +6,12 @@ from __future__ import annotations
 import importlib.util
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis.strategies import floats
+from ros_process import from_source
 
 AT_AN_IMPORT = """
 import importlib.abc, os, signal, sys
@@ -22,6 +26,25 @@ class Interrupter(importlib.abc.MetaPathFinder):
 sys.meta_path.insert(0, Interrupter())
 from rigid_proto_ros.cli import executables
 program, sys.argv = sys.argv[2], sys.argv[2:]
+sys.exit(getattr(executables, program)())
+"""
+
+AT_A_CALL = """
+import os, signal, sys
+from rigid_proto_ros.cli import executables
+
+left = int(sys.argv[1])
+
+def count(*_):
+    global left
+    left -= 1
+    if left == 0:
+        sys.setprofile(None)
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+
+program, sys.argv = sys.argv[2], sys.argv[2:]
+sys.setprofile(count)
 sys.exit(getattr(executables, program)())
 """
 
@@ -78,3 +101,90 @@ def test_during_imports(module, command) -> None:
 def test_while_it_works_and_again_while_it_closes() -> None:
     done = ended(AT_THE_END)
     assert (done.returncode, done.stdout, done.stderr) == (130, "closed\n", "")
+
+
+ENDLESS = (
+    "rigid_proto simulate t_handle --duration 1e9",
+    "rigid_proto simulate t_handle --duration 1e9 --record session.mcap",
+    "poke_client poke --push 1 --timeout 0",
+)
+
+# The first calls set the handler.
+at_a_call = given(calls=floats(2.0, 6.0).map(lambda exponent: round(10.0**exponent)))
+
+
+def check_at_a_call(command: str, calls: int, environment: dict[str, str], cwd: Path) -> None:
+    """Interrupt a command at one call of a Python function, or return from it: the same one on a busy machine."""
+    done = subprocess.run(
+        [sys.executable, "-c", AT_A_CALL, str(calls), *command.split()],
+        env=from_source(environment),
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("command", ENDLESS)
+@at_a_call
+@settings(max_examples=5, deadline=None)
+def test_at_a_call(command, calls, ros_environment, tmp_path_factory) -> None:
+    check_at_a_call(command, calls, ros_environment, tmp_path_factory.getbasetemp())
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("command", ENDLESS)
+@at_a_call
+@settings(max_examples=100, deadline=None)
+def test_at_many_calls(command, calls, ros_environment, tmp_path_factory) -> None:
+    check_at_a_call(command, calls, ros_environment, tmp_path_factory.getbasetemp())
+
+
+IN_A_TEXT = """
+import os, signal, sys
+from rigid_proto_ros.base import interrupts
+
+def work():
+    exec("os.kill(os.getpid(), signal.SIGINT)")
+    while True:
+        pass
+
+sys.exit(interrupts.run(work, str))
+"""
+
+SWALLOWED = """
+import os, signal, sys
+from rigid_proto_ros.base import interrupts
+
+class Finalized:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        os.getpid()
+
+def work():
+    Finalized()
+    try:
+        while True:
+            pass
+    except BaseException:
+        pass
+    while True:
+        pass
+
+sys.exit(interrupts.run(work, str))
+"""
+
+
+def test_within_a_text_that_is_executed(tmp_path) -> None:
+    """Python itself ends by SIGINT then (-2) when it runs a module, however the interrupt is handled."""
+    (tmp_path / "interrupted.py").write_text(IN_A_TEXT)
+    command = [sys.executable, "-m", "interrupted"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def test_an_interrupt_that_a_finalizer_and_a_library_swallow_is_raised_again() -> None:
+    done = ended(SWALLOWED)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

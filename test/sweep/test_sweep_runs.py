@@ -4,7 +4,6 @@
 import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from conftest import ENDINGS
+from ros_process import command as start_of
 from sweep_studies import POKES, PULLED, study
 
 from rigid_proto_ros.cli.main import main
@@ -41,7 +41,7 @@ def long_run(tmp_path):
     file = tmp_path / "long.yaml"
     file.write_text(yaml.safe_dump(spec, sort_keys=False))
     out = tmp_path / "long.parquet"
-    command = [sys.executable, "-m", "rigid_proto_ros.cli.main", "sweep", str(file), "-o", str(out), "--threads", "1"]
+    command = start_of("rigid_proto", "sweep", file, "-o", out, "--threads", "1")
     return command, out, study(spec)
 
 
@@ -67,16 +67,16 @@ def test_a_killed_run_is_resumed_without_a_row_lost_or_done_twice(long_run) -> N
     kept = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.arrow")}
     assert kept and not out.exists()
     # Without --resume the finished parts are not thrown away, with another study they are not taken.
-    assert main(["sweep", command[4], "-o", str(out)]) == 2
+    assert main(["sweep", command[5], "-o", str(out)]) == 2
     # The workers of the killed run may still end a chunk, but nobody writes it.
-    assert main([*command[3:], "--resume"]) == 0
+    assert main([*command[4:], "--resume"]) == 0
     assert content(out) == expected(own)
     assert not folder.exists()
     metadata = metadata_of(out)
     assert metadata["complete"] and metadata["rows_by_simulation"] == own.rows
     assert metadata["cpu"] and metadata["numba"] and metadata["seed"] == own.seed
     before = out.stat().st_mtime_ns
-    assert main(["sweep", command[4], "-o", str(out), "--resume"]) == 0
+    assert main(["sweep", command[5], "-o", str(out), "--resume"]) == 0
     assert out.stat().st_mtime_ns == before
 
 
