@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A workbench with a page in headless Chromium, for tests and pictures."""
+"""The interactive page in headless Chromium, with its workbench in this process: for tests and pictures."""
 
 from __future__ import annotations
 
@@ -10,77 +10,90 @@ import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
-from ros_process import RosProcess
+
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.live.live_simulation import LiveSimulation
+from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.workbench.main import Workbench
 
 CHROMIUM = os.environ.get("CHROMIUM", shutil.which("chromium") or shutil.which("chromium-browser")) or None
 """The browser; ``CHROMIUM=`` hides the one that is installed."""
 
 NO_CHROMIUM = "there is no browser to drive: sudo apt install chromium"
 SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
+
 FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
 """For tests: without a graphics card, smooth edges and a page that WebGL puts together double the cost of a picture."""
 
-PATIENCE_S = 150.0
+PATIENCE_S = 60.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
-DRAWN_MS = 120
-"""[ms] Between two pictures: each is 30 ms of a core's time in software WebGL, which would draw as often as it is let."""
+DRAWN_MS = 100
+"""[ms] Between two pictures: software WebGL would draw as often as it is let, and leave nothing of a core."""
 
 SAID_S = 0.06
 """[s] A page says at most every 0.05 s where the pointer is."""
 
-CAMERA, FIELD_OF_VIEW = np.array([1.45, -2.45, 1.2]), math.radians(40.0)
-"""Where a page looks from at first, to its middle, in units of the picture."""
+SEE_THROUGH = ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
+"""viser says that WebGL runs in software, and stands before the picture while it does."""
 
 
-class Bench:
-    """``rigid_proto workbench`` in a process of its own."""
+class Flown:
+    """A body that flies in real time, and its workbench. lesson: one that begins as the first browser is there."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        environment = {**os.environ, "TMPDIR": str(folder)}
-        log = folder / "workbench"
-        self.process = RosProcess(
-            "rigid_proto", "workbench", "--no-browser", *arguments, environment=environment, log=log
-        )
-        self.address = self.process.wait_for(r"The workbench is at").split()[4]
+    def __init__(self, scene: str = "t_handle", lesson: str = "") -> None:
+        scenario = read_scene(scene)
+        warm_up(scenario.setup)
+        self.live = LiveSimulation(scenario)
+        self.workbench = Workbench(self.live, lesson=lesson, anew=True)
+        self.page, self.server = self.workbench.page, self.workbench.page.server
+        self.live.announce()
+        self.live.start()
+
+    def end(self) -> None:
+        self.workbench.close()
+        self.live.stop()
+
+    def node(self, part: str):
+        """The viser node of a part of the picture; None where there is none to be seen."""
+        node = self.page.backend._nodes.get(part)
+        return node if node is not None and node.visible else None
 
 
-class Page:
-    """One browser page. The body is at the middle of the canvas while it rests at the world's origin."""
+class Browser:
+    """One browser page of it."""
 
-    def __init__(self, browser, address: str, size: tuple[int, int] = (1000, 480)) -> None:
-        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
-        self._fingers = None
-        self.scene: dict = {}  # that its tests begin with
+    def __init__(self, chromium, flown: Flown, size: tuple[int, int] = (1000, 600), drawn_ms: int = DRAWN_MS) -> None:
+        self.flown = flown
+        self.page = chromium.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
         self.page.set_default_timeout(PATIENCE_S * 1e3)
         self.page.add_init_script(
-            f"const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), {DRAWN_MS})"
+            f"const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), {drawn_ms})"
         )
-        self.page.goto(address)
+        known = set(flown.server.get_clients())
+        self.page.goto(flown.workbench.address)
         self.page.wait_for_selector("canvas")
         self.drawn()
-        # viser says that WebGL runs in software, and stands before the picture while it does.
-        see_through = (
-            ".mantine-Notifications-root, .mantine-Notifications-root * {opacity: 0; pointer-events: none !important}"
-        )
-        self.page.add_style_tag(content=see_through)
+        self.page.add_style_tag(content=SEE_THROUGH)
         self.until(lambda: re.search(r"\d\.\d\d s", self.text), "time on the page")
+        (self.client,) = (client for number, client in flown.server.get_clients().items() if number not in known)
 
-    def drawn(self) -> None:
+    def drawn(self, pictures: int = 2) -> None:
         """Wait for two pictures: what the page has been told is in the second, and there a click hits it."""
-        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        for _ in range(pictures):
+            self.page.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+
+    @property
+    def text(self) -> str:
+        return self.page.inner_text("body")
 
     @property
     def time_s(self) -> float:
         """As the bar shows it."""
         return float(re.search(r"(\d+\.\d\d) s", self.text)[1])
-
-    @property
-    def text(self) -> str:
-        return self.page.inner_text("body")
 
     def until(self, condition, what: str, timeout_s: float = PATIENCE_S):
         """Wait for a condition; returns its value."""
@@ -90,8 +103,9 @@ class Page:
             time.sleep(0.05)
         return found
 
+    # The panel
+
     def tab(self, name: str) -> None:
-        """Open a tab; a click may fall between two pictures of the panel."""
         tab = self.page.get_by_role("tab", name=name, exact=True)
 
         def opened() -> bool:
@@ -100,11 +114,8 @@ class Page:
 
         self.until(opened, f"tab {name}")
 
-    def button(self, name: str) -> None:
-        self.page.get_by_role("button", name=name, exact=True).click()
-
     def press(self, name: str) -> None:
-        """A button of a group."""
+        """A button, alone or of a group."""
         self.page.locator("button", has_text=name).first.click()
 
     def input(self, label: str):
@@ -112,34 +123,35 @@ class Page:
         path = f'xpath=//p[label[normalize-space()="{label}"]]/../following-sibling::div//input[not(@type="hidden")]'
         return self.page.locator(path).first
 
-    def write(self, label: str, text: str) -> None:
-        field = self.input(label)
-        field.fill(text)
-        field.press("Enter")
-
     def choose(self, label: str, option: str) -> None:
         """Take an option of a dropdown."""
         self.input(label).click()
         self.page.get_by_role("option", name=option, exact=True).click()
 
-    @property
-    def middle(self) -> tuple[float, float]:
-        """Of the canvas [pixels]."""
-        box = self.page.locator("canvas").first.bounding_box()
-        return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    # The picture
 
-    def ray(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
-        """The view ray through a pixel, by pinhole geometry: origin (3,) [units of the picture] and direction (3,)."""
-        box = self.page.locator("canvas").first.bounding_box()
-        forward = -CAMERA / np.linalg.norm(CAMERA)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        up = np.cross(right, forward)
-        half = 0.5 * box["height"]
-        mx, my = self.middle
-        slope = math.tan(0.5 * FIELD_OF_VIEW) / half
-        direction = forward + (x - mx) * slope * right + (my - y) * slope * up
-        return CAMERA, direction / np.linalg.norm(direction)
+    @property
+    def canvas(self) -> dict[str, float]:
+        """Of three.js; the plots have others."""
+        return self.page.locator("canvas[data-engine]").first.bounding_box()
+
+    def pixel(self, point) -> tuple[float, float]:
+        """Where a point (3,) of the picture, in its units, is drawn, by pinhole geometry."""
+        camera, box = self.client.camera, self.canvas
+        w, x, y, z = camera.wxyz
+        across, down, away = matrix_from_quaternion(np.array([x, y, z, w])).T @ (np.asarray(point) - camera.position)
+        focal = 0.5 * box["height"] / math.tan(0.5 * camera.fov)
+        middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+        return middle[0] + focal * across / away, middle[1] + focal * down / away
+
+    def look(self):
+        """The page as it is drawn, (height, width, 3)."""
+        import io
+
+        from PIL import Image
+
+        with Image.open(io.BytesIO(self.page.screenshot())) as image:
+            return np.asarray(image.convert("RGB"), dtype=int)
 
     def click(self, x: float, y: float, modifier: str = "") -> None:
         """Press and release at one place: a poke."""
@@ -151,41 +163,27 @@ class Page:
         if modifier:
             self.page.keyboard.up(modifier)
 
-    def drag(self, x: float, y: float, dx: float, dy: float, steps: int = 3) -> None:
+    def drag(self, x: float, y: float, dx: float, dy: float, steps: int = 3, button: str = "left") -> None:
         """Press at a point and move on from there in steps; the button stays down."""
         self.page.mouse.move(x, y)
-        self.page.mouse.down()
+        self.page.mouse.down(button=button)
         for k in range(1, steps + 1):
             self.page.mouse.move(x + dx * k / steps, y + dy * k / steps)
             time.sleep(SAID_S)
 
-    def touch(self, phase: str, *points: tuple[float, float]) -> None:
-        """Fingers on the glass: phase touchStart, touchMove or touchEnd, all points where they are."""
-        if self._fingers is None:
-            self._fingers = self.page.context.new_cdp_session(self.page)
-        self._fingers.send(
-            "Input.dispatchTouchEvent",
-            {"type": phase, "touchPoints": [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]},
-        )
+    def release(self, button: str = "left") -> None:
+        self.page.mouse.up(button=button)
 
-    def wheel(self, notches: int) -> None:
-        """Turn the wheel over the picture's middle, away from the hand."""
-        self.page.mouse.move(*self.middle)
-        for _ in range(notches):
-            self.page.mouse.wheel(0.0, -100.0)
-            time.sleep(SAID_S)
 
-    def pinch(self, begin: float, end: float) -> None:
-        """Move two fingers from one distance [pixels] beside the picture's middle to another."""
-        x, y = self.middle
-        for k in range(6):
-            away = begin + (end - begin) * k / 5
-            self.touch("touchMove" if k else "touchStart", (x - away, y), (x + away, y))
-            time.sleep(2.0 * SAID_S)
-        self.touch("touchEnd")
+@contextmanager
+def chromium(flags: list[str]) -> Iterator:
+    """The browser itself."""
+    from playwright.sync_api import sync_playwright
 
-    def release(self) -> None:
-        self.page.mouse.up()
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield browser
+        browser.close()
 
 
 CAMERA_MESSAGE = {

@@ -21,6 +21,7 @@ from ..picture.string import POINTS
 from ..picture.style import Colour
 from ..simulation.observer import BodyChanged, BodySnapshot, GhostChanged
 from .flight_record import FlightRecord
+from .gltf_model import add_model, model_of
 from .tracks import MeshSteps, Tracks
 
 if TYPE_CHECKING:
@@ -195,7 +196,8 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
         document.gltf.nodes[node].extras = _mass_properties(record.bodies(kind)[0][1])
         document.animate(node, "translation", seconds, positions)
         document.animate(node, "rotation", seconds, attitudes)
-        _draw_meshes(document, node, name, tracks.meshes(mesh), style.STYLES[mesh], surfaces)
+        model = model_of(record) if kind is BodyChanged else None
+        _draw_meshes(document, node, name, tracks.meshes(mesh), style.STYLES[mesh], surfaces, model)
         if times_ns[0] > record.times_ns[0]:
             # A ghost that comes in flight is of no size before.
             begins = np.array([0.0, seconds[0]], np.float32)
@@ -219,9 +221,18 @@ def _draw_meshes(
     meshes: list[MeshSteps],
     look: style.Style,
     surfaces: dict[int, tuple[dict[str, int], int]],
+    model: tuple[bytes, np.ndarray] | None,
 ) -> None:
-    """A node for each mesh that the body is drawn as, below the body's."""
+    """A node for each mesh that the body is drawn as, below the body's; model: as ``model_of`` has it, in its place."""
     if not meshes:
+        return
+    if model is not None:
+        data, middle = model
+        (steps,) = meshes
+        frame = document.node(f"{name} mesh", body)
+        document.animate_steps(frame, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
+        document.node("model", frame, translation=(-middle).tolist())
+        document.gltf.nodes[-1].children += add_model(document.gltf, document.data, data)
         return
     material = document.material(name, look.colours[0], look.opacity)
     for number, steps in enumerate(meshes, 1):

@@ -116,7 +116,7 @@ class Picture:
 
     def restart(self) -> None:
         """A new run: simulated time starts again at 0; mesh, body and scales stay."""
-        self._ticks, self._redraw_ticks = Ticks(self._rate), Ticks(REDRAWN_RATE)
+        self.redraw()
         self._drawn_ns = -1
         self._trail, self._com_trail = Trail(), Trail()
         self._plots = Plots()
@@ -126,6 +126,10 @@ class Picture:
         self._body_times, self._body_attitudes = np.empty(0, np.int64), np.empty((0, 4))
         if self.shape is not None:
             self._poinsot.set_body(self.shape.moments, self.shape.axes)
+
+    def redraw(self) -> None:
+        """The next state is drawn even if it was before: other parts are wanted."""
+        self._ticks, self._redraw_ticks = Ticks(self._rate), Ticks(REDRAWN_RATE)
 
     # What changes
 

@@ -47,13 +47,9 @@ class Workbench:
     ) -> None:
         # The physics thread shares the interpreter with the page: it waits this long for its turn at most.
         sys.setswitchinterval(TURN_S)
-        default = Parameters().workbench_port
-        name = "" if live.name == "rigid_body" else f" {live.name}"
-        self._server = make_server(f"{TITLE}{name}", host, port, default)
+        title = TITLE if live.name == "rigid_body" else f"{TITLE} {live.name}"
+        self._server = make_server(title, host, port, Parameters().workbench_port)
         self.address = f"http://{host}:{self._server.get_port()}"
-        if port is None and self._server.get_port() != default:
-            # Another one runs already: its page and this one are to be told apart.
-            self._server.gui.set_panel_label(f"{TITLE}{name} :{self._server.get_port()}")
         self.page = Page(self._server, live, lesson, anew)
         self._running = asyncio.run_coroutine_threadsafe(self.page.run(), self._server.get_event_loop())
 

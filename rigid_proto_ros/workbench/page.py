@@ -476,6 +476,11 @@ class Page:
             self._com.visible = shown
         else:
             self.backend.switch(part, shown)
+            # Also while time stands.
+            self.picture.redraw()
+            self._undrawn = True
+            if self._drawn_moment_ns is not None:
+                self._drawn_moment_ns = -1
 
     async def _fly(self, values: dict[str, object]) -> bool:
         taken = await self.flight.fly(values)

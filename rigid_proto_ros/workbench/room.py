@@ -10,10 +10,11 @@ import numpy as np
 import viser
 
 from ..picture.plot_range import nice_step
+from ..picture.surface import BOX_CORNERS
 
 FIELD_OF_VIEW = math.radians(35.0)
 
-VIEW = np.array([0.50, -0.80, 0.34])
+VIEW = np.array([0.50, -0.80, 0.34]) / math.sqrt(0.50**2 + 0.80**2 + 0.34**2)
 """Direction from the body to the camera, at first."""
 
 BODY_FILLS, PATH_FILLS = 0.62, 0.85
@@ -24,12 +25,30 @@ one that falls.
 CELLS = 4.0
 """About so many cells of the floor's grid to a unit."""
 
-SUN = (2.0, -1.2, 4.2)
+SLOPE = math.tan(0.5 * FIELD_OF_VIEW)
+
+SUN = np.array([0.416, -0.25, 0.874])
+"""Direction to the light that throws the shadow."""
+
+SUN_SIZES, SUN_ANGLE = 10.0, 0.2
+"""How far that light is from what it lights, in half sizes of that, and half the angle [rad] of its cone."""
+
+SKY_LIGHT = 2.0
+"""Of a picture without an environment map."""
 
 LEASH = 0.2
 """Body sizes that the body may move from the picture's middle before the picture follows."""
 
 SKY_ROWS = 64
+
+
+def distance_to_see(half_sides: np.ndarray) -> float:
+    """How far off a camera sees all of a box with these half sides (3,), in a picture as high as wide."""
+    right = np.cross(-VIEW, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    corners = half_sides * BOX_CORNERS
+    beside = np.abs(corners @ np.column_stack([right, np.cross(right, -VIEW)])).max(axis=1)
+    return float((corners @ VIEW + beside / (PATH_FILLS * SLOPE)).max())
 
 
 class Theme:
@@ -47,10 +66,10 @@ class Theme:
 
 class Room:
     """Lengths are the picture's units: one is the body's size. The floor stays below the picture's middle while its
-    lines stand still in the world.
+    lines stand still in the world. environment: lit from a map as well, which viser's server has and a file hasn't.
     """
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, environment: bool = True) -> None:
         self._server = server
         self._scene = scene = server.scene
         self._cell = 0.25
@@ -71,7 +90,20 @@ class Room:
         self._wall = scene.add_grid(
             "/room/wall", plane="xz", visible=False, infinite_grid=True, fade_from="origin", fade_strength=1.5
         )
-        self._sun = scene.add_light_directional("/room/sun", color=(255, 250, 240), cast_shadow=True, position=SUN)
+        # viser's directional light is several, of which each throws a shadow of its own.
+        self._sun = scene.add_light_spot(
+            "/room/sun",
+            color=(255, 250, 240),
+            angle=SUN_ANGLE,
+            penumbra=0.5,
+            decay=0.0,
+            cast_shadow=True,
+            direction=-SUN,
+        )
+        self._environment = environment
+        if not environment:
+            sky, ground = (255, 255, 255), (150, 148, 144)
+            scene.add_light_hemisphere("/room/sky", sky_color=sky, ground_color=ground, intensity=SKY_LIGHT)
         self.theme = Theme(False)
         self.paint(False)
 
@@ -81,7 +113,8 @@ class Room:
         self._server.gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
         )
-        self._scene.configure_environment_map("studio", environment_intensity=theme.ambient)
+        if self._environment:
+            self._scene.configure_environment_map("studio", environment_intensity=theme.ambient)
         self._sun.intensity = theme.sun
         for grid in (self._floor, self._wall):
             grid.cell_color, grid.section_color = theme.cell, theme.section
@@ -97,17 +130,18 @@ class Room:
         half = 0.5 * float(np.linalg.norm(high - low))
         self._reach = max(half - 0.5, LEASH)
         self._cell = nice_step(size_m / CELLS) / size_m
-        self._distance = max(0.5 / BODY_FILLS, half / PATH_FILLS) / math.tan(0.5 * FIELD_OF_VIEW)
+        self._distance = max(0.5 / BODY_FILLS / SLOPE, distance_to_see(0.5 * (high - low)))
         far = 3.0 * self._distance
         for grid in (self._floor, self._wall):
             grid.cell_size, grid.section_size, grid.fade_distance = self._cell, 5.0 * self._cell, far
         self._floor_height = float(low[2]) - 0.18
         self._wall.visible = falls
+        self._sun.position = tuple(self._middle + SUN_SIZES * max(half, 0.5) * SUN)
         self._look()
 
     def _look(self) -> None:
         at = self._middle
-        position = at + self._distance * VIEW / np.linalg.norm(VIEW)
+        position = at + self._distance * VIEW
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.fov = position, at, FIELD_OF_VIEW
         for client in self._server.get_clients().values():

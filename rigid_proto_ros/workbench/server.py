@@ -8,7 +8,6 @@ over.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import functools
 import gzip
@@ -16,6 +15,7 @@ import html
 import http
 import io
 import logging
+import socket
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
@@ -38,7 +38,8 @@ VISERS_TITLE = b"<title>Viser</title>"
 
 
 def make_server(title: str, host: str, asked: int | None, default: int) -> viser.ViserServer:
-    """A server on the port that was asked for, or on the first free one from the default on.
+    """A server on the port that was asked for, or on the first free one from the default on; one that had to move has
+    its port in its title, for there is another one.
 
     Raises InputError naming ``--host`` or ``--port`` where nothing can listen there.
     """
@@ -47,9 +48,10 @@ def make_server(title: str, host: str, asked: int | None, default: int) -> viser
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
 
     def serve(port: int) -> viser.ViserServer:
+        label = title if port in (asked, default) else f"{title} :{port}"
         # Its greeting would stand between the lines that the command prints.
-        with contextlib.redirect_stdout(io.StringIO()), _requests_looked_at(host, title):
-            server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        with contextlib.redirect_stdout(io.StringIO()), _requests_looked_at(host, label):
+            server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
         if server.get_port() != port:
             stop_server(server)  # viser goes on to other ports by itself
             raise PortTakenError
@@ -73,19 +75,12 @@ def stop_server(server: viser.ViserServer) -> None:
 def _check_host(host: str) -> None:
     """viser tries for ever to listen on an address that isn't this machine's."""
 
-    async def bound() -> None:
-        server = await asyncio.get_running_loop().create_server(asyncio.Protocol, host, 0, start_serving=False)
-        server.close()
-        await server.wait_closed()
-
-    loop = asyncio.new_event_loop()
     try:
-        loop.run_until_complete(bound())
+        family, _, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        socket.create_server(address[:2], family=family).close()
     except (OSError, UnicodeError, ValueError):  # no such address; no name at all
         accepted = "an address of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         raise InputError("--host", host, accepted) from None
-    finally:
-        loop.close()
 
 
 @contextlib.contextmanager

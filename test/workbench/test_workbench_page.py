@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: MIT
+"""The page as its user sees it, in headless Chromium: what is drawn where, and what mouse and buttons do."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed: no interactive page")
+pytest.importorskip("playwright.sync_api", reason="playwright is not installed: nothing drives a browser")
+
+from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, Browser, Flown, chromium
+
+from rigid_proto_ros.picture import style
+from rigid_proto_ros.scene.lessons import lesson
+
+pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
+
+SIZE = (900, 420)
+NEAR = 4.0
+"""[pixels] A pixel of the mouse, one of the picture, and single precision; a click beside its point is 20 away."""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium(FLAGS) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def opened(browser):
+    flown = Flown("t_handle")
+    yield Browser(browser, flown, SIZE)
+    flown.end()
+
+
+@pytest.fixture
+def page(opened):
+    """The page, with a T-handle that rests at the world's origin."""
+    opened.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+    fly(opened, {"mesh": "t_handle"})
+    return opened
+
+
+def fly(page: Browser, scene) -> None:
+    """Begin another scene, and wait until it is drawn."""
+    flown = page.flown
+
+    async def begin() -> None:
+        await flown.page.flight.fly(scene, paused=False)
+        flown.page.lessons.leave()
+
+    asyncio.run_coroutine_threadsafe(begin(), flown.page.loop).result(60.0)
+    page.until(lambda: not flown.page._new_scene and not flown.page._undrawn, "another body")
+    page.drawn(3)
+
+
+def com_pixel(page: Browser) -> tuple[float, float]:
+    flown = page.flown
+    return page.pixel((flown.page.state.position - flown.page.backend.origin) / flown.page.backend.unit)
+
+
+def apart(a, b) -> float:
+    return math.dist(a, b)
+
+
+def commands(page: Browser) -> list[dict]:
+    """What was done since the last reset, as the event log has it."""
+    return [json.loads(line) for _, line in page.flown.page.flight.memory.session().events]
+
+
+COLOURED = """() => [...document.querySelectorAll('canvas:not([data-engine])')].map(canvas => {
+  const seen = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+  let count = 0;
+  for (let i = 0; i < seen.length; i += 4) {
+    const colour = [seen[i], seen[i + 1], seen[i + 2]];
+    count += seen[i + 3] > 128 && Math.max(...colour) - Math.min(...colour) > 60;
+  }
+  return count;
+})"""
+"""Of each plot on the page, how many of its pixels have a colour: curves have, axes haven't."""
+
+
+def test_a_drag_draws_the_string_from_the_grabbed_point_to_the_pointer_and_the_body_follows(page) -> None:
+    x, y = com_pixel(page)
+    page.drag(x, y, 150.0, -90.0)
+    string = page.until(lambda: page.flown.node(style.STRING), "string")
+    page.drawn()
+    # The page's thread goes on drawing: hand and knot are taken from one frame.
+    hand, *_, knot = np.array(string.points).reshape(-1, 3)
+    assert apart(page.pixel(hand), (x + 150.0, y - 90.0)) < NEAR
+    tied = page.flown.live.loop.simulation.string
+    grabbed = np.asarray(page.flown.page.picture.string._changes[-1][1].attach) / page.flown.page.backend.unit
+    start = page.pixel(grabbed)
+    assert tied is not None and apart(start, (x, y)) < NEAR, "the knot isn't where the mouse went down"
+    picture = page.look()
+    assert (picture[..., 0] - picture[..., 2] > 60).sum() > 60, "nothing orange in the picture"
+    pulled = page.until(lambda: np.linalg.norm(page.flown.live.state.position) > 0.01, "body that follows")
+    moved = np.subtract(com_pixel(page), (x, y))
+    assert pulled and moved @ (150.0, -90.0) > 0.0
+    page.release()
+    page.until(lambda: page.flown.live.loop.simulation.string is None, "release")
+    page.until(lambda: page.flown.node(style.STRING) is None, "picture without the string")
+    assert np.all(np.isfinite(knot))
+
+
+def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> None:
+    shown = style.load_part("poke", "force")
+    for modifier in ("", "Shift"):
+        fly(page, {"mesh": "hollow_box", "poke_duration": 30.0})
+        x, y = com_pixel(page)
+        page.click(x + 30.0, y + 5.0, modifier)
+        arrow = page.until(lambda: page.flown.node(shown), "arrow")
+        # The force pushes into the body, so its arrow's tip stands at the point that was clicked. The body has hardly
+        # moved yet: the point is fixed to it.
+        tail, tip = np.array(arrow.points).reshape(-1, 2, 3)[0]
+        assert apart(page.pixel(tip), (x + 30.0, y + 5.0)) < 25.0
+        (load,) = (each for _, each in page.flown.page._loads.values())
+        point = np.asarray(load.point) / page.flown.page.backend.unit
+        assert apart(page.pixel(point), (x + 30.0, y + 5.0)) < NEAR
+        force = np.asarray(load.force) / np.linalg.norm(load.force)
+        along = (np.asarray(point) - page.client.camera.position) / np.linalg.norm(point - page.client.camera.position)
+        if modifier:
+            # The side that faces the camera is x+, y- or z+, square to the axes.
+            assert np.abs(force).max() > 0.999 and force @ along > 0.3
+        else:
+            assert force @ along > 0.9999
+        page.until(lambda: np.linalg.norm(page.flown.live.state.linear_velocity) > 0.0, "body that moves")
+        page.tab("Plots")
+        page.until(lambda: re.search(r"speed of the COM\s+(?!0 m/s)[\d.e-]+ m/s", page.text), "speed in the readouts")
+        picture = page.look()
+        assert (picture[..., 0] - picture[..., 1:].max(axis=-1) > 80).sum() > 20, "nothing red in the picture"
+
+
+def test_a_drag_beside_the_body_turns_the_camera_and_touches_nothing(page) -> None:
+    before, logged = np.array(page.client.camera.position), len(commands(page))
+    box = page.canvas
+    page.drag(box["x"] + 40.0, box["y"] + 0.8 * box["height"], 120.0, 20.0)
+    page.release()
+    page.until(lambda: np.linalg.norm(page.client.camera.position - before) > 0.3, "camera that turns")
+    x, y = com_pixel(page)
+    page.drag(x, y, 60.0, 30.0, button="right")
+    page.release("right")
+    page.drawn()
+    assert len(commands(page)) == logged and not np.any(page.flown.live.state.position)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1400, 800), (800, 360), (768, 1024), (390, 844)])
+def test_body_and_controls_of_time_are_in_sight_in_windows_of_every_size(page, width: int, height: int) -> None:
+    page.page.set_viewport_size({"width": width, "height": height})
+    page.drawn(3)
+    for name in ("Pause", "Step", "Reset"):
+        box = page.page.locator("button:visible", has_text=name).first.bounding_box()
+        assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, name
+        assert box["y"] >= 0.0 and box["y"] + box["height"] <= height, name
+    box, (x, y) = page.canvas, com_pixel(page)
+    assert box["width"] * box["height"] > 0.45 * width * height
+    assert box["x"] < x < box["x"] + box["width"] and box["y"] < y < box["y"] + box["height"]
+    # Nothing of the panel lies over the body.
+    assert page.page.evaluate("([x, y]) => document.elementFromPoint(x, y).tagName", [x, y]) == "CANVAS"
+
+
+def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_buttons_are_left(page) -> None:
+    page.page.set_viewport_size({"width": 1400, "height": 800})
+    page.tab("Show")
+    page.page.get_by_label("Dark", exact=True).first.click(force=True)
+
+    def picture() -> np.ndarray:
+        box = page.canvas
+        return page.look()[: int(box["height"]), : int(box["width"]) - 400]
+
+    page.until(lambda: picture().mean() < 90.0, "dark picture")
+    seen = picture()
+    assert np.percentile(seen, 95) < 110.0, "a floor that glares"
+    assert seen.max() > 150, "a body that is lit"
+    page.page.get_by_label("Dark", exact=True).first.click(force=True)
+    page.until(lambda: picture().mean() > 180.0, "light picture")
+
+    page.page.get_by_label("Class mode", exact=True).first.click(force=True)
+    page.until(lambda: not page.page.get_by_role("tab", name="Body").is_visible(), "page without tabs")
+    buttons = [b.inner_text() for b in page.page.locator(".mantine-Button-root").all() if b.is_visible()]
+    assert {"Pause", "Step", "Reset"} <= set(buttons)
+    page.flown.page.show_tab._class.value = False
+    page.until(lambda: page.page.get_by_role("tab", name="Body").is_visible(), "tabs again")
+
+
+def test_plots_show_their_curves_also_after_a_lesson_was_begun(page) -> None:
+    page.page.set_viewport_size({"width": 1400, "height": 1200})
+    page.tab("Plots")
+    for name in ("t_handle", "dropped_term"):
+        fly(page, lesson(name).path.read_text("utf-8"))
+        page.until(lambda: page.flown.live.state.time_ns > 2e9, "two seconds of motion")
+
+        page.until(
+            lambda: sum(n > 50 for n in page.page.evaluate(COLOURED)) >= 2, f"curves of energy and spin in {name}"
+        )
+
+
+def test_a_second_workbench_on_this_machine_has_a_port_and_a_name_of_its_own(page, browser) -> None:
+    other = Flown("book")
+    try:
+        assert other.workbench.address != page.flown.workbench.address
+        second = Browser(browser, other, (600, 400))
+        port = other.workbench.address.rpartition(":")[2]
+        assert port in second.page.title() and port in second.text
+        assert port not in page.page.title()
+        second.page.close()
+    finally:
+        other.end()
+
+
+OPEN_BOX = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
+"""A tetrahedron without its largest face."""
+CLOSED = "mtllib none.mtl\nusemtl red\n" + OPEN_BOX + "f 2 3 4\n"
+
+
+def test_an_upload_is_judged_beside_no_word_of_success_and_flies_upright(page, tmp_path) -> None:
+    page.page.set_viewport_size({"width": 1400, "height": 1000})
+    page.tab("Body")
+    for name, text in (("open.obj", OPEN_BOX), ("closed.obj", CLOSED)):
+        (tmp_path / name).write_text(text)
+    chooser = page.page.locator('input[type="file"]').first
+    chooser.set_input_files(tmp_path / "open.obj")
+    page.until(lambda: "refused: " in page.text, "refusal")
+    assert "successfully" not in page.text
+    assert not page.page.get_by_role("button", name="Simulate it", exact=True).is_visible()
+    chooser.set_input_files(tmp_path / "closed.obj")
+    page.until(lambda: page.page.get_by_role("button", name="Simulate it", exact=True).is_visible(), "question")
+    page.page.get_by_role("button", name="Simulate it", exact=True).click()
+    page.until(lambda: page.flown.live.scenario.parameters.mesh.endswith("closed.obj"), "uploaded body")
+    up = page.flown.live.state.rotation @ [0.0, 1.0, 0.0]
+    assert up == pytest.approx([0.0, 0.0, 1.0]), "an .obj is y-up"
