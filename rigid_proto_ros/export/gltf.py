@@ -232,7 +232,8 @@ def _draw_meshes(
         frame = document.node(f"{name} mesh", body)
         document.animate_steps(frame, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
         document.node("model", frame, translation=(-middle).tolist())
-        document.gltf.nodes[-1].children += add_model(document.gltf, document.data, data)
+        below = document.gltf.nodes[-1]
+        below.children += add_model(document.gltf, document.data, type(document.gltf)().load_from_bytes(data))
         return
     material = document.material(name, look.colours[0], look.opacity)
     for number, steps in enumerate(meshes, 1):

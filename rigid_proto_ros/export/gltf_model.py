@@ -8,7 +8,7 @@ section 3). Skins, cameras and animations of its own are left out: a rigid body 
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from ..mesh.locate import resolve_mesh
 from ..scene.scene_file import read_scene_text
 from ..simulation.observer import MeshChanged, Started
 from .flight_record import FlightRecord
-
-if TYPE_CHECKING:
-    import pygltflib
 
 MAGIC = b"glTF"
 
@@ -41,11 +38,10 @@ def model_of(record: FlightRecord) -> tuple[bytes, np.ndarray] | None:
     return data, 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
 
 
-def add_model(gltf: pygltflib.GLTF2, buffer: bytearray, data: bytes) -> list[int]:
-    """Add what a .glb's scene shows to a document and its buffer; returns the numbers of the scene's nodes there."""
-    import pygltflib
-
-    model = pygltflib.GLTF2().load_from_bytes(data)
+def add_model(gltf: Any, buffer: bytearray, model: Any) -> list[int]:
+    """Add what a model's scene shows to a document (both as pygltflib has them) and to its buffer; returns the numbers
+    of the scene's nodes there.
+    """
     buffer += bytes(-len(buffer) % 4)
     begin = len(buffer)
     buffer += model.binary_blob() or b""
@@ -76,7 +72,7 @@ def add_model(gltf: pygltflib.GLTF2, buffer: bytearray, data: bytes) -> list[int
     return [root + before["nodes"] for root in model.scenes[model.scene or 0].nodes]
 
 
-def _move_pictures(model: pygltflib.GLTF2, before: dict[str, int]) -> None:
+def _move_pictures(model: Any, before: dict[str, int]) -> None:
     for image in model.images:
         _move(image, "bufferView", before["bufferViews"])
     for texture in model.textures:

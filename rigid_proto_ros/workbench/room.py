@@ -98,7 +98,7 @@ class Room:
             penumbra=0.5,
             decay=0.0,
             cast_shadow=True,
-            direction=-SUN,
+            direction=tuple(-SUN),
         )
         self._environment = environment
         if not environment:
