@@ -30,8 +30,8 @@ SWEEP = ["pyarrow>=15", "scipy>=1.15", "distributed>=2024.8", "matplotlib>=3.8"]
 # Motion for other tools: tables, glTF, USD.
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
 TERMINAL = ["rich>=13", "argcomplete>=3"]
-# Mass and tensor from recorded motion; zstandard comes with mcap.
-IDENTIFY = ["scipy>=1.11", *MCAP]
+# Mass and tensor from recorded motion: our sessions by mcap, with which zstandard comes, other bags by rosbags.
+IDENTIFY = ["scipy>=1.11", "rosbags>=0.11,<0.12", *MCAP]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 # COLLADA files, the hull, and the union of overlapping parts.
@@ -44,7 +44,7 @@ TEST = [
     "psutil>=5.9",
     "trimesh>=4.4",
     *MESHES,
-    *MCAP,
+    *IDENTIFY,
     "mcap-ros2-support>=0.5",
     "playwright>=1.50",
     "nbclient>=0.10",

@@ -22,6 +22,7 @@ Writes results/identification.csv beside this file.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 import time
 from pathlib import Path
@@ -39,12 +40,13 @@ import measured_flights as mf
 
 from result_table import ResultTable
 from rigid_proto_ros import __version__
-from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import measurements as ms
 from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.local_motion import local_start
 from rigid_proto_ros.identify.shooting import moved_starts
+from rigid_proto_ros.identify.unknowns import Values, second_moments
+from rigid_proto_ros.mass.properties import MassProperties
 from rigid_proto_ros.motion import loads as ld
 
 COLUMNS = ("tool", "version", "body", "throw", "begins_from", "seconds", "cpu_seconds", "error", "mass_error")
@@ -97,7 +99,7 @@ class Rollouts:
 
     def departures(self, theta: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Of all samples (6 m,)."""
-        body = mp.mass_of(theta)
+        body = _body_of_pseudo_inertia(theta)
         moments, quaternion = _principal(body.inertia)
         model, data = self.model, self.data
         model.body_mass[1], model.body_inertia[1] = body.mass, moments
@@ -149,17 +151,30 @@ def fit_by_mujoco(flight: ms.MeasuredFlight, theta: np.ndarray, start: np.ndarra
     return theta + least_squares(residuals, np.zeros(22), x_scale="jac", max_nfev=200).x[:10]
 
 
-def _body_of_pseudo_inertia(numbers: np.ndarray) -> mp.MassEstimate:
-    """Of MuJoCo's ten numbers, those of Rucker and Wensing."""
+def _body_of_pseudo_inertia(numbers: np.ndarray) -> MassProperties:
+    """Of the peers' ten numbers, log-Cholesky coordinates (Rucker and Wensing, IEEE RA-L 7, 2022)."""
     alpha, a, b, c, s12, s23, s13 = numbers[:7].tolist()
     V = np.array([[np.exp(a), s12, s13], [0.0, np.exp(b), s23], [0.0, 0.0, np.exp(c)]])
     mass = float(np.exp(2.0 * alpha))
-    return mp.MassEstimate(mass, numbers[7:10].copy(), mp.tensor_of(mass * (V @ V.T)))
+    second = mass * (V @ V.T)
+    return MassProperties(mass, numbers[7:10].copy(), np.trace(second) * np.eye(3) - second)
+
+
+def _pseudo_inertia(mass: float, com: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """The ten numbers of a body."""
+    # Upper triangular: Cholesky of the matrix turned end for end.
+    V = np.linalg.cholesky((second_moments(inertia) / mass)[::-1, ::-1])[::-1, ::-1]
+    return np.array([0.5 * np.log(mass), *np.log(np.diag(V)), V[0, 1], V[1, 2], V[0, 2], *com])
+
+
+def _with_body(truth: Values, theta: np.ndarray) -> Values:
+    body = _body_of_pseudo_inertia(theta)
+    return dataclasses.replace(truth, mass=body.mass, center_of_mass=body.center_of_mass, inertia=body.inertia)
 
 
 def fit_by_sysid(flight: ms.MeasuredFlight, theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     """θ (10,) by MuJoCo's system identification, its least squares over its rollouts."""
-    [load], body = flight.load_history.loads, mp.mass_of(theta)
+    [load], body = flight.load_history.loads, _body_of_pseudo_inertia(theta)
     point, force = load[ld.POINT : ld.POINT + 3], load[ld.FORCE : ld.FORCE + 3]
     moments, axes = _principal(body.inertia)
     given = (flight.gravity, point, body.center_of_mass, moments, axes)
@@ -223,8 +238,7 @@ def fit_by_sysid(flight: ms.MeasuredFlight, theta: np.ndarray, start: np.ndarray
         models_sequences=sequences, custom_rollout=rollout, modify_residual=residual
     )
     found, _ = mujoco.sysid.optimize(params, residuals, verbose=False)
-    body = _body_of_pseudo_inertia(found["pseudo-inertia"].value)
-    return mp.parameters_of(body.mass, body.center_of_mass, body.inertia)
+    return found["pseudo-inertia"].value
 
 
 FITS = {PEER: fit_by_mujoco, SYSID: fit_by_sysid}
@@ -235,22 +249,25 @@ def main() -> None:
     parser.add_argument("--throws", type=int, default=8)
     args = parser.parse_args()
     table = ResultTable(HERE / "results" / "identification.csv", COLUMNS)
-    ball = mp.parameters_of(1.0, np.zeros(3), 0.004 * np.eye(3))
+    ball = _pseudo_inertia(1.0, np.zeros(3), 0.004 * np.eye(3))
     for number in range(args.throws):
         made = study.measured_throw(2 * number, poked=True)
         widths = np.array([1.0] * 7 + [made.size] * 3)
-        near = made.truth.theta + 0.05 * widths * np.random.default_rng(number).standard_normal(10)
-        true = made.truth.theta
+        truth = made.truth
+        true = _pseudo_inertia(truth.mass, truth.center_of_mass, truth.inertia)
+        # Lengths in the triangle are relative to the body's size, as its logarithms are.
+        widths[4:7] = truth.size
+        near = true + 0.05 * widths * np.random.default_rng(number).standard_normal(10)
         begun = (("truth", true), ("near", near), ("ball", ball))
         for tool, begins, theta in ((OURS, *begun[2]), *((tool, *one) for one in begun for tool in FITS)):
             start = made.start if begins == "truth" else local_start(made.flight, made.flight.begin_ns)
             clock, cpu = time.perf_counter(), time.process_time()
             if tool == OURS:
-                found = identify([made.flight], known=Known(length=made.size)).estimate.values.theta
+                found = identify([made.flight], known=Known(length=made.size)).estimate.values
             else:
-                found = FITS[tool](made.flight, theta, start)
+                found = _with_body(truth, FITS[tool](made.flight, theta, start))
             seconds, cpu_seconds = time.perf_counter() - clock, time.process_time() - cpu
-            mass, true_mass = mp.mass_of(found).mass, made.truth.body.mass
+            mass, true_mass = found.mass, truth.mass
             row = {
                 "tool": tool,
                 "version": __version__ if tool == OURS else mujoco.__version__,

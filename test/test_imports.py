@@ -69,6 +69,7 @@ ALLOWED = {
     "websockets": ("workbench",),  # comes with viser
     "mcap": ("session.mcap_reading", "session.mcap_observer"),
     "zstandard": ("session.bag",),  # comes with mcap
+    "rosbags": ("identify.bag_reading",),
 }
 
 

@@ -33,7 +33,7 @@ SENSORS = ("pose", "twist", "odom", "imu", "wrench")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "sessions", nargs="+", metavar="SESSION", help="recordings made here (.rrd, .mcap), or any bags of rosbag2"
+        "sessions", nargs="+", metavar="SESSION", help="recordings made here (.rrd, .mcap), or any bags of ROS 2 or 1"
     )
     parser.add_argument("--mass", type=float, metavar="M", help="the mass [kg], where it is known")
     parser.add_argument(
@@ -135,7 +135,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
         if not path.exists():
             raise InputError("session", f"there is no file and no folder {name!r}")
         runs = []
-        if not choice.topics and (not is_bag(path) or has_scene(path)):
+        if not choice.topics and path.suffix != ".bag" and (not is_bag(path) or has_scene(path)):
             runs = [run for run in read_runs(path) if is_own_session(run)]
         if not runs:
             flights.append(bag_flight(path, choice))
@@ -161,28 +161,24 @@ def _known(args: argparse.Namespace, choice: Choice, scenes: list) -> tuple[Know
     """What is known beforehand, and the bodies that are to be compared with the motion."""
     import numpy as np
 
+    from ..identify.comparison import Candidate
     from ..identify.identification import GUESSED_RADIUS, Known
-    from ..identify.mass_parameters import parameters_of
 
     candidates: dict[str, Candidate] = {}
-    mass, theta, length = args.mass, None, GUESSED_RADIUS
+    mass, known, length = args.mass, None, GUESSED_RADIUS
     if args.mesh is not None:
         body = _mesh_body(args.mesh)
-        models = _models(body, args.mass, args.density)
-        candidates |= models
+        candidates |= _models(body, args.mass, args.density)
+        known = next(iter(candidates.values()))
         if args.density is not None:
-            mass = next(iter(models.values())).mass
-        best = next(iter(models.values()))
-        theta = parameters_of(best.mass, np.zeros(3), best.inertia)
-        points = body.vertices
-        length = 0.5 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+            mass = known.mass
+        length = 0.5 * float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
     elif scenes:
-        body = scenes[0].setup.body
-        length = scenes[0].setup.length
-        theta = parameters_of(body.mass, np.zeros(3), body.inertia)
+        setup = scenes[0].setup
+        known, length = Candidate(setup.body.mass, setup.body.inertia), setup.length
     if args.against is not None:
         candidates |= _inertials(Path(args.against))
-    return Known(mass, theta, length, choice.offsets), candidates
+    return Known(mass, known, length, choice.offsets), candidates
 
 
 def _mesh_body(part: str) -> MeshBody:

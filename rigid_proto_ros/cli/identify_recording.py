@@ -32,7 +32,7 @@ def record(
         raise InputError("--record", is_missing("rerun-sdk", "rerun")) from None
     from ..identify.report import as_text
 
-    com = found.estimate.mass.center_of_mass
+    com = found.estimate.values.center_of_mass
     given = [DrawnTensor(name, one.mass, com, one.inertia) for name, one in candidates.items()]
     if scenes:
         body = scenes[0].setup.body
@@ -45,7 +45,7 @@ def _found_tensor(found: Identification) -> list[DrawnTensor]:
     """Where the motion tells its shape at least; an ellipsoid's axes depend on the tensor for each kg."""
     from ..rerun_view.identification_picture import DrawnTensor
 
-    body = found.estimate.mass
+    body = found.estimate.values
     if any(one.value is None for one in found.shape):
         return []
     is_whole = found.mass.value is not None and all(one.value is not None for one in found.inertia)
@@ -61,7 +61,7 @@ def _mesh(
     """
     if mesh is not None:
         center = mesh.moments.mass_properties("solid", mass=1.0).center_of_mass if mesh.verdict.closed else 0.0
-        return mesh.vertices - center + found.estimate.mass.center_of_mass, mesh.triangles
+        return mesh.vertices - center + found.estimate.values.center_of_mass, mesh.triangles
     surface = scenes[0].setup.surface if scenes else None
     if surface is None:
         return None
@@ -70,29 +70,36 @@ def _mesh(
 
 
 def _tracked(found: Identification) -> list[TrackedFlight]:
-    from ..identify import measurements as ms
+    from ..identify import rotations as rot
     from ..identify.fitting import residuals_by_series
-    from ..identify.shooting import flown_poses
+    from ..identify.measurements import UNITS
+    from ..identify.shooting import flown
     from ..rerun_view.identification_picture import Residuals, TrackedFlight
 
-    estimate = found.estimate
-    left = residuals_by_series(estimate.segments, estimate.starts, estimate.values)
+    estimate, values = found.estimate, found.estimate.values
+    left = residuals_by_series(estimate.segments, estimate.starts, values)
     tracked = []
     for segment, start in zip(estimate.segments, estimate.starts, strict=True):
-        flight = segment.flight
-        attitude = next((one for one in flight.series if one.kind == ms.ATTITUDE), None)
-        topic = attitude.topic if attitude is not None else ""
-        position = next((one for one in flight.series if one.kind == ms.POSITION and one.topic == topic), None)
-        measured = [one.values if one is not None else np.zeros((0, 3)) for one in (position, attitude)]
-        times = attitude.times_ns - flight.begin_ns if attitude is not None else np.zeros(0, np.int64)
-        flown_ns, positions, attitudes = flown_poses(segment, start, estimate.values)
+        flight, motion = segment.flight, flown(segment, start, values)
+        assert flight.pose is not None and motion is not None
+        position, attitude = flight.pose
+        times, samples, _ = motion
+        turns = samples[:, 3:7]
         residuals = []
         for series in flight.series:
-            sigma = estimate.sigmas[id(series)]
-            title = f"{series.name}, 1 is {sigma:.3g} {ms.UNITS[series.kind]}"
+            sigma = estimate.sigmas[series.name]
+            title = f"{series.name}, 1 is {sigma:.3g} {UNITS[series.kind]}"
             residuals.append(Residuals(title, series.times_ns - flight.begin_ns, left[id(series)] / sigma))
-        since_begin = flown_ns + (segment.begin_ns - flight.begin_ns)
         tracked.append(
-            TrackedFlight(flight.name, times, measured[0], measured[1], since_begin, positions, attitudes, residuals)
+            TrackedFlight(
+                flight.name,
+                position.times_ns - flight.begin_ns,
+                position.values,
+                attitude.values,
+                times + (segment.begin_ns - flight.begin_ns),
+                samples[:, :3] - rot.turned(turns, values.center_of_mass),
+                turns,
+                residuals,
+            )
         )
     return tracked

@@ -1,38 +1,43 @@
 # SPDX-License-Identifier: MIT
-"""Anybody's bags as measured flights: which topics count, their messages as series, a wrench's as loads."""
+"""Anybody's bags as measured flights, read by rosbags: which topics count, their messages as series, a wrench's as
+loads.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..base.errors import CommandRefused, InputError
+from ..base.errors import CommandRefused, InputError, is_missing
 from ..base.rotation import vector
-from ..messages.measured_messages import MEASURED_TYPES, Stamped, read_measured
 from ..motion.frames import parse_frame
 from ..motion.loads import Load
-from ..session.bag import read_bag
-from ..session.mcap_reading import BagContent
 from . import measurements as ms
-from .session_reading import load_history
 
 WRENCH_TIMEOUT_NS = 1_500_000_000
 """A wrench holds until the next message, and at most as long as the node's own default."""
 EARTH = (0.0, 0.0, -9.81)
 
 TRANSFORMS = ("geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
-POSES = ("geometry_msgs/msg/PoseStamped", *TRANSFORMS)
 KINDS = {
-    "pose": POSES,
+    "pose": ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", *TRANSFORMS),
     "twist": ("geometry_msgs/msg/TwistStamped",),
     "odom": ("nav_msgs/msg/Odometry",),
     "imu": ("sensor_msgs/msg/Imu",),
     "wrench": ("geometry_msgs/msg/WrenchStamped",),
 }
 """Options, and the types of message that each takes."""
+
+STEADY = 0.5
+"""Gaps between messages that differ from the usual one by less than this part of it are of one rate."""
+FEWEST_SAMPLED = 20
+"""Messages of a wrench that is called sampled."""
+CHANGED, MOST_CHANGES = 0.1, 16
+"""A sampled load's change counts where it is more than this part of the largest force or torque, and so many do."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +54,24 @@ class Choice:
 
 
 @dataclass(frozen=True)
+class _Message:
+    """stamp_ns as its header says. numbers: the type's own, in its order; of an Imu its rate and its acceleration, NaN
+    where they aren't given.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    child_frame_id: str
+    numbers: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class _Topic:
     """name and the frame that stands behind it, or empty; messages in the order of their stamps."""
 
     name: str
     frame: str
-    message_type: str
-    messages: list[Stamped]
+    messages: list[_Message]
 
     @property
     def times_ns(self) -> np.ndarray:
@@ -67,86 +83,131 @@ class _Topic:
 
 def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     """What was measured in a bag; raises InputError naming the topic and what is wrong with it."""
-    content = read_bag(path, lambda _: True)
-    chosen = {kind: _read(content, *found) for kind, found in _chosen(content, choice.topics, str(path)).items()}
-    if not set(chosen) & {"pose", "odom", "imu", "twist"}:
-        known = ", ".join(f"{t} ({k})" for t, k in sorted(content.types.items())[:6]) or "nothing"
-        raise InputError("session", f"{path} has neither poses nor rates; it has {known}")
+    chosen = _chosen_topics(path, choice)
     _check_clocks(chosen, choice)
-    begin = min(int(topic.times_ns[0]) for topic in chosen.values() if topic.messages)
+    begin = min(int(topic.times_ns[0]) for topic in chosen.values())
     window = (begin + round(choice.first_s * 1e9), begin + round(min(choice.last_s, 1e9) * 1e9))
     series = [one for kind, topic in chosen.items() if kind != "wrench" for one in _series(kind, topic, chosen)]
-    series = [_within(one, window) for one in series]
-    series = [one for one in series if len(one.times_ns)]
+    series = [part for part in (one.within(*window) for one in series) if len(part.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
-    loads = _load_history(chosen["wrench"], chosen, choice) if "wrench" in chosen else ms.no_loads()
-    given = choice.gravity is not None
-    where = "from --gravity" if given else "assumed, as no --gravity was given"
+    loads = _load_history(chosen["wrench"], chosen) if "wrench" in chosen else ms.no_loads()
+    where = "assumed, as no --gravity was given" if choice.gravity is None else "from --gravity"
     return ms.MeasuredFlight(str(path), tuple(series), loads, choice.gravity or EARTH, gravity_from=where)
 
 
-def _chosen(content: BagContent, given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
+def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
+    """By option."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError("session", str(path), is_missing("rosbags", "identify")) from None
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as bag:
+            types = {one.topic: one.msgtype for one in bag.connections if one.msgcount}
+            chosen = _chosen(types, choice.topics, str(path))
+            names = {topic for topic, _ in chosen.values()}
+            found: dict[str, list[_Message]] = {name: [] for name in names}
+            connections = [one for one in bag.connections if one.topic in names]
+            for connection, logged_ns, data in bag.messages(connections):
+                message = bag.deserialize(data, connection.msgtype)
+                found[connection.topic] += _messages(connection.msgtype, message, logged_ns)
+    except InputError:
+        raise
+    except Exception as error:  # the library lets through whatever cut or damaged bytes lead to
+        accepted = f"a bag that rosbags can read ({error}); ros2 bag reindex mends one whose recorder was killed"
+        raise InputError("session", str(path), accepted) from None
+    return {kind: _topic(found[name], name, types[name], frame) for kind, (name, frame) in chosen.items()}
+
+
+def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
     """(topic, frame) by option: those given, else the only one of its types."""
-    found = {kind: _split(text, content, kind) for kind, text in given.items()}
-    if found:
-        return found
-    for kind, types in KINDS.items():
-        topics = sorted(topic for topic, its_type in content.types.items() if its_type in types)
-        topics = [topic for topic in topics if content.messages.get(topic)]
+    found = {}
+    for kind, text in given.items():
+        topic, _, frame = text.partition("@")
+        fitting = ", ".join(sorted(name for name, its_type in types.items() if its_type in KINDS[kind]))
+        if topic not in types:
+            raise InputError(f"--{kind}", topic, f"a topic of the bag: {fitting or 'it has none of such a type'}")
+        if types[topic] not in KINDS[kind]:
+            raise InputError(f"--{kind}", f"{topic}, a {types[topic]}", " or ".join(KINDS[kind]))
+        found[kind] = (topic, frame)
+    for kind, accepted in KINDS.items() if not given else ():
+        topics = sorted(topic for topic, its_type in types.items() if its_type in accepted)
         if len(topics) > 1:
-            raise InputError(
-                "session", f"{path} has several {kind} topics, {', '.join(topics)}; say which with --{kind}"
-            )
+            several = f"{path} has several {kind} topics, {', '.join(topics)}"
+            raise InputError("session", f"{several}; say which with --{kind}")
         if topics:
             found[kind] = (topics[0], "")
+    if not {"pose", "odom"} & set(found):
+        known = ", ".join(f"{t} ({k})" for t, k in sorted(types.items())[:6]) or "nothing"
+        raise InputError("session", f"{path} has no poses, transforms or odometry; it has {known}")
     return found
 
 
-def _split(text: str, content: BagContent, kind: str) -> tuple[str, str]:
-    topic, _, frame = text.partition("@")
-    if topic not in content.types:
-        fitting = sorted(t for t, its_type in content.types.items() if its_type in KINDS[kind])
-        raise InputError(
-            f"--{kind}", topic, f"a topic of the bag: {', '.join(fitting) or 'it has none of such a type'}"
+def _messages(message_type: str, message: Any, logged_ns: int) -> list[_Message]:
+    """What a message of one of KINDS holds: one, but any number in a TFMessage."""
+    if message_type == "tf2_msgs/msg/TFMessage":
+        return [one for part in message.transforms for one in _messages(TRANSFORMS[0], part, logged_ns)]
+    header, child = message.header, getattr(message, "child_frame_id", "")
+    if message_type == "nav_msgs/msg/Odometry":
+        numbers = (*_pose(message.pose.pose), *_pair(message.twist.twist.linear, message.twist.twist.angular))
+    elif message_type == TRANSFORMS[0]:
+        numbers = (
+            *_xyz(message.transform.translation),
+            *_xyz(message.transform.rotation),
+            message.transform.rotation.w,
         )
-    if content.types[topic] not in KINDS[kind]:
-        raise InputError(f"--{kind}", f"{topic}, a {content.types[topic]}", " or ".join(KINDS[kind]))
-    return topic, frame
+    elif message_type == "geometry_msgs/msg/TwistStamped":
+        numbers = _pair(message.twist.linear, message.twist.angular)
+    elif message_type == "geometry_msgs/msg/WrenchStamped":
+        numbers = _pair(message.wrench.force, message.wrench.torque)
+    elif message_type == "sensor_msgs/msg/Imu":
+        # A covariance that begins with -1 says that its quantity isn't measured (sensor_msgs/msg/Imu).
+        none = (np.nan, np.nan, np.nan)
+        rate = none if message.angular_velocity_covariance[0] == -1.0 else _xyz(message.angular_velocity)
+        felt = none if message.linear_acceleration_covariance[0] == -1.0 else _xyz(message.linear_acceleration)
+        numbers = (*rate, *felt)
+    else:
+        numbers = _pose(message.pose.pose if hasattr(message.pose, "covariance") else message.pose)
+    stamp_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+    return [_Message(stamp_ns or logged_ns, header.frame_id, child, numbers)]
 
 
-def _read(content: BagContent, topic: str, frame: str) -> _Topic:
-    message_type = content.types[topic]
-    assert message_type in MEASURED_TYPES
-    messages: list[Stamped] = []
-    for log_time, data in content.messages.get(topic, []):
-        for message in read_measured(message_type, data, topic):
-            if message.stamp_ns == 0:
-                message = Stamped(log_time, message.frame_id, message.child_frame_id, message.numbers)
-            messages.append(message)
+def _xyz(v: Any) -> tuple[float, float, float]:
+    return v.x, v.y, v.z
+
+
+def _pair(one: Any, other: Any) -> tuple[float, ...]:
+    return (*_xyz(one), *_xyz(other))
+
+
+def _pose(pose: Any) -> tuple[float, ...]:
+    return (*_pair(pose.position, pose.orientation), pose.orientation.w)
+
+
+def _topic(messages: list[_Message], name: str, message_type: str, frame: str) -> _Topic:
     if message_type in TRANSFORMS:
-        messages, frame = _one_transform(messages, topic, frame), ""
+        messages, frame = _one_transform(messages, name, frame), ""
     elif frame and message_type not in KINDS["twist"] + KINDS["wrench"]:
-        raise InputError(topic, f"{topic}@{frame}", f"{topic} alone, as a {message_type} has no choice of frames")
-    messages.sort(key=lambda message: message.stamp_ns)
+        raise InputError(name, f"{name}@{frame}", f"{name} alone, as a {message_type} has no choice of frames")
+    messages = sorted(messages, key=lambda message: message.stamp_ns)
     # Of messages with one stamp the first counts: a repeated one says nothing new.
     kept = [m for k, m in enumerate(messages) if k == 0 or m.stamp_ns != messages[k - 1].stamp_ns]
-    if not kept:
-        raise InputError(topic, "no messages in the bag")
     for message in kept:
-        if not np.isfinite(message.numbers).all():
+        if not np.isfinite(message.numbers).all() and message_type not in KINDS["imu"]:
             at = 1e-9 * (message.stamp_ns - kept[0].stamp_ns)
-            raise InputError(topic, f"the message {at:.6g} s after the first has a number that isn't finite")
-    return _Topic(topic, frame, message_type, kept)
+            raise InputError(name, f"the message {at:.6g} s after the first has a number that isn't finite")
+    return _Topic(name, frame, kept)
 
 
-def _one_transform(messages: list[Stamped], topic: str, child: str) -> list[Stamped]:
+def _one_transform(messages: list[_Message], topic: str, child: str) -> list[_Message]:
     children = sorted({message.child_frame_id for message in messages})
     if not child and len(children) > 1:
         raise InputError("--pose", topic, f"{topic}@CHILD with the frame of the body, one of {', '.join(children)}")
     if child and child not in children:
         raise InputError("--pose", f"{topic}@{child}", f"one of the frames {', '.join(children)}")
-    found = [message for message in messages if message.child_frame_id == (child or "".join(children[:1]))]
+    found = [message for message in messages if message.child_frame_id == (child or children[0])]
     parents = {message.frame_id for message in found}
     if len(parents) > 1:
         raise InputError(topic, f"{child or children[0]} has several parents, {', '.join(sorted(parents))}")
@@ -165,28 +226,23 @@ def _frames(chosen: dict[str, _Topic]) -> tuple[set[str], set[str]]:
 
 
 def _series(kind: str, topic: _Topic, chosen: dict[str, _Topic]) -> list[ms.Series]:
-    times, name = topic.times_ns, topic.name
-    if kind in ("pose", "odom"):
-        found = [
-            ms.Series(name, ms.POSITION, times, topic.numbers(0, 3)),
-            ms.Series(name, ms.ATTITUDE, times, _units(topic.numbers(3, 7), topic)),
-        ]
-        if kind == "odom":
-            found.append(ms.Series(name, ms.VELOCITY, times, topic.numbers(7, 10), in_body=True))
-            found.append(ms.Series(name, ms.RATE, times, topic.numbers(10, 13), in_body=True))
-        return found
+    def series(quantity: str, first: int, last: int, in_body: bool = False) -> ms.Series:
+        return ms.Series(topic.name, quantity, topic.times_ns, topic.numbers(first, last), in_body, kind == "imu")
+
+    if kind == "imu":
+        found = [series(ms.RATE, 0, 3, in_body=True), series(ms.ACCELERATION, 3, 6, in_body=True)]
+        given = [one for one in found if not np.isnan(one.values).all()]
+        for one in given:
+            if not np.isfinite(one.values).all():
+                raise InputError(topic.name, f"an {one.kind} that isn't finite")
+        return given
     if kind == "twist":
         in_body = _is_in_body(topic, chosen)
-        return [
-            ms.Series(name, ms.VELOCITY, times, topic.numbers(0, 3), in_body=in_body),
-            ms.Series(name, ms.RATE, times, topic.numbers(3, 6), in_body=in_body),
-        ]
-    _, rate, acceleration = topic.messages[0].numbers[10:13]
-    found = []
-    if rate:
-        found.append(ms.Series(name, ms.RATE, times, topic.numbers(4, 7), in_body=True, is_imu=True))
-    if acceleration:
-        found.append(ms.Series(name, ms.ACCELERATION, times, topic.numbers(7, 10), in_body=True, is_imu=True))
+        return [series(ms.VELOCITY, 0, 3, in_body), series(ms.RATE, 3, 6, in_body)]
+    attitude = series(ms.ATTITUDE, 3, 7)
+    found = [series(ms.POSITION, 0, 3), replace(attitude, values=_units(attitude.values, topic))]
+    if kind == "odom":
+        found += [series(ms.VELOCITY, 7, 10, in_body=True), series(ms.RATE, 10, 13, in_body=True)]
     return found
 
 
@@ -211,19 +267,9 @@ def _units(q: np.ndarray, topic: _Topic) -> np.ndarray:
     return q / size
 
 
-def _within(series: ms.Series, window: tuple[int, int]) -> ms.Series:
-    inside = slice(*np.searchsorted(series.times_ns, (window[0], window[1] + 1)))
-    return ms.Series(
-        series.topic, series.kind, series.times_ns[inside], series.values[inside], series.in_body, series.is_imu
-    )
-
-
 def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
-    spans = {t.name: (int(t.times_ns[0]), int(t.times_ns[-1])) for k, t in chosen.items() if k != "wrench"}
-    wrench = chosen.get("wrench")
-    if wrench is not None:
-        begin, end = (int(wrench.times_ns[k]) for k in (0, -1))
-        spans[wrench.name] = (begin, end + WRENCH_TIMEOUT_NS)
+    held = {kind: WRENCH_TIMEOUT_NS if kind == "wrench" else 0 for kind in chosen}
+    spans = {t.name: (int(t.times_ns[0]), int(t.times_ns[-1]) + held[kind]) for kind, t in chosen.items()}
     first, *others = spans.items()
     for name, (begin, end) in others:
         shift = round(1e9 * (choice.offsets.get(name, 0.0) - choice.offsets.get(first[0], 0.0)))
@@ -235,8 +281,55 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
             )
 
 
-def _load_history(topic: _Topic, chosen: dict[str, _Topic], choice: Choice) -> ms.LoadHistory:
+def _load_history(topic: _Topic, chosen: dict[str, _Topic]) -> ms.LoadHistory:
     """A wrench's messages, each held until the next; axes alone mean the origin of the tracked frame."""
+    axes, where = _wrench_frame(topic, chosen)
+    times, numbers = topic.times_ns, topic.numbers(0, 6)
+    acts, same = numbers.any(axis=1), np.append(False, np.all(numbers[1:] == numbers[:-1], axis=1))
+    begins, sds_s = _begins(times, acts)
+    ends = np.minimum(np.append(begins[1:], times[-1] + WRENCH_TIMEOUT_NS), times + WRENCH_TIMEOUT_NS)
+    rows: list[tuple[int, int, np.ndarray]] = []
+    before, which = np.full(len(times), -1), np.full(len(times), -1)
+    for k in range(len(times)):
+        before[k] = which[k - 1] if k and ends[k - 1] == begins[k] else -1
+        if not acts[k]:
+            continue
+        if same[k] and before[k] >= 0:
+            rows[-1] = (rows[-1][0], int(ends[k]), rows[-1][2])
+        else:
+            load = Load(axes, where, vector(numbers[k, :3]), vector(numbers[k, 3:]))
+            rows.append((int(begins[k]), int(ends[k]), load.row))
+        which[k] = len(rows) - 1
+    largest = np.maximum(
+        [np.linalg.norm(numbers[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6))], 1e-300
+    )
+    steps = np.diff(numbers, axis=0, prepend=numbers[:1])
+    sizes = np.linalg.norm(steps[:, :3], axis=1) / largest[0] + np.linalg.norm(steps[:, 3:], axis=1) / largest[1]
+    counted = np.argsort(-np.where(sds_s > 0.0, sizes, 0.0))[:MOST_CHANGES]
+    counted = np.sort(counted[(sizes[counted] > CHANGED) & (sds_s[counted] > 0.0)])
+    changes = ms.SampledChanges(before[counted], which[counted], sds_s[counted])
+    return replace(ms.load_history(rows), topic=topic.name, changes=changes)
+
+
+def _begins(times_ns: np.ndarray, acts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """When the loads of messages at times_ns (m,) begin (m,), and how well that is known (m,) [s].
+
+    A command acts from its stamp on. A wrench at a steady rate that is also sent while nothing acts was sampled: it
+    changed at any time since the message before, on average in the middle.
+    """
+    gaps = np.diff(times_ns)
+    if len(times_ns) < FEWEST_SAMPLED or not np.any(~acts[:-1] & acts[1:]):
+        return times_ns, np.zeros(len(times_ns))
+    usual = float(np.median(gaps))
+    steady = np.append(False, np.abs(gaps - usual) < STEADY * usual)
+    if steady.mean() < 0.5:
+        return times_ns, np.zeros(len(times_ns))
+    waited = np.where(steady, np.append(0, gaps), 0)
+    return times_ns - waited // 2, 1e-9 * waited / np.sqrt(12.0)
+
+
+def _wrench_frame(topic: _Topic, chosen: dict[str, _Topic]) -> tuple[str, tuple[float, float, float] | None]:
+    """Axes of a wrench, and where it acts in the tracked frame, None for the centre of mass."""
     worlds, bodies = _frames(chosen)
     text = topic.frame or topic.messages[0].frame_id
     axes, at, point = text.partition("@")
@@ -251,17 +344,7 @@ def _load_history(topic: _Topic, chosen: dict[str, _Topic], choice: Choice) -> m
         raise InputError("--wrench", f"{topic.name} in frame {text!r}", accepted) from None
     if frame.axes == "normal" or frame.point[0] not in ("com", "origin", "point") or frame.options:
         raise InputError("--wrench", text, "axes world or body, at com, origin or point/x,y,z")
-    where = {"com": None, "origin": (0.0, 0.0, 0.0)}.get(frame.point[0], frame.point[-1])
-    rows = []
-    times = (topic.times_ns + round(1e9 * choice.offsets.get(topic.name, 0.0))).tolist()
-    for number, message in enumerate(topic.messages):
-        if not any(message.numbers):
-            continue
-        until = times[number + 1] if number + 1 < len(times) else times[number] + WRENCH_TIMEOUT_NS
-        force, torque = vector(message.numbers[:3]), vector(message.numbers[3:])
-        until = min(until, times[number] + WRENCH_TIMEOUT_NS)
-        rows.append((times[number], until, Load(frame.axes, where, force, torque).row))
-    return load_history(rows)
+    return frame.axes, {"com": None, "origin": (0.0, 0.0, 0.0)}.get(frame.point[0], frame.point[-1])
 
 
 def given_offsets(words: Sequence[str]) -> dict[str, float]:

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..base.errors import InputError
-from . import mass_parameters as mp
-from .fitting import Estimate, fit_flights, topics_of
-from .measurements import MeasuredFlight
+from .fitting import Estimate, fit_flights
+from .measurements import MeasuredFlight, topics_of
 from .unknowns import make_unknowns
 
 CONTRADICTED = 1e-3
@@ -62,17 +61,16 @@ def compare(
     fixed = {True: [g for g in fit if g not in ("inertia", "mass")], False: [g for g in fit if g != "inertia"]}
     found = []
     for name, candidate in candidates.items():
-        theta = mp.parameters_of(candidate.mass, estimate.values.theta[mp.COM], candidate.inertia)
-        if not candidate.fixes_mass:
-            theta = mp.scaled(theta, estimate.mass.mass / candidate.mass, 1.0)
-        values = replace(estimate.values, theta=theta)
+        mass = candidate.mass if candidate.fixes_mass else estimate.values.mass
+        inertia = candidate.inertia * (mass / candidate.mass)
+        values = replace(estimate.values, mass=mass, inertia=inertia)
         try:
             unknowns = make_unknowns(fixed[candidate.fixes_mass], topics_of(flights))
             cost = fit_flights(flights, unknowns, values, known=estimate).cost
         except InputError as error:
             found.append(ModelComparison(name, -np.inf, 0, 0.0, 0.0, str(error)))
             continue
-        fewer = max(1, min(identified, len(estimate.unknowns.theta_columns)) - len(unknowns.theta_columns))
+        fewer = max(1, identified - unknowns.count("mass", "inertia", "com"))
         gain = max(cost - estimate.cost, 0.0)
         found.append(ModelComparison(name, -0.5 * gain, fewer, float(chi2.sf(gain, fewer)), 0.0))
     best = max((one.log_likelihood for one in found), default=0.0)

@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""The estimate: after the approach one segment for each flight, which uses all there is."""
+"""The fit: the initial estimate is improved on short segments, which converge from far, then on ever longer ones, until
+each flight is one segment.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import InputError
-from . import mass_parameters as mp
-from . import measurements as ms
 from . import shooting as sh
-from .approach import approached, spread
-from .fit_state import FitState, noise_left, residuals_of, segments_of, solved
-from .local_motion import noise_by_differences
-from .unknowns import Unknowns, Values
+from .initial_estimate import initial_values
+from .least_squares import SMALL_STEP, Problem, best_unknowns
+from .local_motion import high_rate, least_noise, local_start, noise_by_differences, spread
+from .measurements import MeasuredFlight
+from .psd_projection import is_possible, possible_step
+from .unknowns import Unknowns, Values, possible_tensor
 
+CANNOT_FLY = "the estimate can't be simulated"
 LEAST_NOISE = 1e-4
 """Part of what a series shows that is taken for noise at first: a simulated flight leaves nothing at the end."""
 HUBER = 1.5
@@ -25,41 +29,62 @@ HUBER = 1.5
 """
 WIDER = 8.0
 """Of steps of difference quotients: of what is rounding alone so much less is left."""
+OFFSET_MARGIN_S = 0.05
+"""The largest difference of two clocks that is looked for."""
+MOST_RIM_STEPS = 6
+ROUGH = 1e-3
+"""Tolerance of a stage that only leads on to the next one."""
+FIRST_ANGLES = (6.0, 3.0)
+"""Turn of the first segments [rad], of which the initial estimate's errors of some hundredths aren't much: the next one
+where the one before leaves more than noise.
+"""
+FITS = 2.0
+"""Residuals so many times what neighbouring samples say are no noise."""
+NEAR = 1e-3
+"""Part of what a series shows, or radians, within which a stage that leads on to the next one is near enough."""
+MOST_SEGMENTS = 40
+"""Of all flights together in the first stage."""
+FEWEST_SAMPLES = 6
+"""Of a segment in the first stage: a start has 12 numbers."""
+ENOUGH_SAMPLES, ENOUGH_IN_A_RADIAN = 300, 2.0
+"""Of a series until the last stage, or so many in a radian of its turn, where that is more."""
+LENGTHENING = (4.0, 2.0)
+"""Segments become so many times longer from stage to stage: the second where the first leaves more than noise."""
+GROWN = 1.5
+"""Residuals of longer segments so many times those of shorter ones are no noise."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """values: what came out. segments and starts (k, 13): one for each flight. sigmas: of each series by flight's
-    number and name.
+    """values: what came out. segments and starts: one for each flight. sigmas: of each series by its name.
 
     root (m, n): rootᵀ root is the Fisher information of the unknowns, the starts eliminated; root_wide by steps WIDER
-    times as long, which shows what of it is rounding. cost: sum of squares in standard deviations. evaluations: of the
-    residuals.
+    times as long, which shows what of it is rounding. cost: sum of squares in standard deviations.
     """
 
     values: Values
     unknowns: Unknowns
-    segments: list[sh.ShootingInterval]
-    starts: np.ndarray
-    sigmas: dict[int, float]
+    segments: list[sh.Segment]
+    starts: list[np.ndarray]
+    sigmas: dict[str, float]
     root: np.ndarray
     root_wide: np.ndarray
     cost: float
-    evaluations: int
 
-    @property
-    def mass(self) -> mp.MassEstimate:
-        """The body."""
-        return mp.mass_of(self.values.theta)
-
-
-def topics_of(flights: Sequence[ms.MeasuredFlight]) -> list[str]:
-    """All topics in their order."""
-    return list(dict.fromkeys(series.topic for flight in flights for series in flight.series))
+    def rise(self, change: np.ndarray) -> float:
+        """By how much the squares rise with the unknowns changed (n,), whatever the starts are then; without end for a
+        body that can't exist.
+        """
+        problem = Problem(self.segments, self.unknowns.moved(self.values, change), self.unknowns)
+        if not is_possible(problem.given.inertia):
+            return np.inf
+        none = np.zeros(len(change))
+        there = problem.linear(none, problem.settled(none, self.starts))
+        return np.inf if there is None else there.cost - self.cost
 
 
 def fit_flights(
-    flights: Sequence[ms.MeasuredFlight],
+    flights: Sequence[MeasuredFlight],
     unknowns: Unknowns,
     values: Values,
     robust: bool = False,
@@ -69,40 +94,168 @@ def fit_flights(
 
     known: an estimate of the same flights whose noise counts and whose starts are near.
     """
-    series = [one for flight in flights for one in flight.series]
-    noise = {id(one): max(noise_by_differences(one), LEAST_NOISE * spread(one)) for one in series}
-    ones = {id(one): np.ones(len(one.times_ns)) for one in series}
-    fit = FitState(flights, topics_of(flights), unknowns, values, dict(known.sigmas if known else noise), ones)
-    whole = 2.0 * max(flight.duration_s for flight in flights)
+    fit = _Fit(flights, unknowns, values)
     if known is not None:
-        segments = segments_of(fit, whole)
-        return _estimate(fit, segments, solved(fit, segments, known.starts, 30, 1e-7))
-    starts = approached(fit, whole)
-    fit.sigmas = noise_left(fit, segments_of(fit, whole), starts)
+        fit.sigmas = dict(known.sigmas)
+        segments = fit.cut(math.inf)
+        return _estimate(fit, segments, fit.improve(segments, known.starts, 30, 1e-7))
+    starts = _approached(fit)
+    fit.sigmas = fit.noise_left(fit.cut(math.inf), starts)
     for turn in range(4):
-        segments = segments_of(fit, whole)
-        starts = solved(fit, segments, starts, 60, 1e-7)
-        before = dict(fit.sigmas)
+        segments, before = fit.cut(math.inf), fit.sigmas
+        starts = fit.improve(segments, starts, 60, 1e-7)
         if robust:
             fit.weights = _huber_weights(fit, segments, starts)
-        fit.sigmas = noise_left(fit, segments, starts)
+        fit.sigmas = fit.noise_left(segments, starts)
         if all(abs(fit.sigmas[key] - before[key]) < 0.01 * before[key] for key in before) and (turn or not robust):
             break
-    return _estimate(fit, segments_of(fit, whole), starts)
+    return _estimate(fit, fit.cut(math.inf), starts)
+
+
+class _Fit:
+    """Values as far as they have come, the noise (by series' name) and the weights of samples (by series' ``id``)."""
+
+    def __init__(self, flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> None:
+        self.flights, self.unknowns, self.values = flights, unknowns, values
+        self.series = [one for flight in flights for one in flight.series]
+        self.sigmas = {one.name: max(noise_by_differences(one), LEAST_NOISE * spread(one)) for one in self.series}
+        self.weights = {id(one): np.ones(len(one.times_ns)) for one in self.series}
+        every = {}
+        for flight in flights:
+            enough = max(ENOUGH_SAMPLES, round(ENOUGH_IN_A_RADIAN * high_rate(flight) * flight.duration_s))
+            every.update({id(series): max(len(series.times_ns) // enough, 1) for series in flight.series})
+        self._every = every
+
+    def cut(self, length_s: float, is_thin: bool = False) -> list[sh.Segment]:
+        """Segments of about this length. is_thin: with as many samples as stages before the last one need."""
+        is_open = "offset" in self.unknowns
+        margin = OFFSET_MARGIN_S if is_open else max(0.0, -min(self.values.offsets.values(), default=0.0))
+        return sh.cut(
+            self.flights,
+            length_s,
+            lambda series: np.sqrt(self.weights[id(series)]) / self.sigmas[series.name],
+            margin,
+            lambda series: self._every[id(series)] if is_thin else 1,
+        )
+
+    def improve(
+        self, segments: Sequence[sh.Segment], starts: Sequence[np.ndarray], most: int, tolerance: float
+    ) -> list[np.ndarray]:
+        """Improve the values; returns the starts that go with them."""
+        problem = Problem(segments, self.values, self.unknowns)
+        found = best_unknowns(problem, starts, most, tolerance)
+        if found is None:
+            raise InputError("identify", CANNOT_FLY)
+        numbers, starts = found
+        self.values = problem.values(numbers)
+        is_inside = is_possible(self.values.inertia)
+        self.values = possible(self.values)
+        return starts if is_inside or tolerance > ROUGH else self._along_the_rim(segments, starts)
+
+    def _along_the_rim(self, segments: Sequence[sh.Segment], starts: list[np.ndarray]) -> list[np.ndarray]:
+        """Improve the values among the bodies that can exist, where the best of all tensors is none of these."""
+        first = self.unknowns.slots.index(("inertia", 0))
+        for _ in range(MOST_RIM_STEPS):
+            problem = Problem(segments, self.values, self.unknowns)
+            here = problem.linear(np.zeros(len(self.unknowns)), starts)
+            if here is None:
+                raise InputError("identify", CANNOT_FLY)
+            step = possible_step(here.jacobian, here.residuals, slice(first, first + 6), self.values.inertia)
+            self.values, starts = possible(problem.values(step)), here.starts_for(step)
+            if np.linalg.norm(here.jacobian @ step) < SMALL_STEP:
+                break
+        return starts
+
+    def noise_left(self, segments: Sequence[sh.Segment], starts: Sequence[np.ndarray]) -> dict[str, float]:
+        """Standard deviation of each series from its residuals; those of one topic and quantity share it over all
+        flights.
+        """
+        sums = {one.name: 0.0 for one in self.series}
+        counts = dict(sums)
+        for segment, start in zip(segments, starts, strict=True):
+            for piece, residual in zip(segment.pieces, residuals_of(segment, start, self.values), strict=True):
+                name, weights = piece.series.name, self.weights[id(piece.series)][piece.rows]
+                sums[name] += float((weights[:, None] * residual**2).sum())
+                counts[name] += 3.0 * float(weights.sum())
+        samples = 3 * sum(segment.samples for segment in segments)
+        left = max(1.0 - (sh.START * len(segments) + len(self.unknowns)) / samples, 0.1)
+        found = {}
+        for one in self.series:
+            found[one.name] = max(math.sqrt(sums[one.name] / (left * counts[one.name])), least_noise(one))
+        return found
+
+
+def possible(values: Values) -> Values:
+    """The same, with the nearest tensor on the rim of what can exist where it is outside."""
+    return replace(values, inertia=possible_tensor(values.inertia))
+
+
+def residuals_of(segment: sh.Segment, start: np.ndarray, values: Values) -> list[np.ndarray]:
+    """Measured minus shown of each piece (m, 3), in its own unit; raises InputError where it can't be flown."""
+    found = sh.segment_residuals(segment, start, values)
+    if found is None:
+        raise InputError("identify", CANNOT_FLY)
+    return found
 
 
 def residuals_by_series(
-    segments: Sequence[sh.ShootingInterval], starts: np.ndarray, values: Values
+    segments: Sequence[sh.Segment], starts: Sequence[np.ndarray], values: Values
 ) -> dict[int, np.ndarray]:
-    """Departures (n, 3) of each series in its own unit, by ``id``."""
-    parts: dict[int, list[np.ndarray]] = {}
-    for segment, start in zip(segments, starts, strict=True):
-        for piece, residual in zip(segment.pieces, residuals_of(segment, start, values), strict=True):
-            parts.setdefault(id(piece.series), []).append(residual)
-    return {key: np.concatenate(part) for key, part in parts.items()}
+    """Residuals (n, 3) of each series in its own unit, by ``id``, of segments that are whole flights."""
+    return {
+        id(piece.series): residual
+        for segment, start in zip(segments, starts, strict=True)
+        for piece, residual in zip(segment.pieces, residuals_of(segment, start, values), strict=True)
+    }
 
 
-def _huber_weights(fit: FitState, segments: Sequence[sh.ShootingInterval], starts: np.ndarray) -> dict[int, np.ndarray]:
+def _approached(fit: _Fit) -> list[np.ndarray]:
+    """Bring ``fit`` near the truth by ever longer segments; returns starts of whole flights."""
+    sigmas = fit.sigmas
+    initial = initial_values(fit.flights, fit.unknowns, fit.values)
+    near = {series.name: NEAR * spread(series) for series in fit.series}
+    for angle in FIRST_ANGLES:
+        fit.values, fit.sigmas = initial, sigmas
+        length = _first_length(fit.flights, angle)
+        segments = fit.cut(length, is_thin=True)
+        starts = _starts(segments)
+        starts = fit.improve(segments, starts, 12, 1e-2)
+        fit.sigmas = fit.noise_left(segments, starts)
+        if all(fit.sigmas[key] < max(FITS * sigmas[key], near[key]) for key in sigmas):
+            break
+    while len(segments) > len(fit.flights):
+        values, sigmas = fit.values, fit.sigmas
+        for factor in LENGTHENING:
+            fit.values, fit.sigmas = values, sigmas
+            longer = fit.cut(factor * length, is_thin=True)
+            joined = fit.improve(longer, _starts(longer, segments, starts), 12, 1e-2)
+            fit.sigmas = fit.noise_left(longer, joined)
+            if all(fit.sigmas[key] <= GROWN * max(sigmas[key], near[key]) for key in sigmas):
+                break
+        length, segments, starts = factor * length, longer, joined
+    return [segment.begin(start) for segment, start in zip(fit.cut(math.inf), starts, strict=True)]
+
+
+def _starts(
+    segments: Sequence[sh.Segment], before: Sequence[sh.Segment] = (), starts: Sequence[np.ndarray] = ()
+) -> list[np.ndarray]:
+    """Those of the segments before that begin at the same time, or what the samples nearby say."""
+    known = {(id(one.flight), one.begin_ns): start for one, start in zip(before, starts, strict=True)}
+    found = []
+    for one in segments:
+        start = known.get((id(one.flight), one.begin_ns))
+        found.append(one.begin(local_start(one.flight, one.begin_ns) if start is None else start))
+    return found
+
+
+def _first_length(flights: Sequence[MeasuredFlight], angle: float) -> float:
+    total = sum(flight.duration_s for flight in flights)
+    samples = sum(len(flight.pose[0].times_ns) for flight in flights if flight.pose is not None)
+    rate = max(high_rate(flight) for flight in flights)
+    return max(angle / max(rate, 1e-9), total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
+
+
+def _huber_weights(fit: _Fit, segments: Sequence[sh.Segment], starts: Sequence[np.ndarray]) -> dict[int, np.ndarray]:
     """1, or less for samples that lie too far off; too far is relative to the median size of the residuals."""
     weights = {}
     for key, part in residuals_by_series(segments, starts, fit.values).items():
@@ -113,18 +266,19 @@ def _huber_weights(fit: FitState, segments: Sequence[sh.ShootingInterval], start
     return weights
 
 
-def _estimate(fit: FitState, segments: list[sh.ShootingInterval], starts: np.ndarray) -> Estimate:
-    roots: dict[float, list[np.ndarray]] = {1.0: [], WIDER: []}
-    cost = 0.0
-    for wider, parts in roots.items():
-        variations = sh.Variations(fit.values, fit.unknowns.physical, wider=wider)
+def _estimate(fit: _Fit, segments: list[sh.Segment], starts: list[np.ndarray]) -> Estimate:
+    roots, cost = [], 0.0
+    for wider in (1.0, WIDER):
+        variations = sh.Variations(fit.unknowns, fit.values, wider=wider)
+        parts = []
         for segment, start in zip(segments, starts, strict=True):
-            flown = sh.linearized(segment, start, variations)
-            if flown is None:
-                raise InputError("identify", "the estimate can't be simulated; see --from and --to")
-            triangle = sh.compressed(flown)
+            columns = sh.linearized(segment, start, variations)
+            if columns is None:
+                raise InputError("identify", CANNOT_FLY)
+            triangle = sh.compressed(columns, segment, start, is_held=False)
             # Rows that are left when the start has taken all that it can.
-            parts.append(triangle[sh.START : -1, sh.START : -1])
-            cost += float(flown[-1] @ flown[-1]) if wider == 1.0 else 0.0
-    near, far = (np.concatenate(parts) for parts in roots.values())
-    return Estimate(fit.values, fit.unknowns, segments, starts, fit.sigmas, near, far, cost, fit.evaluations)
+            own = len(columns) - 1 - len(fit.unknowns)
+            parts.append(triangle[own:-1, own:-1])
+            cost += float(triangle[:, -1] @ triangle[:, -1]) if wider == 1.0 else 0.0
+        roots.append(np.concatenate(parts))
+    return Estimate(fit.values, fit.unknowns, segments, starts, fit.sigmas, roots[0], roots[1], cost)

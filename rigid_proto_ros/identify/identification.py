@@ -9,30 +9,28 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError
-from . import mass_parameters as mp
 from .comparison import Candidate, compare
-from .fitting import fit_flights, topics_of
-from .measurements import ACCELERATION, ATTITUDE, RATE, MeasuredFlight
-from .poses import FEWEST
+from .fitting import fit_flights
+from .measurements import ACCELERATION, MeasuredFlight, topics_of
 from .report import Identification
 from .residual_checks import check_residuals
-from .unknowns import DEFAULT_FIT, Values, make_unknowns
+from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability
 
 GUESSED_RADIUS = 0.1
 """Of the ball that stands for a body of which nothing is known [m]."""
+FEWEST = 8
+"""Poses of a flight."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """mass [kg] when it is known. theta: a body to start from, or None. length: of the body, by which an error of its
-    COM is large [m].
-
-    offsets [s]: given, by topic; damping: in place of the flights' own.
+    """mass [kg] when it is known. body: what stands for whatever isn't estimated, or None. length: of the body, by
+    which an error of its COM is large [m]. offsets [s]: given, by topic.
     """
 
     mass: float | None = None
-    theta: np.ndarray | None = None
+    body: Candidate | None = None
     length: float = GUESSED_RADIUS
     offsets: Mapping[str, float] = field(default_factory=dict)
 
@@ -46,59 +44,41 @@ def identify(
 ) -> Identification:
     """Mass properties of the body that flew in all of these flights; raises InputError."""
     known = known or Known()
-    _check_axes(flights)
-    _check_counts(flights)
-    topics = topics_of(flights)
-    theta = _first_guess(known)
+    _check(flights)
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
-    first = flights[0]
-    offsets = tuple(known.offsets.get(topic, 0.0) for topic in topics)
-    damping = np.array([first.linear_damping, first.angular_damping])
-    zero = np.zeros(3)
-    values = Values(theta, damping, np.array(first.gravity, float), offsets, zero, zero, zero)
-    unknowns = make_unknowns(fit, topics)
-    estimate = fit_flights(flights, unknowns, values, robust)
+    unknowns = make_unknowns(fit, topics_of(flights))
+    estimate = fit_flights(flights, unknowns, _first_values(flights[0], known), robust)
     identifiability = Identifiability(estimate, known.length)
     compared = []
     if candidates:
-        compared = compare(
-            flights, estimate, candidates, fit, identifiability.count_identified(len(unknowns.theta_columns))
-        )
-    given = {"mass": known.mass is not None or known.theta is not None}
-    guessed = frozenset(
-        name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.theta is not None)
-    )
+        body = unknowns.count("mass", "inertia", "com")
+        compared = compare(flights, estimate, candidates, fit, identifiability.count_identified(body))
+    given = {"mass": known.mass is not None or known.body is not None}
+    guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
     return Identification(flights, estimate, identifiability, checks, compared, _assumed(flights, known, fit), guessed)
 
 
-def _check_axes(flights: Sequence[MeasuredFlight]) -> None:
-    """Raises InputError where nothing says how the body's axes lie."""
+def _check(flights: Sequence[MeasuredFlight]) -> None:
+    """Raises InputError where a flight has no poses, or too few for its start and anything else."""
     for flight in flights:
-        rate = flight.first(RATE)
-        if rate is not None and flight.first(ATTITUDE) is None and flight.first(RATE, in_body=True) is None:
+        if flight.pose is None:
             raise InputError(
-                rate.topic,
-                f"{flight.name} has rates in world axes and no attitude, so the body's axes are unknown;"
-                " add attitudes by --pose or --odom, or give rates along the body's axes as TOPIC@body",
+                "session", f"{flight.name} has no positions with attitudes", "poses, transforms or odometry"
             )
+        count = len(flight.pose[0].times_ns)
+        if count < FEWEST:
+            raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
 
 
-def _check_counts(flights: Sequence[MeasuredFlight]) -> None:
-    """Raises InputError where a flight has too few samples for its start and anything else."""
-    for flight in flights:
-        most = max(len(one.times_ns) for one in flight.series)
-        if most < FEWEST:
-            raise InputError("session", f"{flight.name} has {most} samples", f"at least {FEWEST} of a pose or rate")
-
-
-def _first_guess(known: Known) -> np.ndarray:
-    mass = known.mass or 1.0
-    if known.theta is None:
-        return mp.parameters_of(mass, np.zeros(3), 0.4 * mass * GUESSED_RADIUS**2 * np.eye(3))
-    if known.mass is None:
-        return known.theta
-    return mp.scaled(known.theta, known.mass / mp.mass_of(known.theta).mass, 1.0)
+def _first_values(first: MeasuredFlight, known: Known) -> Values:
+    """What holds where nothing is estimated."""
+    mass, zero = known.mass or (known.body.mass if known.body is not None else 1.0), np.zeros(3)
+    inertia = 0.4 * mass * GUESSED_RADIUS**2 * np.eye(3)
+    if known.body is not None:
+        inertia = possible_tensor(known.body.inertia) * (mass / known.body.mass)
+    damping = np.array([first.linear_damping, first.angular_damping])
+    return Values(mass, zero, inertia, damping, np.array(first.gravity, float), known.offsets, zero, zero, zero)
 
 
 def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]) -> list[str]:

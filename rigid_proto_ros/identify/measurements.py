@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,16 +37,56 @@ class Series:
         """Topic and quantity."""
         return f"{self.topic} {self.kind}"
 
+    def within(self, first_ns: int, last_ns: int) -> Series:
+        """The samples between two times, both included."""
+        inside = slice(*np.searchsorted(self.times_ns, (first_ns, last_ns + 1)))
+        return replace(self, times_ns=self.times_ns[inside], values=self.values[inside])
+
+
+@dataclass(frozen=True)
+class SampledChanges:
+    """Where a load that was sampled at fixed times changed in between: before and after (e,) are the loads beside each
+    change, -1 for none, and sds_s (e,) [s] say how well its time is known.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    sds_s: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.sds_s)
+
+
+def no_changes() -> SampledChanges:
+    """Of loads whose times are exact."""
+    return SampledChanges(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
+
 
 @dataclass(frozen=True)
 class LoadHistory:
     """Loads that acted: begin_ns (c,), end_ns (c,), the same for an impulse, and loads (c, LOAD), points
-    in the tracked frame.
+    in the tracked frame. topic: whose clock these times are of, empty where they are exact.
     """
 
     begin_ns: np.ndarray
     end_ns: np.ndarray
     loads: np.ndarray
+    topic: str = ""
+    changes: SampledChanges = field(default_factory=no_changes)
+
+    def moved(self, offset_s: float, changes_s: np.ndarray) -> LoadHistory:
+        """All loads later by an offset, and the sampled changes (e,) by their own, or as they are for none (0,)."""
+        offset = round(1e9 * offset_s)
+        begin, end = self.begin_ns + offset, self.end_ns + offset
+        acts = np.ones(len(begin), bool)
+        if changes_s.any():
+            shifts = np.round(1e9 * changes_s).astype(np.int64)
+            had, has = self.changes.before >= 0, self.changes.after >= 0
+            end[self.changes.before[had]] += shifts[had]
+            begin[self.changes.after[has]] += shifts[has]
+            # One that ends before it begins is none, and no impulse either.
+            acts = (end > begin) | (self.begin_ns == self.end_ns)
+        return LoadHistory(begin[acts], end[acts], self.loads[acts])
 
     def within(self, first_ns: int, last_ns: int) -> Wrenches:
         """Those that act between two times, from the first on."""
@@ -58,9 +99,15 @@ class LoadHistory:
         return Wrenches(np.ascontiguousarray(commands, np.int64), np.ascontiguousarray(self.loads[acts][order]))
 
 
+def load_history(rows: Sequence[tuple[int, int, np.ndarray]]) -> LoadHistory:
+    """Of (begin [ns], end [ns], load (LOAD,))."""
+    begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
+    return LoadHistory(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
+
+
 def no_loads() -> LoadHistory:
     """Of a free flight."""
-    return LoadHistory(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, LOAD)))
+    return load_history([])
 
 
 @dataclass(frozen=True)
@@ -68,7 +115,7 @@ class MeasuredFlight:
     """One flight: where it is from, its series, the loads, gravity (3,) [m/s²] and damping [N s/m, N m s] as they are
     known.
 
-    gravity_from and damping_from say from where.
+    gravity_from says from where.
     """
 
     name: str
@@ -89,11 +136,24 @@ class MeasuredFlight:
         """The last sample of all."""
         return max(int(series.times_ns[-1]) for series in self.series)
 
-    def first(self, kind: str, in_body: bool = False) -> Series | None:
-        """The first series of a kind. in_body: along body axes alone."""
-        return next((one for one in self.series if one.kind == kind and (one.in_body or not in_body)), None)
-
     @property
     def duration_s(self) -> float:
         """From the first sample to the last [s]."""
         return 1e-9 * (self.end_ns - self.begin_ns)
+
+    @property
+    def pose(self) -> tuple[Series, Series] | None:
+        """Positions and attitudes of the first topic that has both, with the same times."""
+        for attitude in self.series:
+            for position in self.series:
+                if (attitude.kind, position.kind, position.topic) == (ATTITUDE, POSITION, attitude.topic):
+                    return position, attitude
+        return None
+
+
+def topics_of(flights: Sequence[MeasuredFlight]) -> list[str]:
+    """Topics whose clocks may differ, in their order: those of poses first, as theirs is taken as right."""
+    poses = [flight.pose[0].topic for flight in flights if flight.pose is not None]
+    sensors = [series.topic for flight in flights for series in flight.series]
+    loads = [flight.load_history.topic for flight in flights if flight.load_history.topic]
+    return list(dict.fromkeys([*poses, *sensors, *loads]))

@@ -12,16 +12,15 @@ from ..base.errors import InputError
 from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
-from . import mass_parameters as mp
 from .comparison import ModelComparison
 from .fitting import Estimate
 from .measurements import MeasuredFlight
 from .residual_checks import ResidualCheck, remarks
-from .unknowns import Values
+from .unknowns import DEFAULT_FIT, Values
 from .verdict import Identifiability, Quantity, Unidentified, summary
 
 MISFIT = "the residuals are larger than the noise, so the numbers may be farther off than their standard deviations say"
-OTHER_UNITS = {"gravity": "m/s²", "offsets": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
+OTHER_UNITS = {"gravity": "m/s²", "offset": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
 DAMPING_UNITS = ("N s/m", "N m s")
 TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -67,61 +66,61 @@ class Identification:
     @property
     def mass(self) -> Quantity:
         """[kg]."""
-        return Quantity(None, None) if "mass" in self.guessed else self._of(lambda body: body.mass)
+        return self._each(lambda values: np.array([values.mass]), 1, "mass")[0]
 
     @property
     def center_of_mass(self) -> list[Quantity]:
         """[m, tracked frame]."""
-        return self._each(lambda body: body.center_of_mass, 3, "com")
+        return self._each(lambda values: values.center_of_mass, 3, "com")
 
     @property
     def inertia(self) -> list[Quantity]:
         """ixx ixy ixz iyy iyz izz [kg m², about the COM, axes of the tracked frame]."""
-        return self._whole(lambda body: np.array(six_from_tensor(body.inertia)), 6)
+        return self._whole(lambda values: np.array(six_from_tensor(values.inertia)), 6)
 
     @property
     def shape(self) -> list[Quantity]:
         """The same divided by the tensor's trace."""
-        return self._whole(lambda body: np.array(six_from_tensor(body.inertia)) / np.trace(body.inertia), 6)
+        return self._whole(lambda values: np.array(six_from_tensor(values.inertia)) / np.trace(values.inertia), 6)
 
     @property
     def moments(self) -> list[Quantity]:
         """Principal moments, ascending [kg m²]."""
-        return self._whole(lambda body: principal_axes(body.inertia)[0], 3)
+        return self._whole(lambda values: principal_axes(values.inertia)[0], 3)
 
     @property
     def others(self) -> dict[str, Quantity]:
         """Whatever else was asked for, by name."""
         unknowns = self.estimate.unknowns
-        return {
-            unknowns.names[k]: self.identifiability.quantity(_reader(name, index))
-            for k, (name, index) in enumerate(unknowns.slots)
-            if name != "theta"
-        }
+        return {unknowns.name(k): self.identifiability.quantity(self._reader(k)) for k in self._other_slots}
 
     @property
     def units(self) -> dict[str, str]:
         """Of the others, by name."""
         unknowns = self.estimate.unknowns
-        return {
-            unknowns.names[k]: DAMPING_UNITS[index] if name == "damping" else OTHER_UNITS[name]
-            for k, (name, index) in enumerate(unknowns.slots)
-            if name != "theta"
-        }
+        found = {}
+        for k in self._other_slots:
+            group, index = unknowns.slots[k]
+            found[unknowns.name(k)] = DAMPING_UNITS[index] if group == "damping" else OTHER_UNITS[group]
+        return found
 
-    def _of(self, read: Callable[[mp.MassEstimate], float]) -> Quantity:
-        return self.identifiability.quantity(lambda values: read(values.body))
+    @property
+    def _other_slots(self) -> list[int]:
+        return [k for k, (group, _) in enumerate(self.estimate.unknowns.slots) if group not in DEFAULT_FIT]
 
-    def _each(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int, group: str) -> list[Quantity]:
+    def _reader(self, slot: int) -> Callable[[Values], float]:
+        return lambda values: self.estimate.unknowns.read(values, slot)
+
+    def _each(self, read: Callable[[Values], np.ndarray], count: int, group: str) -> list[Quantity]:
         if group in self.guessed:
             return [Quantity(None, None)] * count
 
         def one(k: int) -> Quantity:
-            return self._of(lambda body: float(read(body)[k]))
+            return self.identifiability.quantity(lambda values: float(read(values)[k]))
 
         return [one(k) for k in range(count)]
 
-    def _whole(self, read: Callable[[mp.MassEstimate], np.ndarray], count: int) -> list[Quantity]:
+    def _whole(self, read: Callable[[Values], np.ndarray], count: int) -> list[Quantity]:
         """All of them or none: an entry that happens to be 0 has the size of the others."""
         found = self._each(read, count, "inertia")
         return found if all(one.value is not None for one in found) else [Quantity(None, None)] * count
@@ -130,10 +129,6 @@ class Identification:
     def remarks(self) -> list[str]:
         """On the residuals."""
         return remarks(self.checks)
-
-
-def _reader(name: str, index: int) -> Callable[[Values], float]:
-    return lambda values: float(getattr(values, name)[index])
 
 
 def as_json(found: Identification) -> dict:
@@ -240,6 +235,6 @@ def as_urdf(found: Identification) -> str:
     parts = [found.mass, *found.center_of_mass, *found.inertia]
     if any(part.value is None for part in parts):
         raise InputError("--urdf", f"{found.verdict}; a URDF needs mass, centre of mass and tensor")
-    body = found.estimate.mass
+    body = found.estimate.values
     written = urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia))
     return written if found.fits else f"<!-- {MISFIT} -->\n{written}"

@@ -63,7 +63,7 @@ def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> li
     """Of every series of every flight."""
     found = residuals_by_series(estimate.segments, estimate.starts, estimate.values)
     return [
-        _check(flight, series, found[id(series)], estimate.sigmas[id(series)])
+        _check(flight, series, found[id(series)], estimate.sigmas[series.name])
         for flight in flights
         for series in flight.series
         if id(series) in found

@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
-from ..motion.loads import LOAD, Load, resolve_load
+from ..motion.loads import Load, resolve_load
 from ..scene.command_codec import command_of_event, frame_names
 from ..scene.scenario import Scenario
 from ..session.recorded_session import RecordedSession
@@ -16,7 +14,7 @@ from ..session.replay import session_scenario
 from ..session.runs import decode_event
 from ..simulation.commands import ClearWrench, WrenchCommand
 from ..simulation.setup import Setup
-from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, LoadHistory, MeasuredFlight, Series
+from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, LoadHistory, MeasuredFlight, Series, load_history
 
 
 def is_own_session(session: RecordedSession) -> bool:
@@ -45,7 +43,7 @@ def session_flight(
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
     frames = frame_names(scenario.parameters, session.node_name)
     loads = _load_history(session, setup, frames, name, end_ns)
-    series = [_cut(one, round(first_s * 1e9), end_ns) for one in _series(session)]
+    series = [one.within(round(first_s * 1e9), end_ns) for one in _series(session)]
     series = [one for one in series if len(one.times_ns)]
     if not series:
         raise InputError("--from", first_s, f"a time within {name}, which ends at {1e-9 * session.end_ns:g} s")
@@ -72,12 +70,6 @@ def _series(session: RecordedSession) -> list[Series]:
             found.append(Series(topic, VELOCITY, times, rows[:, first : first + 3], in_body=own))
             found.append(Series(topic, RATE, times, rows[:, first + 3 : first + 6], in_body=own))
     return found
-
-
-def _cut(series: Series, first_ns: int, last_ns: int) -> Series:
-    inside = slice(*np.searchsorted(series.times_ns, (first_ns, last_ns + 1)))
-    times, values = series.times_ns[inside], series.values[inside]
-    return Series(series.topic, series.kind, times, values, series.in_body, series.is_imu)
 
 
 def _load_history(
@@ -116,12 +108,6 @@ def _load_history(
     for wrench in held.values():
         _let_go(rows, wrench, end_ns, setup)
     return load_history(rows)
-
-
-def load_history(rows: Sequence[tuple[int, int, np.ndarray]]) -> LoadHistory:
-    """Of (begin, end, load)."""
-    begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
-    return LoadHistory(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
 
 
 def _let_go(rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray], time_ns: int, setup: Setup) -> None:

@@ -59,12 +59,6 @@ class Wrenches:
         """When loads begin and end, ascending."""
         return np.sort(np.concatenate([self.commands[:, 0], self.commands[:, 0] + self.commands[:, 1]]))
 
-    def is_near_edge(self, times_ns: np.ndarray, within_ns: int) -> np.ndarray:
-        """Whether a load begins or ends so near to each of the times (m,)."""
-        edges = self.edges_ns
-        after = np.searchsorted(edges, times_ns - within_ns)
-        return after < np.searchsorted(edges, times_ns + within_ns, side="right")
-
 
 @njit(cache=True, error_model="numpy")
 def _make_body(flown: np.ndarray, body: np.ndarray) -> bool:

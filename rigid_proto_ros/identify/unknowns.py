@@ -1,128 +1,175 @@
 # SPDX-License-Identifier: MIT
-"""What is estimated: the ten mass parameters, and on request damping, gravity, clock offsets, an IMU's
-place and biases.
+"""What is estimated: mass, centre of mass and tensor, and on request damping, gravity, clock offsets, an IMU's place
+and biases.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..base.errors import InputError
-from . import mass_parameters as mp
+from ..mass.tensor import principal_axes
 
-MASS_NAMES = ("alpha", "lambda", "e1", "e2", "s12", "s23", "s13", "t1", "t2", "t3")
 GROUPS = ("mass", "com", "inertia", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
 """What ``--fit`` takes."""
 DEFAULT_FIT = ("mass", "com", "inertia")
+STEP = 2e-6
+"""Of difference quotients, part of what counts as a large change: long flights bend so much that 1e-5 is too long for
+some, and 1e-7 leaves too little above rounding.
+"""
+THINNEST = 1e-9
+"""Least second moment of an estimate, of the largest: of none at all there may be a rod, whose least moment is 0."""
 
 
 @dataclass(frozen=True)
 class Values:
-    """theta (10,): mass_parameters.py. damping (2,): linear [N s/m], angular [N m s]. gravity (3,) [m/s²].
+    """mass [kg]; center_of_mass (3,) [m, tracked frame]; inertia (3, 3) [kg m², about the COM, axes of the tracked
+    frame]; damping (2,): linear [N s/m], angular [N m s]; gravity (3,) [m/s²].
 
-    offsets [s] by topic: a sample stamped t was taken at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²],
-    and imu_place (3,) [m, tracked frame] of the IMU.
+    offsets [s] by topic: what is stamped t happened at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²], and
+    imu_place (3,) [m, tracked frame] of the IMU.
     """
 
-    theta: np.ndarray
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
     damping: np.ndarray
     gravity: np.ndarray
-    offsets: tuple[float, ...]
+    offsets: Mapping[str, float]
     gyro_bias: np.ndarray
     accel_bias: np.ndarray
     imu_place: np.ndarray
-    tensor_change: np.ndarray = field(default_factory=lambda: np.zeros(6))
 
-    @cached_property
-    def body(self) -> mp.MassEstimate:
-        """The body that these say."""
-        body = mp.mass_of(self.theta)
-        return mp.changed_tensor(body, self.tensor_change) if self.tensor_change.any() else body
+    @property
+    def size(self) -> float:
+        """Radius of gyration [m]."""
+        return math.sqrt(float(np.trace(self.inertia) / self.mass))
+
+    def offset(self, topic: str) -> float:
+        """Of a topic's clock [s]."""
+        return float(self.offsets.get(topic, 0.0))
 
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Which numbers are free, in their order; topics: those whose clocks may differ, the first one keeps its own.
+    """Which numbers are free, in their order. slots: (group, index) of each; of ``offset`` the index is a topic."""
 
-    slots: (field of Values, index) for each; steps: for difference quotients.
-    """
-
-    slots: tuple[tuple[str, int], ...]
-    names: tuple[str, ...]
+    slots: tuple[tuple[str, Any], ...]
 
     def __len__(self) -> int:
         return len(self.slots)
 
-    @property
-    def theta_columns(self) -> list[tuple[int, int]]:
-        """(place among the unknowns, index in theta) of the mass parameters that are free."""
-        return [(k, index) for k, (name, index) in enumerate(self.slots) if name == "theta"]
+    def __contains__(self, group: str) -> bool:
+        return any(name == group for name, _ in self.slots)
 
-    @property
-    def physical(self) -> Unknowns:
-        """The same with the tensor itself for its parameters, which near the rim of what can exist hardly
-        change it any more.
+    def count(self, *groups: str) -> int:
+        """How many unknowns belong to these groups."""
+        return sum(name in groups for name, _ in self.slots)
+
+    def scales(self, values: Values) -> np.ndarray:
+        """What counts as a large change of each unknown."""
+        mass, size = values.mass, values.size
+        large = {"com": size, "damping": (10.0 * mass, 10.0 * mass * size**2 / 3.0)}
+        return np.array([_entry(large.get(group, 1.0), index) for group, index in self.slots])
+
+    def moved(self, values: Values, change: np.ndarray) -> Values:
+        """``values`` with the unknowns changed (n,): the mass by a factor e^change, the tensor as ``moved_tensor``
+        says, all others by what is added to them. Where the tensor isn't an unknown it grows with the mass.
         """
-        slots = [("tensor_change", i - 1) if n == "theta" and 1 <= i <= 6 else (n, i) for n, i in self.slots]
-        return Unknowns(tuple(slots), self.names)
-
-    def read(self, values: Values) -> np.ndarray:
-        """The free numbers of ``values``."""
-        return np.array([float(getattr(values, name)[index]) for name, index in self.slots])
-
-    def put(self, values: Values, numbers: np.ndarray) -> Values:
-        """``values`` with these for the free numbers."""
-        changed = {name: np.array(getattr(values, name), dtype=float) for name, _ in self.slots}
-        for (name, index), number in zip(self.slots, numbers, strict=True):
-            changed[name][index] = number
-        new: dict[str, Any] = dict(changed)
-        if "offsets" in changed:
-            new["offsets"] = tuple(changed["offsets"].tolist())
+        by_group: dict[str, dict[Any, float]] = {}
+        for (group, index), number in zip(self.slots, change.tolist(), strict=True):
+            by_group.setdefault(group, {})[index] = number
+        new: dict[str, Any] = {}
+        for group, numbers in by_group.items():
+            if group == "mass":
+                factor = math.exp(numbers[0])
+                new["mass"] = values.mass * factor
+                if "inertia" not in by_group:
+                    new["inertia"] = values.inertia * factor
+            elif group == "inertia":
+                new["inertia"] = moved_tensor(values.inertia, np.array(list(numbers.values())))
+            elif group == "offset":
+                new["offsets"] = {**values.offsets, **{t: values.offset(t) + s for t, s in numbers.items()}}
+            else:
+                name = "center_of_mass" if group == "com" else group
+                new[name] = getattr(values, name) + np.array(list(numbers.values()))
         return replace(values, **new)
 
-    def steps(self, values: Values) -> np.ndarray:
-        """Steps for difference quotients."""
-        theta = mp.difference_steps(values.theta)
-        mass = values.body
-        damping = 10.0 * mp.STEP * np.array([mass.mass, np.trace(mass.inertia) / 3.0])
-        given = {"theta": theta, "damping": damping}
-        return np.array([float(given[name][index]) if name in given else mp.STEP for name, index in self.slots])
+    def read(self, values: Values, slot: int) -> float:
+        """The number of an unknown other than mass and tensor."""
+        group, index = self.slots[slot]
+        return values.offset(index) if group == "offset" else float(getattr(values, group)[index])
+
+    def name(self, slot: int) -> str:
+        """Of an unknown other than mass, COM and tensor."""
+        group, index = self.slots[slot]
+        if group == "offset":
+            return f"offset of {index}"
+        return ("linear_damping", "angular_damping")[index] if group == "damping" else f"{group}.{'xyz'[index]}"
 
 
-NONE = Unknowns((), ())
+NONE = Unknowns(())
 """Nothing is free."""
+_SIZES = {
+    "mass": 1,
+    "inertia": 6,
+    "com": 3,
+    "damping": 2,
+    "gravity": 3,
+    "gyro_bias": 3,
+    "accel_bias": 3,
+    "imu_place": 3,
+}
+
+
+def _entry(large: float | tuple[float, ...], index: Any) -> float:
+    return large[index] if isinstance(large, tuple) else large
 
 
 def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
-    """Of the groups in ``fit``; raises InputError for one that isn't known."""
-    slots: list[tuple[str, int]] = []
-    names: list[str] = []
+    """Of the groups in ``fit``; topics: those whose clocks may differ, of which the first keeps its own. Raises
+    InputError for a group that isn't known.
+    """
     for group in fit:
         if group not in GROUPS:
             raise InputError("--fit", group, ", ".join(GROUPS))
-    if "mass" in fit:
-        slots.append(("theta", mp.MASS))
-    if "inertia" in fit:
-        slots += [("theta", k) for k in range(1, 7)]
-    if "com" in fit:
-        slots += [("theta", k) for k in range(7, 10)]
-    names += [MASS_NAMES[index] for _, index in slots]
-    if "damping" in fit:
-        slots += [("damping", 0), ("damping", 1)]
-        names += ["linear_damping", "angular_damping"]
-    if "offset" in fit:
-        # All clocks together say nothing but when the flight began: the first one is taken as right.
-        slots += [("offsets", k) for k in range(1, len(topics))]
-        names += [f"offset of {topic}" for topic in topics[1:]]
-    for group in ("gravity", "gyro_bias", "accel_bias", "imu_place"):
+    slots: list[tuple[str, Any]] = []
+    for group in ("mass", "inertia", "com", "damping", "offset", "gravity", "gyro_bias", "accel_bias", "imu_place"):
         if group in fit:
-            slots += [(group, k) for k in range(3)]
-            names += [f"{group}.{axis}" for axis in "xyz"]
+            # All clocks together say nothing but when the flight began: the first one is taken as right.
+            slots += [(group, index) for index in (topics[1:] if group == "offset" else range(_SIZES.get(group, 3)))]
     if not slots:
-        raise InputError("--fit", "", ", ".join(GROUPS))
-    return Unknowns(tuple(slots), tuple(names))
+        raise InputError("--fit", ",".join(fit), ", ".join(GROUPS) + "; an offset needs a second topic")
+    return Unknowns(tuple(slots))
+
+
+def moved_tensor(inertia: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """A tensor (3, 3) changed (6,) in its own principal axes, each entry by the root of its two moments: the trace's
+    third, the last moment less the mean of the others, the second less the first, and products 23, 13, 12.
+    """
+    moments, axes = principal_axes(inertia)
+    size, ratio, smaller, turn23, turn13, turn12 = change.tolist()
+    a, b, c = size - ratio / 3.0 - 0.5 * smaller, size - ratio / 3.0 + 0.5 * smaller, size + 2.0 * ratio / 3.0
+    relative = np.array([[a, turn12, turn13], [turn12, b, turn23], [turn13, turn23, c]])
+    moved = inertia + axes @ (relative * np.sqrt(np.outer(moments, moments))) @ axes.T
+    return 0.5 * (moved + moved.T)
+
+
+def second_moments(inertia: np.ndarray) -> np.ndarray:
+    """∫ x xᵀ dm (3, 3) [kg m²] of a tensor: a body can have it where none of its eigenvalues is below 0."""
+    return 0.5 * np.trace(inertia) * np.eye(3) - inertia
+
+
+def possible_tensor(inertia: np.ndarray, thinnest: float = THINNEST) -> np.ndarray:
+    """The nearest tensor of a body whose least second moment is at least ``thinnest`` of the largest."""
+    values, axes = np.linalg.eigh(second_moments(inertia))
+    least = thinnest * np.abs(values).max()
+    if values[0] >= least:
+        return inertia
+    second = (axes * np.maximum(values, least)) @ axes.T
+    return np.trace(second) * np.eye(3) - second

@@ -9,10 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from . import mass_parameters as mp
+from ..mass.tensor import principal_axes
 from .fitting import Estimate
-from .unknowns import Unknowns, Values
-from .variable_projection import Problem
+from .unknowns import STEP, Unknowns, Values
 
 MOST_RELATIVE = 0.5
 """A standard deviation of more than half of the quantity itself says nothing: neither the number nor its
@@ -41,7 +40,16 @@ _REMEDIES = {
     "size of the tensor": f"{POKE}, or a known torque",
     "mass, tensor and damping by one factor": f"{POKE}, or --mass",
 }
-UNITS = {"damping": 1.0, "gravity": 1.0, "offsets": 0.01, "gyro_bias": 0.1, "accel_bias": 1.0, "imu_place": 0.1}
+COORDINATES = {
+    "mass": ("mass",),
+    "inertia": (
+        *("size of the tensor", "ratio of the largest moment to the others", "ratio of the two smaller moments"),
+        *("turn of axes 2 and 3", "turn of axes 1 and 3", "turn of axes 1 and 2"),
+    ),
+    "com": ("centre of mass along x", "centre of mass along y", "centre of mass along z"),
+}
+"""Axes 1, 2, 3 are those of the moments, ascending; x, y, z those of the tracked frame."""
+UNITS = {"damping": 1.0, "gravity": 1.0, "offset": 0.01, "gyro_bias": 0.1, "accel_bias": 1.0, "imu_place": 0.1}
 """Of what a standard deviation is to be small for it to be identified: N s/m and N m s by the body's own, m/s²,
 s, rad/s, m/s², m.
 """
@@ -64,25 +72,23 @@ class Quantity:
 
 
 class Identifiability:
-    """Which directions of the unknowns the flights identify, in coordinates in which 1 is a large change:
-    (``mass_parameters.COORDINATES``, then the others).
-    """
+    """Which directions of the unknowns the flights identify, in coordinates in which 1 is a large change."""
 
     def __init__(self, estimate: Estimate, length: float) -> None:
         """length: by which an error of the centre of mass is called large [m]."""
-        self.unknowns, self.values = estimate.unknowns.physical, estimate.values
-        self.names, self._to_physical = _coordinates(estimate.unknowns, estimate.values, length)
-        back = np.linalg.inv(self._to_physical)
-        root = estimate.root @ back
+        self.unknowns, self.values = estimate.unknowns, estimate.values
+        self.names, self._units = _coordinates(estimate.unknowns, estimate.values, length)
+        root = estimate.root * self._units
         # Fewer rows than columns: the rest of the directions has no information at all.
         short = root.shape[1] - root.shape[0]
         root = np.vstack([root, np.zeros((max(short, 0), root.shape[1]))])
         _, self.roots, directions = np.linalg.svd(root, full_matrices=False)
         self._directions = directions.T
-        wide = np.linalg.norm(estimate.root_wide @ back @ self._directions, axis=0)
+        wide = np.linalg.norm((estimate.root_wide * self._units) @ self._directions, axis=0)
         self._unidentified = (self.roots < 1.0 / MOST_RELATIVE) | (wide < ROUNDING * self.roots)
         for k in np.flatnonzero(~self._unidentified & (self.sds > DOUBTED)):
-            self._unidentified[k] = not _is_confirmed(estimate, back @ self._directions[:, k], float(self.sds[k]))
+            far = min(TRIED * float(self.sds[k]), MOST_RELATIVE) * self._units * self._directions[:, k]
+            self._unidentified[k] = min(estimate.rise(far), estimate.rise(-far)) < LEAST_RISE
 
     @property
     def sds(self) -> np.ndarray:
@@ -116,10 +122,10 @@ class Identifiability:
         return named
 
     def _com_along_axes(self) -> list[tuple[str, np.ndarray]]:
-        if mp.COORDINATES[-1] not in self.names:
+        if "com" not in self.unknowns:
             return []
-        first = self.names.index(mp.COORDINATES[7])
-        _, axes = mp.principal(self.values.theta)
+        first = self.names.index(COORDINATES["com"][0])
+        _, axes = principal_axes(self.values.inertia)
         named = []
         for k in range(3):
             vector = np.zeros(len(self.names))
@@ -144,16 +150,12 @@ class Identifiability:
         """A function of the estimate with its standard deviation, or nothing where a direction that isn't
         identified changes it.
         """
-        base, steps = self.unknowns.read(self.values), self.unknowns.steps(self.values)
-        gradient = np.empty(len(base))
-        for k, step in enumerate(steps):
-            sides = []
-            for sign in (1.0, -1.0):
-                numbers = base.copy()
-                numbers[k] += sign * step
-                sides.append(of(self.unknowns.put(self.values, numbers)))
+        gradient = np.empty(len(self.unknowns))
+        for k, step in enumerate(STEP * self.unknowns.scales(self.values)):
+            change = step * np.eye(len(gradient))[k]
+            sides = [of(self.unknowns.moved(self.values, sign * change)) for sign in (1.0, -1.0)]
             gradient[k] = (sides[0] - sides[1]) / (2.0 * step)
-        along = self._directions.T @ np.linalg.solve(self._to_physical.T, gradient)
+        along = self._directions.T @ (self._units * gradient)
         size = float(np.linalg.norm(along))
         if np.any(np.abs(along[self._unidentified]) > LEAST_SHARE * size):
             return Quantity(None, None)
@@ -161,45 +163,16 @@ class Identifiability:
         return Quantity(float(of(self.values)), float(np.linalg.norm(along[good] / self.roots[good])))
 
 
-def _is_confirmed(estimate: Estimate, direction: np.ndarray, sd: float) -> bool:
-    """Whether the flights contradict a body far away along a direction of the physical unknowns, whatever
-    their starts were.
-    """
-    problem = Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
-    best = problem.residuals(problem.first)
-    for side in (1.0, -1.0):
-        tried = Problem(estimate.segments, estimate.starts, estimate.values, estimate.unknowns.physical)
-        there = tried.residuals(tried.first + side * min(TRIED * sd, MOST_RELATIVE) * direction)
-        if there @ there - best @ best < LEAST_RISE:
-            return False
-    return True
-
-
 def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], np.ndarray]:
-    """Names of the coordinates in which 1 is much, and their change with the (physical) unknowns (n, n)."""
-    body = values.body
-    names, matrix = [], np.zeros((len(unknowns), len(unknowns)))
-    for k, (name, index) in enumerate(unknowns.slots):
-        matrix[k, k] = 1.0
-        if name == "theta" and index == mp.MASS:
-            names.append(mp.COORDINATES[mp.MASS])
-            # The tensor for each kg stays: so its size grows with the mass.
-            matrix[k, k] = 2.0
-            for other, slot in enumerate(unknowns.slots):
-                if slot == ("tensor_change", 0):
-                    matrix[other, k] = 2.0
-        elif name == "theta":
-            names.append(mp.COORDINATES[index])
-            matrix[k, k] = 1.0 / length
-        elif name == "tensor_change":
-            names.append(mp.COORDINATES[1 + index])
-        else:
-            unit = UNITS[name]
-            if name == "damping":
-                unit = body.mass if index == 0 else float(np.trace(body.inertia)) / 3.0
-            names.append(unknowns.names[k].replace("_", " "))
-            matrix[k, k] = 1.0 / unit
-    return names, matrix
+    """Names of the unknowns, and what is much of each (n,)."""
+    names, units = [], []
+    for k, (group, index) in enumerate(unknowns.slots):
+        names.append(COORDINATES[group][index] if group in COORDINATES else unknowns.name(k).replace("_", " "))
+        unit = length if group == "com" else UNITS.get(group, 1.0)
+        if group == "damping":
+            unit = values.mass if index == 0 else float(np.trace(values.inertia)) / 3.0
+        units.append(unit)
+    return names, np.array(units)
 
 
 def _orthonormal(space: np.ndarray) -> np.ndarray:

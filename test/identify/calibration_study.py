@@ -16,16 +16,16 @@ import measured_flights as mf
 import numpy as np
 
 from rigid_proto_ros.base.bundled import body_names
-from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import shooting as sh
-from rigid_proto_ros.identify.fitting import Estimate, topics_of
+from rigid_proto_ros.identify.comparison import Candidate
+from rigid_proto_ros.identify.fitting import Estimate
 from rigid_proto_ros.identify.identification import Known, identify
-from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight
+from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, topics_of
 from rigid_proto_ros.identify.report import Identification
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, Values, make_unknowns
 from rigid_proto_ros.identify.verdict import Identifiability, Quantity
 from rigid_proto_ros.mass.from_mesh import mesh_body
-from rigid_proto_ros.mass.tensor import six_from_tensor
+from rigid_proto_ros.mass.tensor import principal_axes, six_from_tensor
 
 EARTH = (0.0, 0.0, -9.81)
 SIGMAS = dict(zip((POSITION, ATTITUDE, RATE, ACCELERATION), (*mf.MOCAP, *mf.PHONE), strict=True))
@@ -72,22 +72,24 @@ class MeasuredThrow:
 
     def bound(self) -> Estimate:
         """What nobody has: the truth, with its Fisher information."""
-        topics = topics_of([self.flight])
-        unknowns = make_unknowns(self.fit, topics)
-        [segment] = sh.cut([self.flight], 1e9, topics, lambda s: SIGMAS[s.kind], lambda s: np.ones(len(s.times_ns)))
-        linear = sh.linearized(segment, self.start, sh.Variations(self.truth, unknowns.physical))
-        assert linear is not None
-        root = sh.compressed(linear)[sh.START : -1, sh.START : -1]
-        return Estimate(self.truth, unknowns, [segment], self.start[None], {}, root, root, 0.0, 0)
+        unknowns = make_unknowns(self.fit, topics_of([self.flight]))
+        [segment] = sh.cut([self.flight], np.inf, lambda s: np.full(len(s.times_ns), 1.0 / SIGMAS[s.kind]))
+        columns = sh.linearized(segment, self.start, sh.Variations(unknowns, self.truth))
+        assert columns is not None
+        root = sh.compressed(columns, segment, self.start, is_held=False)[sh.START : -1, sh.START : -1]
+        return Estimate(self.truth, unknowns, [segment], [self.start], {}, root, root, 0.0)
 
-    def error(self, theta: np.ndarray) -> float:
+    def error(self, found: Values) -> float:
         """How far a body is from the truth, in standard deviations of the Cramér-Rao bound, root mean square of all ten
         directions.
         """
-        alike = self.truth.theta.copy()
-        alike[mp.MASS] = theta[mp.MASS]
-        change = np.array([theta[mp.MASS] - self.truth.theta[mp.MASS], *mf.physical_change(alike, theta)[1:]])
-        return float(np.linalg.norm(self.bound().root @ change) / np.sqrt(mp.PARAMETERS))
+        true = self.truth
+        moments, axes = principal_axes(true.inertia)
+        d = axes.T @ (found.inertia - true.inertia) @ axes / np.sqrt(np.outer(moments, moments))
+        a, b, c = np.diag(d)
+        tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, d[1, 2], d[0, 2], d[0, 1])
+        change = [np.log(found.mass / true.mass), *tensor, *(found.center_of_mass - true.center_of_mass)]
+        return float(np.linalg.norm(self.bound().root @ np.array(change)) / np.sqrt(10.0))
 
 
 def measured_throw(number: int, poked: bool, seconds: float = 2.0, phone: bool = False) -> MeasuredThrow:
@@ -99,8 +101,8 @@ def measured_throw(number: int, poked: bool, seconds: float = 2.0, phone: bool =
     start = mf.tumbling(rng.uniform(3.0, 8.0) * _direction(rng), rng.normal(0.0, 2.0, 3))
     load = None
     if poked:
-        mass = mp.mass_of(truth.theta).mass
-        point = tuple((truth.theta[mp.COM] + 0.6 * size * _direction(rng)).tolist())
+        mass = truth.mass
+        point = tuple((truth.center_of_mass + 0.6 * size * _direction(rng)).tolist())
         load = mf.load_history((0.4 * seconds, 0.05, "world", point, 20.0 * mass * _direction(rng), (0.0, 0.0, 0.0)))
     if not phone:
         return MeasuredThrow(number, name, truth, size, start, mf.mocap(truth, start, rng, seconds, load=load))
@@ -108,7 +110,7 @@ def measured_throw(number: int, poked: bool, seconds: float = 2.0, phone: bool =
     place = 0.5 * size * _direction(rng)
     flight = mf.with_imu(truth, start, rng, seconds, load, offset, place, biases)
     gyro, accel = (np.full(3, bias) for bias in biases)
-    truth = replace(truth, offsets=(0.0, offset), gyro_bias=gyro, accel_bias=accel, imu_place=place)
+    truth = replace(truth, offsets={"/imu": offset}, gyro_bias=gyro, accel_bias=accel, imu_place=place)
     return MeasuredThrow(number, name, truth, size, start, flight, PHONE_FIT)
 
 
@@ -116,7 +118,7 @@ def throw(number: int, poked: bool, first: str = "ball", phone: bool = False) ->
     """One throw, estimated. first: what the estimate begins with, ``ball`` or ``wrong``."""
     made = measured_throw(number, poked, phone=phone)
     begin = _first(first, made.truth, np.random.default_rng([number, 1]))
-    found = identify([made.flight], made.fit, Known(theta=begin, length=made.size))
+    found = identify([made.flight], made.fit, Known(body=begin, length=made.size))
     failed = any(
         check.noise > 1.5 * SIGMAS[one.kind] for check, one in zip(found.checks, made.flight.series, strict=True)
     )
@@ -142,15 +144,15 @@ def normalised_errors(found: Identification, truth: Values) -> np.ndarray:
 
 
 def _numbers(found: Identification, truth: Values) -> tuple[list[str], list[Quantity], list[float]]:
-    body = truth.body
-    six = np.array(six_from_tensor(body.inertia))
+    six = np.array(six_from_tensor(truth.inertia))
     tensor, names = found.inertia, ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
     if any(one.value is None for one in tensor):
-        tensor, six, names = found.shape, six / np.trace(body.inertia), [f"{name} of the trace" for name in names]
+        tensor, six, names = found.shape, six / np.trace(truth.inertia), [f"{name} of the trace" for name in names]
     told = [found.mass, *found.center_of_mass, *tensor, *found.others.values()]
-    others = [float(getattr(truth, name)[k]) for name, k in found.estimate.unknowns.slots if name != "theta"]
+    unknowns = found.estimate.unknowns
+    others = [unknowns.read(truth, k) for k, (name, _) in enumerate(unknowns.slots) if name not in DEFAULT_FIT]
     names = ["mass", "x", "y", "z", *names, *found.others]
-    return names, told, [body.mass, *body.center_of_mass, *six, *others]
+    return names, told, [truth.mass, *truth.center_of_mass, *six, *others]
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:
@@ -158,12 +160,11 @@ def _direction(rng: np.random.Generator) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def _first(first: str, truth: Values, rng: np.random.Generator) -> np.ndarray | None:
+def _first(first: str, truth: Values, rng: np.random.Generator) -> Candidate | None:
     if first == "ball":
         return None
-    mass = mp.mass_of(truth.theta)
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
-    return mp.parameters_of(100.0 * mass.mass, np.zeros(3), 100.0 * turn @ mass.inertia @ turn.T)
+    return Candidate(100.0 * truth.mass, 100.0 * turn @ truth.inertia @ turn.T)
 
 
 def has_phone(number: int) -> bool:

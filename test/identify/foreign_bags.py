@@ -5,15 +5,13 @@ jitter and clocks.
 
 from __future__ import annotations
 
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap_ros2.writer import Writer
-
-from rigid_proto_ros.session.bag import read_bag
+from mcap_ros2.writer import Writer as McapWriter
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 TIME = "builtin_interfaces/Time stamp\nstring frame_id\n"
 SEPARATOR = "=" * 80 + "\n"
@@ -113,7 +111,7 @@ def imu(time_ns: int, rate: Any, acceleration: Any) -> dict:
 def write(path: Path, topics: dict[str, tuple[str, list[tuple[int, dict]]]]) -> Path:
     """A bag of topics: type, and (time [ns], message) each."""
     with open(path, "wb") as stream:
-        writer = Writer(stream)
+        writer = McapWriter(stream)
         for topic, (message_type, messages) in topics.items():
             schema = writer.register_msgdef(message_type, definition(message_type))
             for number, (time_ns, message) in enumerate(messages):
@@ -123,55 +121,16 @@ def write(path: Path, topics: dict[str, tuple[str, list[tuple[int, dict]]]]) -> 
     return path
 
 
-def as_sqlite_folder(bag: Path, folder: Path, files: int = 1) -> Path:
-    """The same messages as ``ros2 bag record -s sqlite3`` would have kept them, split over some files."""
-    content = read_bag(bag, lambda _: True)
-    rows = sorted((time_ns, topic, data) for topic, found in content.messages.items() for time_ns, data in found)
-    folder.mkdir()
-    names = [f"{folder.name}_{number}.db3" for number in range(files)]
-    for number, name in enumerate(names):
-        with closing(sqlite3.connect(folder / name)) as made, made:
-            made.execute(
-                "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
-                " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)"
-            )
-            made.execute(
-                "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,"
-                " data BLOB NOT NULL)"
-            )
-            ids = {topic: k for k, topic in enumerate(content.types, 1)}
-            made.executemany(
-                "INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')",
-                [(ids[t], t, kind) for t, kind in content.types.items()],
-            )
-            own = rows[len(rows) * number // files : len(rows) * (number + 1) // files]
-            made.executemany(
-                "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)",
-                [(ids[t], at, d) for at, t, d in own],
-            )
-    _write_metadata(folder, "sqlite3", names)
+def as_folder(bag: Path, folder: Path, storage: StoragePlugin) -> Path:
+    """The same messages as ``ros2 bag record`` would have kept them in one of its storages."""
+    with AnyReader([bag]) as reader, Writer(folder, version=9, storage_plugin=storage) as writer:
+        made = {
+            one.id: writer.add_connection(one.topic, one.msgtype, typestore=reader.typestore)
+            for one in reader.connections
+        }
+        for connection, time_ns, data in reader.messages():
+            writer.write(made[connection.id], time_ns, data)
     return folder
-
-
-def as_mcap_folder(bag: Path, folder: Path) -> Path:
-    """The same bag as a folder of ``ros2 bag record -s mcap``."""
-    folder.mkdir()
-    name = f"{folder.name}_0.mcap"
-    (folder / name).write_bytes(bag.read_bytes())
-    _write_metadata(folder, "mcap", [name])
-    return folder
-
-
-def _write_metadata(folder: Path, storage: str, names: list[str]) -> None:
-    lines = [
-        "rosbag2_bagfile_information:",
-        "  version: 9",
-        f"  storage_identifier: {storage}",
-        "  relative_file_paths:",
-    ]
-    lines += [f"    - {name}" for name in names]
-    lines += ['  compression_format: ""', '  compression_mode: ""']
-    (folder / "metadata.yaml").write_text("\n".join(lines) + "\n")
 
 
 def keep(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -5,18 +5,13 @@ seeded generator.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import measurements as ms
 from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify import trajectories as tr
-from rigid_proto_ros.identify.mass_parameters import parameters_of
 from rigid_proto_ros.identify.unknowns import Values
-from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.motion.loads import Load
 
 MOCAP = (0.5e-3, np.radians(0.2))
@@ -25,35 +20,21 @@ PHONE = (0.005, 0.05)
 """Of a phone's rates [rad/s] and accelerations [m/s²] at 200 Hz, each component."""
 
 
-def physical_change(theta: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How far another body is from this one (10,), in the order of ``COORDINATES``.
-
-    The mass by its logarithm, the tensor's difference in this one's principal axes, each entry by the root of its two
-    moments, the COM in metres. Unlike angles of axes these stay regular where two moments agree.
-    """
-    this, that = mp.mass_of(theta), mp.mass_of(other)
-    moments, axes = principal_axes(this.inertia)
-    change = (axes.T @ (that.inertia - this.inertia) @ axes) / np.sqrt(np.outer(moments, moments))
-    a, b, c = np.diag(change)
-    tensor = ((a + b + c) / 3.0, c - 0.5 * (a + b), b - a, change[1, 2], change[0, 2], change[0, 1])
-    return np.array([math.log(that.mass / this.mass), *tensor, *(that.center_of_mass - this.center_of_mass)])
-
-
-def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0), topics=1) -> Values:
+def values_of(mass, com, inertia, gravity=(0.0, 0.0, 0.0), damping=(0.0, 0.0)) -> Values:
     """All that is known of a body."""
-    zero = np.zeros(3)
-    theta = parameters_of(mass, np.asarray(com, float), np.asarray(inertia, float))
-    return Values(theta, np.array(damping, float), np.array(gravity, float), (0.0,) * topics, zero, zero, zero)
+    com, inertia, damping, gravity = (np.array(one, float) for one in (com, inertia, damping, gravity))
+    return Values(mass, com, inertia, damping, gravity, {}, np.zeros(3), np.zeros(3), np.zeros(3))
 
 
 def load_history(*pokes) -> ms.LoadHistory:
     """Loads from (begin [s], duration [s] or 0 for an impulse, axes, point in the tracked frame or None,
     force, torque).
     """
-    begin = np.array([round(p[0] * 1e9) for p in pokes], np.int64)
-    end = begin + np.array([round(p[1] * 1e9) for p in pokes], np.int64)
-    loads = [Load(axes, point, tuple(force), tuple(torque)).row for _, _, axes, point, force, torque in pokes]
-    return ms.LoadHistory(begin, end, np.array(loads))
+    rows = []
+    for begin, duration, axes, point, force, torque in pokes:
+        row = Load(axes, point, tuple(force), tuple(torque)).row
+        rows.append((round(begin * 1e9), round(begin * 1e9) + round(duration * 1e9), row))
+    return ms.load_history(rows)
 
 
 def flown(values, start, times_s, load=None):
@@ -70,7 +51,7 @@ def mocap(
 ) -> ms.MeasuredFlight:
     """A flight whose pose was measured."""
     times, samples = flown(values, start, np.arange(0.0, seconds, 1.0 / rate), load)
-    com = values.theta[7:10]
+    com = values.center_of_mass
     position = samples[:, :3] - rot.turned(samples[:, 3:7], com) + noise[0] * rng.standard_normal((len(times), 3))
     attitude = rot.product(samples[:, 3:7], rot.exponential(noise[1] * rng.standard_normal((len(times), 3))))
     series = (ms.Series(topic, ms.POSITION, times, position), ms.Series(topic, ms.ATTITUDE, times, attitude))
@@ -96,7 +77,7 @@ def with_imu(
     flight = mocap(values, start, rng, seconds, load=load)
     times, samples = flown(values, start, np.arange(0.02, seconds - 0.05, 0.005) + offset_s, load)
     rate = samples[:, 10:13] + bias[0] + PHONE[0] * rng.standard_normal((len(times), 3))
-    arm = np.asarray(place) - values.theta[7:10]
+    arm = np.asarray(place) - values.center_of_mass
     w, angular = samples[:, 10:13], samples[:, 16:19]
     felt = samples[:, 13:16] + np.cross(angular, arm) + np.cross(w, np.cross(w, arm))
     felt = felt + bias[1] + PHONE[1] * rng.standard_normal(felt.shape)

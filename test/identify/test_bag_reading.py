@@ -9,6 +9,7 @@ import foreign_bags as fb
 import measured_flights as mf
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.identify import rotations as rot
@@ -23,8 +24,8 @@ EARTH = (0.0, 0.0, -9.81)
 FORCE, TORQUE = (0.3, 0.5, 2.0), (0.01, 0.0, 0.02)
 
 
-def _truth(topics: int = 1):
-    return mf.values_of(0.5, COM, INERTIA, EARTH, topics=topics)
+def _truth():
+    return mf.values_of(0.5, COM, INERTIA, EARTH)
 
 
 def _near(found: Identification, names: int = 10) -> None:
@@ -71,7 +72,7 @@ def test_odometry_with_gaps_and_jitter_beside_a_thruster_gives_the_body(tmp_path
 def test_tf_and_an_imu_with_another_clock_give_the_body_and_the_clocks_offset(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     messages, load = _thruster(rng, "base_link")
-    truth = _truth(2)
+    truth = _truth()
     flight = mf.with_imu(
         truth, mf.tumbling(), rng, 3.0, load, offset_s=0.013, place=(0.05, 0.0, 0.02), bias=(0.02, 0.1)
     )
@@ -134,26 +135,25 @@ def _poses(tmp_path: Path, count: int = 50, topic: str = "/pose", shift_s: float
     return fb.write(tmp_path / "bag.mcap", {topic: ("geometry_msgs/msg/PoseStamped", messages), **others})
 
 
-@pytest.mark.parametrize(
-    "folder_of",
-    [fb.as_mcap_folder, fb.as_sqlite_folder, lambda bag, folder: fb.as_sqlite_folder(bag, folder, files=3)],
-    ids=["mcap", "sqlite3", "sqlite3 split"],
-)
-def test_a_folder_of_rosbag2_says_what_the_bare_file_does(tmp_path: Path, folder_of) -> None:
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_a_folder_of_rosbag2_says_what_the_bare_file_does(tmp_path: Path, storage: StoragePlugin) -> None:
     bag = _poses(tmp_path)
-    bare, folder = bag_flight(bag, Choice()), bag_flight(folder_of(bag, tmp_path / "flown"), Choice())
+    bare, folder = bag_flight(bag, Choice()), bag_flight(fb.as_folder(bag, tmp_path / "flown", storage), Choice())
     assert [one.name for one in folder.series] == [one.name for one in bare.series]
     for one, other in zip(folder.series, bare.series, strict=True):
         assert np.array_equal(one.times_ns, other.times_ns)
         assert np.array_equal(one.values, other.values)
 
 
-def test_a_bare_db3_file_is_a_bag_and_a_broken_one_is_refused(tmp_path: Path) -> None:
-    [file] = fb.as_sqlite_folder(_poses(tmp_path), tmp_path / "flown").glob("*.db3")
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_a_bare_file_is_a_bag_and_a_broken_one_is_refused(tmp_path: Path, storage: StoragePlugin) -> None:
+    [file] = [
+        one for one in fb.as_folder(_poses(tmp_path), tmp_path / "flown", storage).iterdir() if one.suffix != ".yaml"
+    ]
     assert is_bag(file)
     assert len(bag_flight(file, Choice()).series[0].times_ns) == 50
     file.write_bytes(file.read_bytes()[:3000])
-    with pytest.raises(InputError, match="sqlite3 storage"):
+    with pytest.raises(InputError, match="a bag that rosbags can read"):
         bag_flight(file, Choice())
 
 
@@ -175,7 +175,7 @@ def test_a_bag_without_pose_or_rate_is_refused(tmp_path: Path) -> None:
     bag = fb.write(
         tmp_path / "bag.mcap", {"/w": ("geometry_msgs/msg/WrenchStamped", [(0, fb.wrench(0, FORCE, TORQUE, "body"))])}
     )
-    with pytest.raises(InputError, match="neither poses nor rates"):
+    with pytest.raises(InputError, match="has no poses, transforms or odometry"):
         bag_flight(bag, Choice())
 
 
@@ -199,8 +199,7 @@ def test_a_wrench_with_another_clock_is_refused_too(tmp_path: Path) -> None:
     bag = _poses(tmp_path, **{"/w": ("geometry_msgs/msg/WrenchStamped", late)})
     with pytest.raises(InputError, match="clocks: /w begins"):
         bag_flight(bag, Choice())
-    moved = bag_flight(bag, Choice(offsets={"/w": -100.0}))
-    assert moved.load_history.begin_ns[0] == moved.begin_ns
+    assert len(bag_flight(bag, Choice(offsets={"/w": -100.0})).load_history.loads) == 1
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -214,7 +213,7 @@ def test_too_few_samples_are_refused(tmp_path: Path, count: int) -> None:
     ("topics", "message"),
     [
         ({"pose": "/nothing"}, "a topic of the bag: /pose"),
-        ({"twist": "/pose"}, "geometry_msgs/msg/TwistStamped"),
+        ({"pose": "/pose", "twist": "/pose"}, "geometry_msgs/msg/TwistStamped"),
         ({"pose": "/pose@drone"}, "/pose alone, as a geometry_msgs/msg/PoseStamped has no choice of frames"),
         ({"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
     ],

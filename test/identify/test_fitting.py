@@ -10,47 +10,53 @@ import measured_flights as mf
 import numpy as np
 import pytest
 
-from rigid_proto_ros.identify import mass_parameters as mp
 from rigid_proto_ros.identify import shooting as sh
+from rigid_proto_ros.identify.comparison import Candidate
 from rigid_proto_ros.identify.identification import Known, identify
-from rigid_proto_ros.identify.mass_parameters import second_moments
-from rigid_proto_ros.identify.momentum_balance import balanced_values
-from rigid_proto_ros.identify.poses import poses_of
+from rigid_proto_ros.identify.initial_estimate import initial_values
+from rigid_proto_ros.identify.measurements import SampledChanges, Series, topics_of
 from rigid_proto_ros.identify.report import as_text
-from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, GROUPS, make_unknowns
+from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, GROUPS, STEP, make_unknowns, second_moments
 
 POKE = (0.5, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.5, 2.0), (0.0, 0.0, 0.01))
 
+CHANGES = SampledChanges(np.array([-1, 0]), np.array([0, -1]), np.array([1e-3, 1e-3]))
+"""When a single load begins and ends."""
 
-def _body(damping=(0.0, 0.0), topics: int = 1):
+
+def _ones(series: Series) -> np.ndarray:
+    return np.ones(len(series.times_ns))
+
+
+def _body(damping=(0.0, 0.0)):
     inertia = np.array([[2.0, 0.2, -0.1], [0.2, 3.0, 0.3], [-0.1, 0.3, 4.0]]) * 1e-3
-    return mf.values_of(0.5, (0.01, -0.02, 0.03), inertia, study.EARTH, damping, topics)
+    return mf.values_of(0.5, (0.01, -0.02, 0.03), inertia, study.EARTH, damping)
 
 
 def test_derivatives_agree_with_extrapolated_differences() -> None:
-    truth = _body((0.05, 1e-4), 2)
+    truth = _body((0.05, 1e-4))
     rng = np.random.default_rng(1)
     flight = mf.with_imu(truth, mf.tumbling(), rng, 1.0, mf.load_history((0.5013, *POKE[1:])))
-    topics = ["/mocap/pose", "/imu"]
-    [segment] = sh.cut([flight], 9.0, topics, lambda _: 1.0, lambda s: np.ones(len(s.times_ns)))
-    start = mf.tumbling()
-    unknowns = make_unknowns(GROUPS, topics)
-    jacobian = sh.linearized(segment, start, sh.Variations(truth, unknowns))[:-1].T
-    numbers, steps = unknowns.read(truth), np.maximum(50.0 * unknowns.steps(truth), 1e-5)
+    history = dataclasses.replace(flight.load_history, topic="/thrust", changes=CHANGES)
+    flight = dataclasses.replace(flight, load_history=history)
+    [segment] = sh.cut([flight], np.inf, _ones)
+    unknowns = make_unknowns(GROUPS, topics_of([flight]))
+    start, own = segment.begin(mf.tumbling()), sh.START + len(CHANGES)
+    jacobian = sh.linearized(segment, start, sh.Variations(unknowns, truth))[:-1].T
+    steps = np.maximum(50.0 * STEP * unknowns.scales(truth), 1e-5)
 
     def shown(k: int, h: float) -> np.ndarray:
-        change, other = np.zeros(sh.START), truth
-        if k < sh.START:
+        change, other = np.zeros(own), np.zeros(len(unknowns))
+        if k < own:
             change[k] = h
         else:
-            moved = numbers.copy()
-            moved[k - sh.START] += h
-            other = unknowns.put(truth, moved)
-        found = sh.segment_residuals(segment, sh.moved_starts(start[None], change[None])[0], other)
+            other[k - own] = h
+        moved = sh.moved_starts(start[None], change[None])[0]
+        found = sh.segment_residuals(segment, moved, unknowns.moved(truth, other))
         return np.concatenate([part.ravel() for part in found])
 
     for k in range(jacobian.shape[1]):
-        h = 1e-4 if k < sh.START else steps[k - sh.START]
+        h = 1e-4 if k < own else steps[k - own]
         wide, narrow = ((shown(k, x) - shown(k, -x)) / (2.0 * x) for x in (2.0 * h, h))
         expected = (4.0 * narrow - wide) / 3.0
         # Measured 2e-3 and less: a rotation vector bends by part of its noise.
@@ -58,7 +64,7 @@ def test_derivatives_agree_with_extrapolated_differences() -> None:
 
 
 def test_a_segment_without_samples_of_a_topic_says_nothing_about_its_clock() -> None:
-    truth = _body((0.05, 1e-4), 2)
+    truth = _body((0.05, 1e-4))
     flight = mf.with_imu(truth, mf.tumbling(), np.random.default_rng(1), 1.0, offset_s=0.2)
     late = [
         dataclasses.replace(series, times_ns=series.times_ns[100:], values=series.values[100:])
@@ -67,13 +73,18 @@ def test_a_segment_without_samples_of_a_topic_says_nothing_about_its_clock() -> 
         for series in flight.series
     ]
     flight = dataclasses.replace(flight, series=tuple(late))
-    topics = ["/mocap/pose", "/imu"]
-    segments = sh.cut([flight], 0.2, topics, lambda _: 1.0, lambda s: np.ones(len(s.times_ns)))
-    assert {piece.topic for piece in segments[0].pieces} == {0}
-    unknowns = make_unknowns(GROUPS, topics)
-    columns = sh.linearized(segments[0], mf.tumbling(), sh.Variations(truth, unknowns))
-    own = next(sh.START + k for k, (name, _) in enumerate(unknowns.slots) if name == "offsets")
-    assert not columns[own].any() and columns[: sh.START].any()
+    segments = sh.cut([flight], 0.2, _ones)
+    assert {piece.series.topic for piece in segments[0].pieces} == {"/mocap/pose"}
+    unknowns = make_unknowns(GROUPS, topics_of([flight]))
+    columns = sh.linearized(segments[0], mf.tumbling(), sh.Variations(unknowns, truth))
+    assert not columns[sh.START + unknowns.slots.index(("offset", "/imu"))].any() and columns[: sh.START].any()
+
+
+def test_an_imu_that_is_a_fifth_of_a_second_off_is_said_not_to_fit() -> None:
+    truth = _body()
+    flight = mf.with_imu(truth, mf.tumbling(), np.random.default_rng(1), 2.0, mf.load_history(POKE), offset_s=0.2)
+    found = identify([flight], study.PHONE_FIT)
+    assert not found.fits or abs(found.others["offset of /imu"].value - 0.2) < 4.0 * found.others["offset of /imu"].sd
 
 
 def test_a_poked_throw_tells_all_ten_parameters() -> None:
@@ -107,14 +118,11 @@ def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
 def test_the_balance_of_momentum_needs_no_guess_of_the_body() -> None:
     truth = _body((0.05, 0.0))
     flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 3.0, load=mf.load_history(POKE))
-    poses = poses_of(flight, {"/mocap/pose": 0.0}, truth)
-    assert poses is not None
     guess = mf.values_of(70.0, (1.0, 0.0, 0.0), np.eye(3), study.EARTH, (0.05, 0.0))
-    found = balanced_values([poses], make_unknowns(DEFAULT_FIT, ["/mocap/pose"]), guess)
-    body, true = found.body, truth.body
-    assert abs(body.mass - true.mass) < 0.01 * true.mass  # measured 0.002
-    assert np.abs(body.center_of_mass - true.center_of_mass).max() < 1e-3  # 4e-5
-    assert np.abs(body.inertia - true.inertia).max() < 0.03 * true.inertia.max()  # 0.008
+    found = initial_values([flight], make_unknowns(DEFAULT_FIT, ["/mocap/pose"]), guess)
+    assert abs(found.mass - truth.mass) < 0.01 * truth.mass  # measured 0.002
+    assert np.abs(found.center_of_mass - truth.center_of_mass).max() < 1e-3  # 4e-5
+    assert np.abs(found.inertia - truth.inertia).max() < 0.03 * truth.inertia.max()  # 0.008
 
 
 def test_a_sheet_of_no_thickness_ends_on_the_rim_of_what_can_exist() -> None:
@@ -123,7 +131,7 @@ def test_a_sheet_of_no_thickness_ends_on_the_rim_of_what_can_exist() -> None:
     for seed in range(3):
         flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(seed), 1.0, load=mf.load_history(POKE))
         found = identify([flight])
-        ends.append(np.linalg.eigvalsh(second_moments(found.estimate.mass.inertia))[0] / 3e-3)
+        ends.append(np.linalg.eigvalsh(second_moments(found.estimate.values.inertia))[0] / 3e-3)
         assert ends[-1] > -1e-12
         assert np.mean(study.normalised_errors(found, truth) ** 2) < 2.5
     assert min(ends) < 1e-8  # every other one would have less than no thickness
@@ -180,14 +188,14 @@ def test_outliers_are_said_and_robust_fits_withstand_them() -> None:
     position[rng.choice(len(position), 12, replace=False)] += rng.normal(0.0, 0.05, (12, 3))
     plain, robust = identify([flight]), identify([flight], robust=True)
     assert any("--robust" in remark for remark in plain.remarks)
-    error = [np.linalg.norm(one.estimate.mass.center_of_mass - truth.theta[mp.COM]) for one in (plain, robust)]
+    error = [np.linalg.norm(one.estimate.values.center_of_mass - truth.center_of_mass) for one in (plain, robust)]
     assert error[1] < 0.5 * error[0]
 
 
 def test_a_poke_that_is_not_in_the_recording_is_said() -> None:
     truth = _body()
     flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(5), 3.0, load=mf.load_history(POKE))
-    found = identify([mf.without_loads(flight)], known=Known(theta=truth.theta))
+    found = identify([mf.without_loads(flight)], known=Known(body=Candidate(truth.mass, truth.inertia)))
     assert any("wrong" in remark or "isn't in the bag" in remark for remark in found.remarks)
 
 

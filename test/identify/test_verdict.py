@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.identify.comparison import Candidate
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.report import as_json, as_text, as_urdf
 
@@ -63,7 +64,7 @@ def test_what_is_neither_asked_for_nor_given_is_no_number() -> None:
     assert all(one.value is not None for one in (*found.center_of_mass, *found.shape))
     bare = identify([flight], fit=("gravity",))
     assert all(one.value is None for one in (*bare.center_of_mass, *bare.inertia, *bare.shape, *bare.moments))
-    given = identify([flight], fit=("gravity",), known=Known(theta=truth.theta))
+    given = identify([flight], fit=("gravity",), known=Known(body=Candidate(truth.mass, truth.inertia)))
     assert given.mass.value == pytest.approx(0.5)
 
 

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Least squares among the tensors that a body can have: those whose second moments Σ have no eigenvalue below 0.
 
-Flat bodies lie at the rim of these, where log-Cholesky coordinates run off to -∞ and change nothing any more. So the
-steps are taken in the tensor itself, and only where they end outside is the rim held to, by Σ = S S with a symmetric S,
-which is regular there (Burer and Monteiro, Math. Program. 95, 2003).
+Flat bodies lie at the rim of these. So the steps are taken in the tensor itself, and only where they end outside is the
+rim held to, by Σ = S S with a symmetric S, which is regular there (Burer and Monteiro, Math. Program. 95, 2003).
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from . import mass_parameters as mp
+from .unknowns import moved_tensor, second_moments
 
 _ROWS, _COLUMNS = np.triu_indices(3)
 _UNITS = np.zeros((6, 3, 3))
@@ -20,17 +19,17 @@ _UNITS[np.arange(6), _ROWS, _COLUMNS] = _UNITS[np.arange(6), _COLUMNS, _ROWS] = 
 
 def is_possible(inertia: np.ndarray) -> bool:
     """Whether a body can have it, to rounding."""
-    values = np.linalg.eigvalsh(mp.second_moments(inertia))
+    values = np.linalg.eigvalsh(second_moments(inertia))
     return bool(values[0] >= -1e-12 * values[2])
 
 
 def possible_step(
-    jacobian: np.ndarray, residuals: np.ndarray, tensor_columns: slice, body: mp.MassEstimate
+    jacobian: np.ndarray, residuals: np.ndarray, tensor_columns: slice, inertia: np.ndarray
 ) -> np.ndarray:
     """The step (n,) with the least ``|jacobian step + residuals|`` that leads to a body that can exist.
 
-    tensor_columns: where the six numbers of ``mass_parameters.changed_tensor`` stand in it; they change ``body``, which
-    can exist.
+    tensor_columns: where the six numbers of ``unknowns.moved_tensor`` stand in it; they change ``inertia``, which a
+    body can have.
     """
     width = jacobian.shape[1]
     tensor = np.arange(width)[tensor_columns]
@@ -40,9 +39,9 @@ def possible_step(
     left, triangle = np.linalg.qr(jacobian[:, order])
     right = -(left.T @ residuals)
     own, aim = triangle[first:, first:], right[first:]
-    size = float(np.trace(body.inertia))
-    begin = mp.second_moments(body.inertia) / size
-    changes = [mp.second_moments(mp.changed_tensor(body, unit).inertia) / size - begin for unit in np.eye(6)]
+    size = float(np.trace(inertia))
+    begin = second_moments(inertia) / size
+    changes = [second_moments(moved_tensor(inertia, unit)) / size - begin for unit in np.eye(6)]
     of_second = np.linalg.inv(np.array(changes)[:, _ROWS, _COLUMNS].T)
 
     def change(root: np.ndarray) -> np.ndarray:

@@ -54,12 +54,12 @@ def _add_rows(triangle: np.ndarray, columns: np.ndarray) -> None:
                 other[k] += factor * below[k]
 
 
-def upper_triangle(columns: np.ndarray, diagonal: np.ndarray | None = None, slice_rows: int = 4096) -> np.ndarray:
-    """R (k, k) with RᵀR = AᵀA for a matrix A of k columns, given transposed: columns (k, m), any m. diagonal (k,):
-    A has a diagonal matrix of these above it.
+def upper_triangle(columns: np.ndarray, above: np.ndarray | None = None, slice_rows: int = 4096) -> np.ndarray:
+    """R (k, k) with RᵀR = AᵀA for a matrix A of k columns, given transposed: columns (k, m), any m. above (k, k): an
+    upper triangle that stands above A.
     """
     width, rows = columns.shape
-    triangle = np.zeros((width, width)) if diagonal is None else np.diag(diagonal)
+    triangle = np.zeros((width, width)) if above is None else np.array(above)
     for first in range(0, rows, slice_rows):
         _add_rows(triangle, np.array(columns[:, first : first + slice_rows], dtype=float, order="C"))
     return triangle
