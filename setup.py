@@ -82,7 +82,8 @@ setup(
         *((f"{SHARE}/{folder}", found) for folder in ("launch",) if (found := sorted(glob(f"{folder}/*.py")))),
     ],
     python_requires=">=3.11",
-    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0"],
+    # What inspect, simulate, replay and the page need: `uvx --from WHEEL rigid_proto workbench` works.
+    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", *MCAP, *WORKBENCH],
     extras_require={
         "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
         "ros": ROS,

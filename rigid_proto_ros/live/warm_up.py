@@ -98,7 +98,7 @@ class IntegratorsCompiling:
 
     def begin(self) -> None:
         """Start the process, where there is a second core for it."""
-        if len(os.sched_getaffinity(0)) < 2:
+        if hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) < 2:
             return
         self._process = subprocess.Popen(
             [sys.executable, "-m", "rigid_proto_ros.live.warm_up"],
