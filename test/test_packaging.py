@@ -6,6 +6,7 @@ import importlib.util
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -260,3 +261,39 @@ def test_pins_are_exact() -> None:
         lines = (SOURCE / "requirements" / name).read_text(encoding="utf-8").splitlines()
         pins = [line.split(";")[0].strip() for line in lines if line and not line.startswith("#")]
         assert pins and all("==" in pin for pin in pins)
+
+
+def test_recipe_and_citation_agree_with_the_package() -> None:
+    recipe = yaml.safe_load((SOURCE / "recipe" / "recipe.yaml").read_text("utf-8"))
+    citation = yaml.safe_load((SOURCE / "CITATION.cff").read_text("utf-8"))
+    assert recipe["context"]["version"] == citation["version"] == rigid_proto_ros.__version__
+    metadata = importlib.metadata.distribution("rigid_proto_ros")
+    scripts = {f"{e.name} = {e.value}" for e in metadata.entry_points if e.group == "console_scripts"}
+    assert set(recipe["build"]["python"]["entry_points"]) == scripts
+    needed = [Requirement(text) for text in metadata.requires or []]
+    asked = {r.name.lower(): r.specifier for r in map(Requirement, recipe["requirements"]["run"]) if r.name != "python"}
+    assert asked == {r.name.lower(): r.specifier for r in needed if "extra" not in str(r.marker)}
+
+
+@pytest.mark.stress
+def test_the_wheel_inspects_simulates_and_serves_the_page_in_an_empty_environment(
+    source_copy: Path, tmp_path: Path
+) -> None:
+    """With what PyPI gives, for this Python."""
+    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "-w", tmp_path, ".", cwd=source_copy)
+    (wheel,) = tmp_path.glob("*.whl")
+    run(sys.executable, "-m", "venv", tmp_path / "env", cwd=tmp_path)
+    run(tmp_path / "env/bin/python", "-m", "pip", "install", "--quiet", wheel, cwd=tmp_path)
+    rigid_proto = tmp_path / "env/bin/rigid_proto"
+    run(rigid_proto, "inspect", "hammer", "--verify", cwd=tmp_path)
+    run(rigid_proto, "simulate", "t_handle", "--duration", "1", "--bag", "flight.mcap", cwd=tmp_path)
+    run(rigid_proto, "replay", "flight.mcap", "--verify", cwd=tmp_path)
+    served = subprocess.Popen(
+        [rigid_proto, "workbench", "hammer", "--no-browser"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert any("The workbench is at" in line for line in served.stdout)
+    finally:
+        served.send_signal(signal.SIGINT)
+    # Ended by Ctrl-C.
+    assert served.wait(timeout=180.0) in (0, 130)
