@@ -33,13 +33,11 @@ from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
-from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
-from rigid_proto_ros.simulation import batch_body as bb
 from rigid_proto_ros.simulation import flight as fl
-from rigid_proto_ros.simulation.batch import Variants, fly_variants
+from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows
 from rigid_proto_ros.simulation.flight_arrays import _arrays
 from rigid_proto_ros.simulation.flight_measures import MEASURE
-from work_precision_ours import prepare_simulation, simulation_of
+from work_precision_ours import prepare_simulation, setup_of, simulation_of
 from work_precision_ratios import time_at_error
 
 TARGETS = (1e-6, 1e-8, 1e-10)
@@ -114,35 +112,32 @@ def sweep_runs(problem: Problem, accuracy: float):
     """ROWS rows by a sweep's compiled block, of which the first is the problem's and the others nearly so."""
     if problem.spring is not None:
         return None
-    settings = np.zeros((ROWS, bb.SETTINGS))
-    settings[:, bb.SCALE : bb.SCALE + 3] = 1.0
-    settings[:, bb.GIVEN_MASS] = problem.mass
-    settings[:, bb.GIVEN_TENSOR : bb.GIVEN_TENSOR + 6] = np.array(problem.inertia)[np.triu_indices(3)]
-    settings[:, bb.GRAVITY : bb.GRAVITY + 3] = problem.gravity
-    settings[:, bb.LINEAR_DAMPING], settings[:, bb.ANGULAR_DAMPING] = problem.linear_damping, problem.angular_damping
+    own = np.zeros(ROWS, ROW)
+    own["model"], own["scale"], own["explicit_inertia_mass"] = EXPLICIT, 1.0, problem.mass
+    own["explicit_inertia_tensor"] = np.array(problem.inertia)[np.triu_indices(3)]
+    own["gravity"], own["linear_damping"] = problem.gravity, problem.linear_damping
+    own["angular_damping"] = problem.angular_damping
     row = np.array(problem.row)
-    settings[:, bb.POSITION : bb.ANGULAR_VELOCITY] = row[:10]
-    settings[:, bb.ANGULAR_VELOCITY : bb.ANGULAR_VELOCITY + 3] = matrix_from_quaternion(row[3:7]) @ row[10:]
-    settings[:, bb.ANGULAR_VELOCITY : bb.ANGULAR_VELOCITY + 3] *= 1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS
-    settings[:, bb.ACCURACY] = accuracy
-    times, constants = np.zeros((1, bb.TIMES), np.int64), np.zeros(bb.CONSTANTS)
-    times[0, bb.STEP_NS], times[0, bb.POKE_NS], times[0, bb.DEGREE] = 1_000_000, 50_000_000, degree_for(accuracy)
-    constants[bb.GYROSCOPIC] = 1.0
-    commands = np.zeros((1, len(problem.wrenches), fl.COMMAND), np.int64)
-    rows = np.zeros((1, len(problem.wrenches), ld.LOAD))
-    for command, row, w in zip(commands[0], rows[0], problem.wrenches, strict=True):
-        kind = fl.IMPULSE if w.impulse else fl.HELD_WRENCH if w.end is None else fl.PULSE
-        lasts = -1 if w.end is None else round(w.end * 1e9) - round(w.begin * 1e9)
-        command[:] = round(w.begin * 1e9), lasts, kind, fl.UNNAMED_SLOT if kind == fl.HELD_WRENCH else fl.NO_SLOT
-        row[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
-        row[ld.HAS_POINT], row[ld.POINT : ld.POINT + 3] = 1.0, w.point
-        row[ld.FORCE : ld.FORCE + 3], row[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque
-    variants = Variants(settings, times, np.zeros((1, 0, 4)), constants, INTEGRATORS["auto"], commands, rows)
+    own["initial_position"], own["initial_orientation_xyzw"], own["initial_linear_velocity"] = np.split(
+        row, (3, 7, 10)
+    )[:3]
+    spin = matrix_from_quaternion(row[3:7]) @ row[10:]
+    own["initial_angular_velocity"] = spin * (1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS)
+    commands = np.zeros((1, len(problem.wrenches)), fl.LOAD_ROW)
+    for command, w in zip(commands[0], problem.wrenches, strict=True):
+        command.kind = fl.IMPULSE if w.impulse else fl.HELD_WRENCH if w.end is None else fl.PULSE
+        command.duration_ns = -1 if w.end is None else round(w.end * 1e9) - round(w.begin * 1e9)
+        command.slot = fl.UNNAMED_SLOT if command.kind == fl.HELD_WRENCH else fl.NO_SLOT
+        load, command.at_ns = command.load, round(w.begin * 1e9)
+        load[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
+        load[ld.HAS_POINT], load[ld.POINT : ld.POINT + 3] = 1.0, w.point
+        load[ld.FORCE : ld.FORCE + 3], load[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque
+    batch = Batch(own, np.zeros((0, 4)), setup_of(problem, "auto", 1e-3, accuracy), commands)
     looks = np.array([round(problem.duration * 1e9)]), np.ones(1, bool), np.zeros((0, 3)), np.zeros((0, MEASURE))
     found = {}
 
     def run():
-        found["results"] = fly_variants(variants, None, *looks)
+        found["results"] = fly_rows(batch, None, *looks)
 
     return run, lambda: found["results"].states[0], lambda: None
 

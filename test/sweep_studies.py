@@ -123,6 +123,43 @@ HUNG = {
 }
 """A string from the start, slack and taut."""
 
+TIED = {
+    "scene": "t_handle",
+    "script": [
+        {"t": 0.1, "string": {"target": [0.1, 0.0, 0.5]}},
+        {"t": 0.1, "at": "tip", "impulse": [0.0, 0.0, 0.01]},
+        {"t": 0.13, "string": {"target": [0.1, 0.1, 0.5]}},
+        {"t": 0.2, "thrusters": [0.05, 0.0, 0.02, 0.0]},
+        {"t": 0.23, "thrusters": [0.0, 0.01, 0.02, 0.0]},
+        {"t": 0.53, "string": {"attach": [0.0, 0.0, 0.0], "target": [0.0, 0.1, 0.4]}},
+        {"t": 0.53, "wrench": {"force": [0.01, 0.0, 0.0]}},
+        {"t": 0.6, "string": "release"},
+        {"t": 0.7, "service": "clear_wrench"},
+        {"t": 0.75, "thrusters": [0.01, 0.0, 0.02, 0.0]},
+        {"t": 0.8, "string": {"target": [0.0, 0.1, 0.4]}},
+        {"t": 0.83, "string": {"target": [0.1, 0.1, 0.4]}},
+    ],
+    "duration": 1.5,
+    "samples": 12,
+    "watch": 20,
+    "set": {
+        "gravity": [0, 0, -9.81],
+        "wrench_timeout": 0.2,
+        "thruster": {"minimum_on_time": 0.05},
+        "string": {"attach": [0.0, 0.0, 0.07], "timeout": 0.4, "frequency": 20.0, "rest_length": 0.1},
+    },
+    "vary": {
+        "mass": {"uniform": [0.1, 0.3]},
+        "string.frequency": {"uniform": [5.0, 60.0]},
+        "script.1.string.target": {"direction": 0.5},
+        "script.2.impulse.x": {"uniform": [0.0, 0.02]},
+        "script.11.string.target.x": {"uniform": [-0.3, 0.3]},
+        "initial.angular_velocity": {"direction": 4.0},
+    },
+    "measure": {"final": ["position", "orientation", "energy"], "max": ["potential_energy"], "min": ["energy"]},
+}
+"""A string tied, pulled, let go by command and timeout, tied elsewhere; thrusters by command and timeout."""
+
 HONEY = {
     **POKES,
     "samples": 6,

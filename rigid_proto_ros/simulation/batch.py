@@ -1,64 +1,123 @@
 # SPDX-License-Identifier: MIT
-"""A block of variations in one compiled call without the interpreter's lock: bodies, flights and their measures."""
+"""Rows of one scene in one compiled call without the interpreter's lock: bodies, flights and their measures.
+
+A row begins with the record of a setup's flight, filled with the numbers in which it differs, and is flown by the
+functions of simulation/flight.py. Every operation stands in the order in which a scene's setup and a simulation's
+commands do it, so the bits are theirs. Whatever is out of the ordinary (a bound, a doubtful tensor, a string that pulls
+too hard) gives no result: the caller then asks the simulation, which knows what to say.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numba import boolean, float64, from_dtype, int64, types
+from numpy.typing import NDArray
 
 from ..base.compilation import njit
+from ..base.exact_arithmetic import exact_quotient
+from ..base.records import record_type
+from ..base.rotation import Vector
 from ..base.simd import aligned
 from ..base.uncounted_arrays import copy_numbers, uncounted
-from ..motion.body import BODY, INERTIA, MASS
-from ..motion.integrators.integrator import Integrator
-from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
-from ..motion.integrators.taylor_adaptive import MAX_DEGREE
-from ..motion.loads import is_within_magnitude
-from ..motion.problem import begin_body
-from . import batch_body as b
+from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
+from ..mass.properties import SCALE_LIMITS
+from ..mass.tensor import principal_axes_kernel
+from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
+from ..motion.integrators.auto import FASTEST
+from ..motion.integrators.stepping import METHOD, provide_kernel
+from ..motion.loads import MAX_ACCELERATION, is_within_magnitude
+from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
+from ..motion.state import fill_initial_row
+from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 from . import flight as fl
-from .batch_body import make_body_row
 from .flight_measures import measure_flight
 from .quantities import CONTEXT, STATE, begin, which_is_met
+from .setup import Setup
+
+ROW = record_type(
+    [
+        # Parameters by name, dots as underscores: in these numbers rows of one batch may differ.
+        ("scale", np.float64, 3),
+        ("mass", np.float64),  # [kg], 0: the density decides
+        ("density", np.float64),  # [kg/m³]
+        ("explicit_inertia_mass", np.float64),  # [kg]
+        ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
+        ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
+        ("gravity", np.float64, 3),  # [m/s², world]
+        ("linear_damping", np.float64),  # [N s/m]
+        ("angular_damping", np.float64),  # [N m s]
+        ("initial_position", np.float64, 3),  # [m, world]
+        ("initial_orientation_xyzw", np.float64, 4),  # of any length
+        ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
+        ("initial_angular_velocity", np.float64, 3),  # [rad/s, world]
+        ("string_attach", np.float64, 3),  # [mesh coordinates]
+        ("string_target", np.float64, 3),  # [m, world]
+        ("string_stiffness", np.float64),  # [N/m]
+        ("string_frequency", np.float64),  # [rad/s], > 0 wins over the stiffness
+        ("string_damping_ratio", np.float64),
+        ("string_rest_length", np.float64),  # [m]
+        # The same in all rows of a batch: strings, then what of mesh and model doesn't change with the numbers above.
+        ("string_attached", np.bool_),  # at time 0
+        ("string_bilateral", np.bool_),
+        ("model", np.int64),  # EXPLICIT, ORDINARY or SHELL
+        ("solid_measure", np.float64),  # volume at unit scale; NaN when the surface bounds none
+        ("measure", np.float64),  # of the model: volume, area or number of points
+        ("reference", np.float64, 3),
+        ("center", np.float64, 3),
+        ("center_low", np.float64, 3),
+        ("second", np.float64, 6),
+        ("has_surface", np.bool_),
+        ("extent", np.float64, 3),  # of the bounding box
+    ]
+)
+NUMBERS: tuple[str, ...] = ROW.names[: ROW.names.index("string_attached")]  # type: ignore[index, union-attr]
+"""Fields in which rows of one batch may differ."""
+PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
+"""Fields that parameters give."""
+
+EXPLICIT, ORDINARY, SHELL = range(3)
+
+TIE, MOVE, UNTIE = range(fl.CLEAR + 1, fl.CLEAR + 4)
+"""Commands in a table of loads that act between two calls of the compiled flight. TIE: load holds the target (3,) [m,
+world], the knot (3,) [mesh coordinates] and whether that counts, or the row's own. MOVE: the target, which the free end
+reaches after duration_ns.
+"""
+
+CERTAIN = 0.999
+"""Of a limit: nearer to it the simulation decides."""
 
 
 @dataclass
-class Variants:
-    """Many variations of one scene. settings (n, SETTINGS), times (n, TIMES), ballast (n, k, 4), constants
-    (CONSTANTS,): simulation/batch_body.py. commands (n, c, COMMAND), loads (n, c, LOAD): simulation/flight.py and
-    motion/loads.py. Those alike in all have one row only.
+class Batch:
+    """rows (n,) ROW, ballast (k, 4) with masses [kg] above 0 and mesh coordinates, setup of the scene that they vary.
+    commands (n or 1, c) LOAD_ROW: in the order in which they act, those beyond a row's number at NEVER.
     """
 
-    settings: np.ndarray
-    times: np.ndarray
-    ballast: np.ndarray
-    constants: np.ndarray
-    integrator: Integrator
-    commands: np.ndarray
-    loads: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.settings)
+    rows: NDArray[np.void]
+    ballast: NDArray[np.float64]
+    setup: Setup
+    commands: NDArray[np.void]
 
     @property
-    def is_tied(self) -> bool:
-        """Whether a string is tied at time 0."""
-        return bool(self.constants[b.TIED])
+    def notes_floors(self) -> bool:
+        """Whether the integrator is held to an accuracy."""
+        return self.setup.integrator.chooses or self.setup.integrator.name == "free_body"
 
     @property
     def arrays(self) -> tuple:
-        """What the compiled call takes of it."""
-        ints = (self.times, self.commands)
-        floats = (self.settings, self.ballast, self.constants, self.loads)
-        return (
-            *map(np.ascontiguousarray, (*floats, *ints)),
-            self.integrator.chooses,
-            _methods(self.integrator, self.is_tied),
-        )
+        """What the compiled call takes of it, in the order of _BATCH."""
+        start = self.setup.flight_start
+        integrator = self.setup.integrator
+        strings = bool(self.rows["string_attached"].any() or (self.commands["kind"] >= TIE).any())
+        for number, method in enumerate(integrator.methods):
+            if strings or not method.on_string:
+                provide_kernel(integrator, start.methods, number)
+        return self.rows, self.ballast, start.flight, start.methods, np.ascontiguousarray(self.commands)
 
 
 @dataclass
@@ -68,12 +127,12 @@ class Results:
     accuracy (simulation/flight.py).
     """
 
-    status: np.ndarray
-    end_ns: np.ndarray
-    stop: np.ndarray
-    measured: np.ndarray
-    states: np.ndarray
-    floors: np.ndarray
+    status: NDArray[np.int64]
+    end_ns: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    measured: NDArray[np.float64]
+    states: NDArray[np.float64]
+    floors: NDArray[np.float64]
 
 
 def new_results(rows: int, measures: int) -> Results:
@@ -83,144 +142,292 @@ def new_results(rows: int, measures: int) -> Results:
     return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, state, floors)
 
 
-_VARIANTS = (
-    float64[:, ::1],  # settings
-    float64[:, :, ::1],  # ballast
-    float64[::1],  # constants
-    float64[:, :, ::1],  # loads
-    int64[:, ::1],  # times
-    int64[:, :, ::1],  # commands
-    boolean,  # the method is chosen by what a segment holds
-    from_dtype(METHOD)[:, ::1],  # methods by degree
-)
-_Flights = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool, np.ndarray]
-"""Arrays of a block, in the order of _VARIANTS."""
-_SAMPLING = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
-_RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])
+# A row's body
+
+_Made = tuple[float, np.ndarray, np.ndarray, Principal, bool]
+
+
+@njit(cache=True, error_model="numpy")
+def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
+    """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are plainly good."""
+    given = own.explicit_inertia_tensor
+    inertia = np.empty((3, 3))
+    inertia[0, 0], inertia[1, 1], inertia[2, 2] = given[0], given[3], given[5]
+    inertia[0, 1] = inertia[1, 0] = given[1]
+    inertia[0, 2] = inertia[2, 0] = given[2]
+    inertia[1, 2] = inertia[2, 1] = given[4]
+    mass = own.explicit_inertia_mass
+    good = 0.0 < mass < math.inf
+    # Without ballast the tensor that comes out is the one given.
+    if ballast.shape[0] > 0:
+        good = good and is_plainly_good(principal_axes_kernel(inertia)[0])
+    center = own.explicit_inertia_center_of_mass
+    total, com, gathered, principal, _, _ = given_mass(mass, center, inertia, own.scale, ballast)
+    return total, com, gathered, principal, good and is_plainly_good(principal[0])
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(own: np.record, ballast: np.ndarray) -> _Made:
+    """The same for a model whose mass is spread over a mesh."""
+    s, mass = own.scale, own.mass
+    if not mass > 0.0:
+        mass = own.density * own.solid_measure * abs(s[0] * s[1] * s[2])
+    left = s.copy()
+    uniform = True
+    if own.model == SHELL:
+        for k in range(3):
+            uniform = uniform and abs(s[k]) == abs(s[0])
+            left[k] = math.copysign(abs(s[0]), s[k])
+    total, com, inertia, principal, _, _ = spread_mass(
+        mass, own.measure, s, left, own.center, own.center_low, own.reference, own.second, ballast
+    )
+    return total, com, inertia, principal, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal[0])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
+    """Fill ``body`` (BODY,) from a row and ballast (k, 4); False when the simulation has to check it."""
+    s = own.scale
+    for k in range(3):
+        if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
+            return False
+    mass, com, inertia, principal, good = _explicit(own, ballast) if own.model == EXPLICIT else _spread(own, ballast)
+    if not good:
+        return False
+    diagonal = 0.0
+    for k in range(3):
+        com[k] = exact_quotient(com[k], s[k]) * s[k]
+        side = own.extent[k] * s[k]
+        diagonal += side * side
+    fill_body(mass, com, inertia, principal, s, body)
+    if own.has_surface:
+        body[LENGTH] = 0.5 * math.sqrt(diagonal)
+    return math.isfinite(body[MASS] + body[COM] + body[COM + 1] + body[COM + 2] + body[LENGTH])
+
+
+# A row's string
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _free_end(flight: np.record) -> Vector:
+    """Where the string's free end is now: three numbers [m, world]."""
+    string, begin_ns, end_ns = flight.string, flight.string_begin_ns, flight.string_end_ns
+    if flight.now_ns >= end_ns:
+        return string[TARGET], string[TARGET + 1], string[TARGET + 2]
+    elapsed, seconds = (flight.now_ns - begin_ns) * 1e-9, (end_ns - begin_ns) * 1e-9
+    return (
+        string[ORIGIN] + elapsed * ((string[TARGET] - string[ORIGIN]) / seconds),
+        string[ORIGIN + 1] + elapsed * ((string[TARGET + 1] - string[ORIGIN + 1]) / seconds),
+        string[ORIGIN + 2] + elapsed * ((string[TARGET + 2] - string[ORIGIN + 2]) / seconds),
+    )
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _span_to(flight: np.record, x: float, y: float, z: float) -> Vector:
+    """From a place x, y, z [m, world] to the knot: three numbers [m, world]."""
+    string = flight.string
+    rx, ry, rz = arm(flight.body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+    return span_of(rx, ry, rz, flight.row, x, y, z)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _string_energy(flight: np.record) -> float:
+    """Of the string now [J]; 0 where none is tied."""
+    if not flight.tied:
+        return 0.0
+    string = flight.string
+    return energy_of(_span_to(flight, *_free_end(flight)), string[K], string[REST], string[PUSHES] != 0.0)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _most_yielding(body: np.ndarray, x: float, y: float, z: float) -> float:
+    """A bound of 1/m_eff [1/kg] of the knot at x, y, z [mesh coordinates]."""
+    P, M = AXES, MOMENTS
+    rx, ry, rz = arm(body, x, y, z)
+    a = body[P] * rx + body[P + 3] * ry + body[P + 6] * rz
+    b = body[P + 1] * rx + body[P + 4] * ry + body[P + 7] * rz
+    c = body[P + 2] * rx + body[P + 5] * ry + body[P + 8] * rz
+    return most_yielding(body[MASS], body[M], body[M + 1], body[M + 2], a, b, c)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _tie(own: np.record, flight: np.record, knot: np.ndarray, target: np.ndarray) -> bool:
+    """Tie the string at ``knot`` (3,) [mesh coordinates] with its free end at ``target`` (3,) [m, world]; False when
+    its rates may be beyond what the integrator follows.
+    """
+    string, body = flight.string, flight.body
+    for k in range(3):
+        string[KNOT + k] = knot[k]
+        string[ORIGIN + k] = string[TARGET + k] = target[k]
+    stiffness, frequency, ratio = own.string_stiffness, own.string_frequency, own.string_damping_ratio
+    rest = own.string_rest_length
+    if flight.chooses:
+        yields = _most_yielding(body, knot[0], knot[1], knot[2])
+        # No point shows more than the whole mass.
+        largest, damping = spring_of(body[MASS], stiffness, frequency, ratio)
+        if math.sqrt(largest * yields) > CERTAIN * FASTEST or damping * yields > CERTAIN * FASTEST:
+            return False
+    rx, ry, rz = arm(body, knot[0], knot[1], knot[2])
+    span = _span_to(flight, target[0], target[1], target[2])
+    mass = effective_mass(body, rx, ry, rz, flight.row, span, rest)
+    string[K], string[C] = spring_of(mass, stiffness, frequency, ratio)
+    string[REST], string[PUSHES] = rest, 1.0 if own.string_bilateral else 0.0
+    flight.tied = True
+    flight.string_begin_ns = flight.string_end_ns = flight.now_ns
+    return True
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _pulls_within(flight: np.record, x: float, y: float, z: float) -> bool:
+    """Whether the string pulls with plainly less than MAX_ACCELERATION from a free end at x, y, z [m, world]."""
+    string = flight.string
+    yields = _most_yielding(flight.body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+    x, y, z = _span_to(flight, x, y, z)
+    return string[K] * yields * max(abs(x), abs(y), abs(z)) <= CERTAIN * MAX_ACCELERATION
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _act_on_string(own: np.record, flight: np.record, command: np.record) -> bool:
+    """Apply TIE, MOVE or UNTIE now; False when the simulation must say whether that can be."""
+    if command.kind == UNTIE:
+        flight.tied = False
+        return True
+    target = command.load[:3]
+    if command.kind == TIE:
+        knot = command.load[3:6] if command.load[6] != 0.0 else own.string_attach[:]
+        return _tie(own, flight, knot, target) and _pulls_within(flight, target[0], target[1], target[2])
+    x, y, z = _free_end(flight)
+    string = flight.string
+    string[ORIGIN], string[ORIGIN + 1], string[ORIGIN + 2] = x, y, z
+    for k in range(3):
+        string[TARGET + k] = target[k]
+    flight.string_begin_ns, flight.string_end_ns = flight.now_ns, flight.now_ns + command.duration_ns
+    return _pulls_within(flight, x, y, z) and _pulls_within(flight, target[0], target[1], target[2])
+
+
+# A row's flight
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
+    """Time 0 of a row, in a copy of its setup's flight; fills loads. False: the simulation must do it."""
+    body = flight.body
+    attitude, velocity, spin = own.initial_orientation_xyzw, own.initial_linear_velocity, own.initial_angular_velocity
+    if not _make_body(own, ballast, body):
+        return False
+    if not fill_initial_row(own.initial_position, attitude, velocity, spin, flight.row):
+        return False
+    linear, angular = own.linear_damping / body[MASS], own.angular_damping / body[MOMENTS]
+    if flight.chooses and (linear > FASTEST or angular > FASTEST):
+        return False
+    copy_numbers(flight.row, flight.start)
+    gyroscopic = flight.common.gyroscopic
+    begin_body(flight.common, body, own.gravity, own.linear_damping, own.angular_damping, gyroscopic)
+    if own.string_attached and not _tie(own, flight, own.string_attach, own.string_target):
+        return False
+    for c in range(commands.shape[0]):
+        if commands[c].kind < fl.CLEAR and not is_within_magnitude(commands[c].load, body):
+            return False
+        loads[c] = commands[c]
+    return True
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
-def _fly(
-    settings: np.ndarray,
-    times: np.ndarray,
-    constants: np.ndarray,
-    body: np.ndarray,
-    chooses: bool,
+def _advance(
+    own: np.record, flight: np.record, commands: np.ndarray, until_ns: int, methods: np.ndarray, tables: tuple
+) -> bool:
+    """Carry the body to ``until_ns``, before what acts at that very time; False when the simulation must do it.
+
+    As ``Simulation.advance`` does: the compiled flight takes all commands but those on the string; at such a one all
+    that acts at this instant acts, in its order.
+    """
+    loads, events, room = tables
+    count = commands.shape[0]
+    while True:
+        first = flight.due
+        act = first
+        while act < count and commands[act].kind < TIE and commands[act].at_ns < until_ns:
+            act += 1
+        special = act < count and commands[act].kind >= TIE and commands[act].at_ns < until_ns
+        event_ns = commands[act].at_ns if special else until_ns
+        while special and act > first and commands[act - 1].at_ns == event_ns:
+            act -= 1
+        flight.due_end = act
+        if fl.fly(flight, loads, events, methods, room, event_ns) != fl.REACHED:
+            return False
+        if not special:
+            return True
+        flight.events = 0
+        fl.end_due(flight, loads, events)
+        while flight.due < count and commands[flight.due].at_ns == event_ns:
+            if commands[flight.due].kind < TIE:
+                fl.apply(flight, loads, events, flight.due)
+            elif not _act_on_string(own, flight, commands[flight.due]):
+                return False
+            flight.due += 1
+        fl.cut_segment(flight, loads, methods, room)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _fly_row(
+    i: int,
+    rows: np.ndarray,
+    ballast: np.ndarray,
+    start: np.ndarray,
     methods: np.ndarray,
     commands: np.ndarray,
-    loads: np.ndarray,
     sample_ns: np.ndarray,
     stops: np.ndarray,
     context: np.ndarray,
+    flights: np.ndarray,
     tables: tuple,
     states: np.ndarray,
 ) -> tuple[int, int]:
-    """One flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
+    """Row i's flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
 
-    settings (SETTINGS,), times (TIMES,), constants (CONSTANTS,), body (BODY,): simulation/batch_body.py. methods:
-    motion/integrators/stepping.py. commands (c, COMMAND) in the order in which they act and loads (c, LOAD).
     stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
-    here. tables: arrays of simulation/flight.py with room for all. Returns how many samples it reached, and which stop
-    held or −1; 0 samples: the simulation must say what is wrong.
+    here. Returns how many samples it reached, and which stop held or −1; 0 samples: the simulation must do it.
     """
-    flights, rows, events, room = tables
-    flight = flights[0]
-    count = commands.shape[0]
-    for c in range(count):
-        if commands[c, fl.KIND] != fl.CLEAR and not is_within_magnitude(loads[c], body):
-            return 0, -1
-    if not b.initial_row(settings, flight.row) or (chooses and not b.is_followed(settings, constants, body)):
+    own = rows[i]
+    due = commands[i if commands.shape[0] > 1 else 0]
+    flights[0] = start[0]
+    flight, (loads, _, room) = flights[0], tables
+    if not _begin(own, ballast, flight, due, loads):
         return 0, -1
-    fl.begin_flight(flight)
-    copy_numbers(body, flight.body)
-    if constants[b.TIED] != 0.0:
-        flight.tied, flight.string_begin_ns, flight.string_end_ns = True, 0, 0
-        b.tie_string(settings, constants, body, flight.row, flight.string)
     copy_numbers(flight.row, states[0, :13])
-    states[0, 13] = b.string_energy(flight)
-    g = settings[b.GRAVITY : b.GRAVITY + 3]
-    begin(body[MASS], body[INERTIA : INERTIA + 9], g, states[0], context)
-    copy_numbers(flight.row, flight.start)
-    begin_body(flight.common, body, g, settings[b.LINEAR_DAMPING], settings[b.ANGULAR_DAMPING], constants[b.GYROSCOPIC])
-    flight.accuracy, flight.degree, flight.chooses = settings[b.ACCURACY], times[b.DEGREE], chooses
-    flight.step_ns, flight.timeout_ns, flight.poke_ns = times[b.STEP_NS], times[b.TIMEOUT_NS], times[b.POKE_NS]
-    for c in range(count):
-        row = rows[c]
-        row.at_ns, row.duration_ns = commands[c, fl.AT_NS], commands[c, fl.DURATION_NS]
-        row.kind, row.slot = commands[c, fl.KIND], commands[c, fl.SLOT]
-        copy_numbers(loads[c], row.load)
-    flight.due_end = count
-    fl.begin_segment(flight, rows, methods, room)
+    states[0, 13] = _string_energy(flight)
+    body = flight.body
+    begin(body[MASS], body[INERTIA : INERTIA + 9], own.gravity, states[0], context)
+    fl.begin_segment(flight, loads, methods, room)
     for sample in range(sample_ns.shape[0]):
-        if fl.fly(flight, rows, events, methods, room, sample_ns[sample]) != fl.REACHED:
+        if not _advance(own, flight, due, sample_ns[sample], methods, tables):
             return 0, -1
         copy_numbers(flight.row, states[sample, :13])
-        states[sample, 13] = b.string_energy(flight)
+        states[sample, 13] = _string_energy(flight)
         stop = which_is_met(stops, states[sample], context)
         if stop >= 0:
             return sample + 1, stop
     return sample_ns.shape[0], -1
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
-def _one(
-    i: int,
-    settings: np.ndarray,
-    ballast: np.ndarray,
-    constants: np.ndarray,
-    loads: np.ndarray,
-    times: np.ndarray,
-    commands: np.ndarray,
-    chooses: bool,
-    methods: np.ndarray,
-    body: np.ndarray,
-    sample_ns: np.ndarray,
-    stops: np.ndarray,
-    context: np.ndarray,
-    tables: tuple,
-    states: np.ndarray,
-) -> tuple[int, int]:
-    """Body and flight of variation i; as ``_fly`` returns."""
-    own = settings[i if settings.shape[0] > 1 else 0]
-    if not make_body_row(own, ballast[i if ballast.shape[0] > 1 else 0], constants, body):
-        return 0, -1
-    command = commands[i if commands.shape[0] > 1 else 0]
-    load = loads[i if loads.shape[0] > 1 else 0]
-    own_times = times[i if times.shape[0] > 1 else 0]
-    method = methods[own_times[b.DEGREE]]
-    return _fly(
-        own, own_times, constants, body, chooses, method, command, load, sample_ns, stops, context, tables, states
-    )
-
-
-_ROOM = (
-    float64[::1],
-    float64[::1],
-    types.Tuple((from_dtype(fl.FLIGHT)[::1], from_dtype(fl.LOAD_ROW)[::1], from_dtype(fl.EVENT)[::1], float64[::1])),
-    float64[:, ::1],
-    float64[:, ::1],
+_BATCH = (
+    from_dtype(ROW)[::1],
+    float64[:, ::1],  # ballast
+    from_dtype(fl.FLIGHT)[::1],  # the setup's
+    from_dtype(METHOD)[::1],
+    from_dtype(fl.LOAD_ROW)[:, ::1],  # commands
 )
+_SAMPLING = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
+_RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])
+_TABLES = (from_dtype(fl.LOAD_ROW)[::1], from_dtype(fl.EVENT)[::1], float64[::1])
+_ROOM = (float64[::1], from_dtype(fl.FLIGHT)[::1], types.Tuple(_TABLES), float64[:, ::1], float64[:, ::1])
 
 
-def _room(variants: Variants, references: Variants | None, samples: int) -> tuple:
-    """Arrays in which a block works, with room for any of these flights: body (BODY,), context (CONTEXT,), those of
-    simulation/flight.py, states (m, STATE) at the samples, and those of the references.
-    """
-    sides = (variants,) if references is None else (variants, references)
-    rows = max(side.commands.shape[1] for side in sides) + 1
-    # The workspace begins a line of the processor's cache.
-    room = aligned((1, max(1, *(workspace_size(_methods(side.integrator, side.is_tied)) for side in sides))))[0]
-    flight = np.zeros(1, fl.FLIGHT), np.zeros(rows, fl.LOAD_ROW), np.zeros(4 * rows + 4, fl.EVENT), room
-    others = np.zeros((samples if references is not None else 1, STATE))
-    return np.zeros(BODY), np.zeros(CONTEXT), flight, np.zeros((samples, STATE)), others
-
-
-def _fly_block(
-    first: int,
-    last: int,
-    variants: _Flights,
-    references: _Flights,
+def _fly_rows(
+    own: tuple,
+    references: tuple,
     has_references: bool,
+    notes_floors: bool,
     sample_ns: np.ndarray,
     watched: np.ndarray,
     stops: np.ndarray,
@@ -228,19 +435,17 @@ def _fly_block(
     results: tuple,
     room: tuple,
 ) -> None:
-    """Variations first to last − 1."""
-    variants, references = uncounted(variants), uncounted(references)
+    """All rows of a batch, each beside that of the references if there are any."""
+    own, references = uncounted(own), uncounted(references)
     sample_ns, watched, stops, measures = uncounted((sample_ns, watched, stops, measures))
     status, end_ns, stop, measured, finals, floors = uncounted(results)
-    flights, times, chooses, methods = room[2][0], variants[4], variants[6], variants[7]
-    body, context, tables, states, others = uncounted(room)
+    context, flights, tables, states, others = uncounted(room)
     # One place that flies, whichever it is: a second one would be compiled a second time.
-    sides, kept, ends = (references, variants), (others, states), (stops[:0], stops)
-    for i in range(first, last):
-        status[i] = 0
+    sides, kept, ends = (references, own), (others, states), (stops[:0], stops)
+    for i in range(status.shape[0]):
         reached = 0
         for side in range(0 if has_references else 1, 2):
-            reached, stop[i] = _one(i, *sides[side], body, sample_ns, ends[side], context, tables, kept[side])
+            reached, stop[i] = _fly_row(i, *sides[side], sample_ns, ends[side], context, flights, tables, kept[side])
             if reached == 0:
                 break
         if reached == 0:
@@ -248,53 +453,45 @@ def _fly_block(
         status[i] = 1
         end_ns[i] = sample_ns[reached - 1]
         copy_numbers(states[reached - 1], finals[i])
-        if chooses:
-            degree = times[i if times.shape[0] > 1 else 0, b.DEGREE]
+        if notes_floors:
             copy_numbers(flights[0].floors, floors[i])
-            fl.note_floors(flights[0], methods[degree], floors[i])
+            fl.note_floors(flights[0], own[3], floors[i])
         measure_flight(measures, states, others, sample_ns, watched, reached, context, measured[i])
 
 
 @cache
-def _compiled() -> Callable:
-    """``_fly_block`` compiled, or loaded from the cache: when it is first wanted and not at import."""
-    block = (
-        types.Tuple(_VARIANTS),
-        types.Tuple(_VARIANTS),
-        boolean,
-        *_SAMPLING,
-        types.Tuple(_RESULTS),
-        types.Tuple(_ROOM),
+def _compiled() -> Callable[..., None]:
+    """``_fly_rows`` compiled, or loaded from the cache: when it is first wanted and not at import."""
+    batch, results, room = types.Tuple(_BATCH), types.Tuple(_RESULTS), types.Tuple(_ROOM)
+    signature = types.void(batch, batch, boolean, boolean, *_SAMPLING, results, room)
+    compiled: Callable[..., None] = njit(signature, cache=True, nogil=True, error_model="numpy", allocates=False)(
+        _fly_rows
     )
-    signature = types.void(int64, int64, *block)
-    return njit(signature, cache=True, nogil=True, error_model="numpy", allocates=False)(_fly_block)
+    return compiled
 
 
-@cache
-def _methods(integrator: Integrator, tied: bool) -> np.ndarray:
-    """Tables of the integrator's methods by degree, with the kernels that a flight with or without a string calls."""
-    tables = [method_table(integrator, degree) for degree in range(MAX_DEGREE + 1)]
-    for table in tables:
-        for number, method in enumerate(integrator.methods):
-            if method.on_string == tied:
-                provide_kernel(integrator, table, number)
-    return np.array(tables)
-
-
-def fly_variants(
-    variants: Variants,
-    references: Variants | None,
-    sample_ns: np.ndarray,
-    watched: np.ndarray,
-    stops: np.ndarray,
-    measures: np.ndarray,
+def fly_rows(
+    batch: Batch,
+    references: Batch | None,
+    sample_ns: NDArray[np.int64],
+    watched: NDArray[np.bool_],
+    stops: NDArray[np.float64],
+    measures: NDArray[np.float64],
 ) -> Results:
-    """Fly all variants, each beside its reference if there are any; the rows that it can't check have status 0."""
-    rows = len(variants)
-    results = new_results(rows, len(measures))
+    """Fly all rows, each beside its reference if there are any; those that it can't check have status 0.
+
+    sample_ns (m,) ascending, watched (m,), stops (k, 3), measures (j, MEASURE): simulation/flight_measures.py.
+    """
+    sides = (batch,) if references is None else (batch, references)
+    results = new_results(len(batch.rows), len(measures))
     filled = (results.status, results.end_ns, results.stop, results.measured, results.states, results.floors)
-    own = variants.arrays
-    other = own if references is None else references.arrays
-    room = _room(variants, references, len(sample_ns))
-    _compiled()(0, rows, own, other, references is not None, sample_ns, watched, stops, measures, filled, room)
+    loads = max(side.commands.shape[1] for side in sides) + 1
+    # The workspace begins a line of the processor's cache.
+    work = aligned((1, max(1, *(side.setup.flight_start.room for side in sides))))[0]
+    tables = np.zeros(loads, fl.LOAD_ROW), np.zeros(4 * loads + 4, fl.EVENT), work
+    states, others = (np.zeros((len(sample_ns), STATE)) for _ in range(2))
+    room = np.zeros(CONTEXT), np.zeros(1, fl.FLIGHT), tables, states, others
+    looks = sample_ns, watched, stops, measures
+    has_references = references is not None
+    _compiled()(batch.arrays, sides[-1].arrays, has_references, batch.notes_floors, *looks, filled, room)
     return results

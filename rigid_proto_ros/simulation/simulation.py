@@ -47,6 +47,17 @@ from .thrusters import ThrusterControl
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
+def thrusts(loads: list[tuple[int, Load]], at_ns: int) -> list[Pending]:
+    """What thrusters, by number, push with from ``at_ns`` on, as commands of a flight."""
+    rows = []
+    for number, load in loads:
+        kind = fl.HELD_WRENCH if load.is_zero else fl.PULSE
+        row = Pending(at_ns, ClearWrench(), kind=kind, duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
+        row.slot = -1 - number
+        rows.append(row)
+    return rows
+
+
 class Follower(Protocol):
     """Whoever takes the same commands at the same times, such as a ghost."""
 
@@ -325,13 +336,7 @@ class Simulation(Readings):
     def _thrust(self, loads: list[tuple[int, Load]]) -> None:
         """Let thrusters, by number, push like this until they are told otherwise."""
         arrays = self._arrays
-        rows = []
-        for number, load in loads:
-            kind = fl.HELD_WRENCH if load.is_zero else fl.PULSE
-            row = Pending(self.time_ns, ClearWrench(), kind=kind, duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
-            row.slot = -1 - number
-            rows.append(row)
-        arrays.put(rows)
+        arrays.put(thrusts(loads, self.time_ns))
         arrays.apply()
         if not self._notifier.wants_loads:
             return

@@ -16,13 +16,12 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..scene.declaration import Value
-from ..simulation.batch import Results, fly_variants, new_results
+from ..simulation.batch import Results, fly_rows, new_results
 from ..simulation.readings import floor_text
 from .forms import VERTEX, Draw, as_text
-from .groups import Group, is_structural
 from .row_flight import fly_row
+from .rows import Group, NotBatchable, is_structural
 from .study import Study
-from .templates import NotBatchable
 from .variation import apply, body_mesh_of, plain, vertex_number
 
 GROUPS_KEPT = 512
@@ -125,12 +124,12 @@ def _fly_group(study: Study, key: tuple, members: np.ndarray, columns: list[np.n
         return
     measures = study.measures
     own = [column[members] for column in columns]
-    variants, good = group.variants(own, len(members))
+    batch, good = group.batch(own, len(members))
     references = None
     if beside is not None:
-        references, also_good = beside.variants(own, len(members))
+        references, also_good = beside.batch(own, len(members))
         good &= also_good
-    done = fly_variants(variants, references, measures.sample_ns, measures.watched, measures.stops, measures.table)
+    done = fly_rows(batch, references, measures.sample_ns, measures.watched, measures.stops, measures.table)
     done.status[~good] = 0
     for name in ("status", "end_ns", "stop", "measured", "states", "floors"):
         getattr(flown.results, name)[members] = getattr(done, name)

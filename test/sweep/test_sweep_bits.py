@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from sweep_studies import HONEY, HUNG, POKES, PULLED, STRUCTURE, study
+from sweep_studies import HONEY, HUNG, POKES, PULLED, STRUCTURE, TIED, study
 
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.sweep.chunk import Chunk, run_chunk
@@ -30,7 +30,9 @@ def differing_rows(own, chunk: Chunk) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "spec", [POKES, STRUCTURE, PULLED, HUNG, HONEY], ids=["pokes", "structure", "string", "hung", "damped"]
+    "spec",
+    [POKES, STRUCTURE, PULLED, HUNG, TIED, HONEY],
+    ids=["pokes", "structure", "changed", "hung", "tied", "damped"],
 )
 def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
     own = study(spec)
@@ -39,7 +41,7 @@ def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
     failed = sum(reason is not None for reason in chunk.columns["failure"])
     if spec is PULLED:
         assert chunk.simulated == own.rows and failed == 0
-    elif spec in (POKES, HUNG, HONEY):
+    elif spec in (POKES, HUNG, TIED, HONEY):
         assert chunk.simulated == 0
     else:
         # A ballast below zero is a row with its reason, and the others go through the batch.
