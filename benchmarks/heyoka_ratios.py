@@ -31,7 +31,6 @@ from rigid_proto_ros.base.addresses import entry_of
 from rigid_proto_ros.base.compilation import njit
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
-from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.simulation import flight as fl
 from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows

@@ -346,8 +346,8 @@ class Group:
                     if where.any():
                         found.append((k, j, name, np.nonzero(where)))
                     left &= ~where
-        written = {(k, j) for k, j, _, _ in found}
-        is_whole = len(written) == sum(map(len, probes[0])) and not any(left.any() for left in changed.values())
+        wanted = {(k, j) for k, own in zip(self._of_script, probes[0], strict=True) for j in range(len(own))}
+        is_whole = {(k, j) for k, j, _, _ in found} == wanted and not any(left.any() for left in changed.values())
         return a, found if is_whole else None
 
 
