@@ -39,28 +39,31 @@ from .flight_measures import measure_flight
 from .quantities import CONTEXT, STATE, begin, which_is_met
 from .setup import Setup
 
+_NUMBERS: list[tuple] = [
+    ("scale", np.float64, 3),
+    ("mass", np.float64),  # [kg], 0: the density decides
+    ("density", np.float64),  # [kg/m³]
+    ("explicit_inertia_mass", np.float64),  # [kg]
+    ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
+    ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
+    ("gravity", np.float64, 3),  # [m/s², world]
+    ("linear_damping", np.float64),  # [N s/m]
+    ("angular_damping", np.float64),  # [N m s]
+    ("initial_position", np.float64, 3),  # [m, world]
+    ("initial_orientation_xyzw", np.float64, 4),  # of any length
+    ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
+    ("initial_angular_velocity", np.float64, 3),  # [rad/s, world]
+    ("string_attach", np.float64, 3),  # [mesh coordinates]
+    ("string_target", np.float64, 3),  # [m, world]
+    ("string_stiffness", np.float64),  # [N/m]
+    ("string_frequency", np.float64),  # [rad/s], > 0 wins over the stiffness
+    ("string_damping_ratio", np.float64),
+    ("string_rest_length", np.float64),  # [m]
+]
 ROW = record_type(
     [
         # Parameters by name, dots as underscores: in these numbers rows of one batch may differ.
-        ("scale", np.float64, 3),
-        ("mass", np.float64),  # [kg], 0: the density decides
-        ("density", np.float64),  # [kg/m³]
-        ("explicit_inertia_mass", np.float64),  # [kg]
-        ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
-        ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
-        ("gravity", np.float64, 3),  # [m/s², world]
-        ("linear_damping", np.float64),  # [N s/m]
-        ("angular_damping", np.float64),  # [N m s]
-        ("initial_position", np.float64, 3),  # [m, world]
-        ("initial_orientation_xyzw", np.float64, 4),  # of any length
-        ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
-        ("initial_angular_velocity", np.float64, 3),  # [rad/s, world]
-        ("string_attach", np.float64, 3),  # [mesh coordinates]
-        ("string_target", np.float64, 3),  # [m, world]
-        ("string_stiffness", np.float64),  # [N/m]
-        ("string_frequency", np.float64),  # [rad/s], > 0 wins over the stiffness
-        ("string_damping_ratio", np.float64),
-        ("string_rest_length", np.float64),  # [m]
+        *_NUMBERS,
         # The same in all rows of a batch: strings, then what of mesh and model doesn't change with the numbers above.
         ("string_attached", np.bool_),  # at time 0
         ("string_bilateral", np.bool_),
@@ -75,7 +78,7 @@ ROW = record_type(
         ("extent", np.float64, 3),  # of the bounding box
     ]
 )
-NUMBERS: tuple[str, ...] = ROW.names[: ROW.names.index("string_attached")]  # type: ignore[index, union-attr]
+NUMBERS = tuple(name for name, *_ in _NUMBERS)
 """Fields in which rows of one batch may differ."""
 PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
 """Fields that parameters give."""
