@@ -133,7 +133,15 @@ def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
     slow.chmod(0o755)
     command = [sys.executable, tmp_path / "requirements" / "make_venv.py", "run"]
     environment = {**os.environ, "PYTHON": str(slow), "AMENT_PREFIX_PATH": "/nowhere"}
-    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True) as made:
+    with subprocess.Popen(
+        command,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # A shell that starts the suite in the background has its processes ignore SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as made:
         while not (tmp_path / "started").exists() and made.poll() is None:
             pass
         os.killpg(made.pid, signal.SIGINT)
