@@ -7,6 +7,7 @@ SIGTERM).
 
 from __future__ import annotations
 
+import argparse
 import gc
 import importlib
 import os
@@ -64,15 +65,25 @@ def main(argv: list[str] | None = None) -> int:
     complete(parser)
     args = parser.parse_args(argv)
     if own_process:
-        if "numba" in sys.modules:
-            _without_unused_libraries()
+        # All commands need it, and while it is imported there is nothing to close.
+        importlib.import_module("..base.compilation", __package__)
+        _without_unused_libraries()
         gc.freeze()
         gc.enable()
-        return interrupts.run(lambda: args.run(args), lambda error: _tell(args.command, error))
+        return interrupts.run(lambda: _run(args), lambda error: _tell(args.command, error))
     try:
         return args.run(args)
     except Exception as error:
         return _tell(args.command, error)
+
+
+def _run(args: argparse.Namespace) -> int:
+    """Run the command, and say so where kernels are compiled first."""
+    from ..base.compilation import notify_when_compiling
+
+    text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
+    with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
+        return args.run(args)
 
 
 def _tell(command: str, error: Exception) -> int:

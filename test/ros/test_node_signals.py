@@ -86,3 +86,11 @@ def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path
         time.sleep(0.02)
     assert "Traceback" not in node.errors
     assert "is simulating" not in node.output + node.errors
+
+
+def test_a_first_simulation_says_that_it_compiles_and_ends(ros_environment, tmp_path):
+    environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    flight = RosProcess("rigid_proto", "simulate", "t_handle", environment=environment, log=tmp_path / "flight")
+    flight.wait_for("compiling kernels, at the first start only")
+    assert flight.end() == 130
+    assert flight.output == "" and len(flight.errors.splitlines()) == 1
