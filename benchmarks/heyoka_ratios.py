@@ -35,7 +35,7 @@ from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.simulation import flight as fl
 from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows
 from rigid_proto_ros.simulation.flight_arrays import _arrays
-from rigid_proto_ros.simulation.flight_measures import MEASURE
+from rigid_proto_ros.simulation.flight_measures import CODE, MEASURE
 from work_precision_ours import prepare_simulation, setup_of, simulation_of
 from work_precision_ratios import time_at_error
 
@@ -132,13 +132,15 @@ def sweep_runs(problem: Problem, accuracy: float):
         load[ld.HAS_POINT], load[ld.POINT : ld.POINT + 3] = 1.0, w.point
         load[ld.FORCE : ld.FORCE + 3], load[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque
     batch = Batch(own, np.zeros((0, 4)), setup_of(problem, "auto", 1e-3, accuracy), commands)
-    looks = np.array([round(problem.duration * 1e9)]), np.ones(1, bool), np.zeros((0, 3)), np.zeros((0, MEASURE))
+    end = np.zeros((13, MEASURE))  # of kind FINAL
+    end[:, CODE] = np.arange(13)
+    looks = np.array([round(problem.duration * 1e9)]), np.ones(1, bool), np.zeros((0, 3)), end
     found = {}
 
     def run():
         found["results"] = fly_rows(batch, None, *looks)
 
-    return run, lambda: found["results"].states[0], lambda: None
+    return run, lambda: found["results"].measured[0], lambda: None
 
 
 CURVES = {

@@ -45,9 +45,8 @@ ALLOWED = {
     ("motion/loads.py", "sum"): "asked only whether it is finite",
     ("mass/exact_moments.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "**"): FRACTIONS,
-    ("sweep/forms.py", "**"): "of decimal numbers, whose digits are fixed",
-    ("sweep/row_random.py", "np.random"): "SeedSequence and Philox, whole numbers",
-    ("sweep/sampling.py", "np.random"): "SeedSequence, whole numbers, and Sobol's, which the golden hashes compare",
+    ("sweep/sampling.py", "**"): "of decimal numbers, whose digits are fixed",
+    ("sweep/sampling.py", "np.random"): "whole numbers of Philox, and Sobol's, which the golden hashes compare",
     **{(f"sweep/{name}.py", "sum"): FRACTIONS for name in ("cluster", "study", "run", "table")},
 }
 """What stands there all the same, and why."""

@@ -10,12 +10,9 @@ too hard) gives no result: the caller then asks the simulation, which knows what
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from numba import boolean, float64, from_dtype, int64, types
 from numpy.typing import NDArray
 
 from ..base.compilation import njit
@@ -29,7 +26,7 @@ from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
 from ..motion.integrators.auto import FASTEST
-from ..motion.integrators.stepping import METHOD, provide_kernel
+from ..motion.integrators.stepping import provide_kernel
 from ..motion.loads import MAX_ACCELERATION, is_within_magnitude
 from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
 from ..motion.state import fill_initial_row
@@ -113,7 +110,7 @@ class Batch:
 
     @property
     def arrays(self) -> tuple:
-        """What the compiled call takes of it, in the order of _BATCH."""
+        """What the compiled call takes of it."""
         start = self.setup.flight_start
         integrator = self.setup.integrator
         strings = bool(self.rows["string_attached"].any() or (self.commands["kind"] >= TIE).any())
@@ -126,23 +123,21 @@ class Batch:
 @dataclass
 class Results:
     """status (n,): 1 done, 0 the simulation must do it. end_ns (n,), stop (n,): which condition ended it, −1 none.
-    measured (n, k); states (n, 13) at the end. floors (n, FLOOR_KINDS): what has held the motion to less than its
-    accuracy (simulation/flight.py).
+    measured (n, k). floors (n, FLOOR_KINDS): what has held the motion to less than its accuracy
+    (simulation/flight.py).
     """
 
     status: NDArray[np.int64]
     end_ns: NDArray[np.int64]
     stop: NDArray[np.int64]
     measured: NDArray[np.float64]
-    states: NDArray[np.float64]
     floors: NDArray[np.float64]
 
 
 def new_results(rows: int, measures: int) -> Results:
     """Empty ones, as failed rows have them."""
-    unknown = np.full((rows, measures), np.nan)
-    state, floors = np.full((rows, STATE - 1), np.nan), np.zeros((rows, fl.FLOOR_KINDS))
-    return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, state, floors)
+    unknown, floors = np.full((rows, measures), np.nan), np.zeros((rows, fl.FLOOR_KINDS))
+    return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, floors)
 
 
 # A row's body
@@ -413,19 +408,7 @@ def _fly_row(
     return sample_ns.shape[0], -1
 
 
-_BATCH = (
-    from_dtype(ROW)[::1],
-    float64[:, ::1],  # ballast
-    from_dtype(fl.FLIGHT)[::1],  # the setup's
-    from_dtype(METHOD)[::1],
-    from_dtype(fl.LOAD_ROW)[:, ::1],  # commands
-)
-_SAMPLING = (int64[::1], boolean[::1], float64[:, ::1], float64[:, ::1])
-_RESULTS = (int64[::1], int64[::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])
-_TABLES = (from_dtype(fl.LOAD_ROW)[::1], from_dtype(fl.EVENT)[::1], float64[::1])
-_ROOM = (float64[::1], from_dtype(fl.FLIGHT)[::1], types.Tuple(_TABLES), float64[:, ::1], float64[:, ::1])
-
-
+@njit(cache=True, nogil=True, error_model="numpy", allocates=False)
 def _fly_rows(
     own: tuple,
     references: tuple,
@@ -441,7 +424,7 @@ def _fly_rows(
     """All rows of a batch, each beside that of the references if there are any."""
     own, references = uncounted(own), uncounted(references)
     sample_ns, watched, stops, measures = uncounted((sample_ns, watched, stops, measures))
-    status, end_ns, stop, measured, finals, floors = uncounted(results)
+    status, end_ns, stop, measured, floors = uncounted(results)
     context, flights, tables, states, others = uncounted(room)
     # One place that flies, whichever it is: a second one would be compiled a second time.
     sides, kept, ends = (references, own), (others, states), (stops[:0], stops)
@@ -455,22 +438,10 @@ def _fly_rows(
             continue
         status[i] = 1
         end_ns[i] = sample_ns[reached - 1]
-        copy_numbers(states[reached - 1], finals[i])
         if notes_floors:
             copy_numbers(flights[0].floors, floors[i])
             fl.note_floors(flights[0], own[3], floors[i])
         measure_flight(measures, states, others, sample_ns, watched, reached, context, measured[i])
-
-
-@cache
-def _compiled() -> Callable[..., None]:
-    """``_fly_rows`` compiled, or loaded from the cache: when it is first wanted and not at import."""
-    batch, results, room = types.Tuple(_BATCH), types.Tuple(_RESULTS), types.Tuple(_ROOM)
-    signature = types.void(batch, batch, boolean, boolean, *_SAMPLING, results, room)
-    compiled: Callable[..., None] = njit(signature, cache=True, nogil=True, error_model="numpy", allocates=False)(
-        _fly_rows
-    )
-    return compiled
 
 
 def fly_rows(
@@ -487,7 +458,7 @@ def fly_rows(
     """
     sides = (batch,) if references is None else (batch, references)
     results = new_results(len(batch.rows), len(measures))
-    filled = (results.status, results.end_ns, results.stop, results.measured, results.states, results.floors)
+    filled = results.status, results.end_ns, results.stop, results.measured, results.floors
     loads = max(side.commands.shape[1] for side in sides) + 1
     # The workspace begins a line of the processor's cache.
     work = aligned((1, max(1, *(side.setup.flight_start.room for side in sides))))[0]
@@ -496,5 +467,5 @@ def fly_rows(
     room = np.zeros(CONTEXT), np.zeros(1, fl.FLIGHT), tables, states, others
     looks = sample_ns, watched, stops, measures
     has_references = references is not None
-    _compiled()(batch.arrays, sides[-1].arrays, has_references, batch.notes_floors, *looks, filled, room)
+    _fly_rows(batch.arrays, sides[-1].arrays, has_references, batch.notes_floors, *looks, filled, room)
     return results

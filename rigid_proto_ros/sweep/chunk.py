@@ -2,7 +2,7 @@
 """Some rows of a study, flown and measured: what a thread here and a worker of a cluster both do.
 
 Rows that differ in numbers alone go through the compiled batch together. Those that it can't fly or check are flown
-one by one by the simulation, with the same bits.
+one by one by ``Simulation``, which is what a row is by definition, with the same bits.
 """
 
 from __future__ import annotations
@@ -13,19 +13,28 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..scene.declaration import Value
+from ..scene.offline import OfflineRun
+from ..scene.scenario import Scenario
 from ..simulation.batch import Results, fly_rows, new_results
+from ..simulation.flight_measures import measure_flight
+from ..simulation.quantities import CONTEXT, STATE, begin, which_is_met
 from ..simulation.readings import floor_text
-from .forms import VERTEX, Draw, as_text
-from .row_flight import fly_row
+from ..simulation.simulation import Simulation
 from .rows import Group, NotBatchable, is_structural
+from .sampling import VERTEX, Draw, as_text
 from .study import Study
-from .variation import apply, body_mesh_of, plain, vertex_number
+from .variation import Variation, apply, body_mesh_of, plain, vertex_number
 
 GROUPS_KEPT = 512
 """Groups of rows that a process keeps ready."""
+
+
+class FailedFlight(Exception):
+    """Why a row has no result."""
 
 
 @dataclass
@@ -43,6 +52,8 @@ class Chunk:
 
 @dataclass
 class _Rows:
+    """What became of rows; failures: why there is no result, by place."""
+
     results: Results
     failures: dict[int, str] = field(default_factory=dict)
     simulated: int = 0
@@ -60,98 +71,132 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     return Chunk(_table(study, rows, columns, flown), flown.simulated)
 
 
-def row_summary(study: Study, row: int) -> dict:
+def row_summary(study: Study, row: int) -> dict[str, object]:
     """The row of the table by column, as JSON has it."""
     columns = run_chunk(study, row, row + 1).columns
-    found = {}
+    found: dict[str, object] = {}
     for name, column in columns.items():
         value = column[0] if column.dtype == object else column[0].item()
         found[name] = None if value != value else value
     return found
 
 
-def is_batchable(study: Study, rows: np.ndarray) -> bool:
+def is_batchable(study: Study, rows: NDArray[np.int64]) -> bool:
     """Whether the compiled batch can fly any of these rows (n,)."""
-    columns = study.columns(rows)
-    keys = [key for key, _ in _groups(study, columns, len(rows))]
-    sides = (False, True) if study.reference is not None else (False,)
-    return any(all(_group(_ByFingerprint(study), key, side) for side in sides) for key in keys)
+    return any(all(_sides(study, key)) for key, _ in _groups(study, study.columns(rows), len(rows)))
 
 
-def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tuple[tuple, np.ndarray]]:
+# By the batch
+
+
+def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tuple[tuple, NDArray[np.int64]]]:
     """Values of what is structural, and the rows that have them."""
     structural = [c for v, c in zip(study.vary, columns, strict=True) if is_structural(v)]
-    if not structural:
-        yield (), np.arange(count)
-        return
     members: dict[tuple, list[int]] = {}
-    for i in range(count):
+    for i in range(count if structural else 0):
         values = [plain(c[i]) for c in structural]
         key = tuple(tuple(value) if isinstance(value, list) else value for value in values)
         members.setdefault(key, []).append(i)
-    for key, listed in members.items():
-        yield key, np.array(listed)
+    for key, listed in (members if structural else {(): range(count)}).items():
+        yield key, np.array(listed, np.int64)
+
+
+def _sides(study: Study, key: tuple) -> list[Group | None]:
+    """The group of rows with these values, and that of their references, if the study has any."""
+    return [_group(study, key, False)] + ([_group(study, key, True)] if study.reference is not None else [])
 
 
 @lru_cache(maxsize=GROUPS_KEPT)
-def _group(study: _ByFingerprint, key: tuple, with_reference: bool) -> Group | None:
-    own = study.study
-    names = [v.target.name for v in own.vary if is_structural(v)]
+def _group(study: Study, key: tuple, with_reference: bool) -> Group | None:
+    names = [v.target.name for v in study.vary if is_structural(v)]
     structural = dict(zip(names, key, strict=True))
     try:
-        return Group(own, structural, own.reference if with_reference else None)
+        return Group(study, structural, study.reference if with_reference else None)
     except (NotBatchable, InputError):
         return None
 
 
-class _ByFingerprint:
-    """A study as a key: equal content, equal groups."""
-
-    def __init__(self, study: Study) -> None:
-        self.study = study
-
-    def __hash__(self) -> int:
-        return hash(self.study.fingerprint)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByFingerprint) and self.study.fingerprint == other.study.fingerprint
-
-
-def _fly_group(study: Study, key: tuple, members: np.ndarray, columns: list[np.ndarray], flown: _Rows) -> None:
-    group = _group(_ByFingerprint(study), key, False)
-    beside = _group(_ByFingerprint(study), key, True) if study.reference is not None else None
-    if group is None or (study.reference is not None and beside is None):
+def _fly_group(study: Study, key: tuple, members: NDArray[np.int64], columns: list[np.ndarray], flown: _Rows) -> None:
+    groups = [group for group in _sides(study, key) if group is not None]
+    if len(groups) < len(_sides(study, key)):
         return
-    measures = study.measures
-    own = [column[members] for column in columns]
-    batch, good = group.batch(own, len(members))
-    references = None
-    if beside is not None:
-        references, also_good = beside.batch(own, len(members))
-        good &= also_good
+    measures, own = study.measures, [column[members] for column in columns]
+    (batch, good), *beside = [group.batch(own, len(members)) for group in groups]
+    references = beside[0][0] if beside else None
     done = fly_rows(batch, references, measures.sample_ns, measures.watched, measures.stops, measures.table)
-    done.status[~good] = 0
-    for name in ("status", "end_ns", "stop", "measured", "states", "floors"):
-        getattr(flown.results, name)[members] = getattr(done, name)
+    done.status[~np.logical_and.reduce([good, *(also for _, also in beside)])] = 0
+    for name, values in vars(done).items():
+        getattr(flown.results, name)[members] = values
+
+
+# By the simulation
 
 
 def _fly_alone(study: Study, i: int, columns: list[np.ndarray], flown: _Rows) -> None:
     flown.simulated += 1
     results = flown.results
+    results.measured[i], results.stop[i] = np.nan, -1
     try:
-        row = apply(study, [column[i] for column in columns])
-    except (InputError, TypeError, AttributeError, KeyError, IndexError) as error:
-        results.measured[i] = np.nan
-        results.stop[i] = -1
+        simulate_row(study, apply(study, [column[i] for column in columns]), i, results)
+    except (FailedFlight, InputError, TypeError, AttributeError, KeyError, IndexError) as error:
         flown.failures[i] = " ".join(str(error).split())
-        return
-    result = fly_row(study, row)
-    results.measured[i], results.stop[i] = result.measured, result.stop
-    results.end_ns[i], results.states[i], results.floors[i] = result.end_ns, result.state, result.floors
-    if result.failure:
-        flown.failures[i] = result.failure
-    else:
-        results.status[i] = 1
+
+
+def simulate_row(study: Study, row: Variation, i: int, results: Results) -> None:
+    """The row's flight by ``Simulation``, beside its reference if the study has one, into results i; raises
+    FailedFlight, InputError.
+    """
+    measures = study.measures
+    states, others = (np.zeros((len(measures.sample_ns), STATE)) for _ in range(2))
+    context, scenario = np.zeros(CONTEXT), row.scenario
+    if study.reference is not None:
+        reference = scenario.with_changes(study.reference)
+        _simulate(reference, row, study, others, context, measures.stops[:0], "reference: ")
+    simulation, reached, stop = _simulate(scenario, row, study, states, context, measures.stops)
+    results.stop[i], results.end_ns[i] = stop, measures.sample_ns[reached - 1]
+    results.floors[i] = simulation.floors
+    measure_flight(
+        measures.table, states, others, measures.sample_ns, measures.watched, reached, context, results.measured[i]
+    )
+    results.status[i] = 1
+
+
+def _simulate(
+    scenario: Scenario,
+    row: Variation,
+    study: Study,
+    states: np.ndarray,
+    context: np.ndarray,
+    stops: np.ndarray,
+    whose: str = "",
+) -> tuple[Simulation, int, int]:
+    """Fill ``states`` at the sample times, and the context; how many were reached, and which stop held or −1."""
+    simulation, sample_ns = OfflineRun(scenario, row.commands).simulation, study.measures.sample_ns
+    body = simulation.setup.body
+    begin(body.mass, body.inertia.ravel(), simulation.setup.gravity, _state(simulation), context)
+    reached, stop = 0, -1
+    while reached < len(sample_ns) and stop < 0:
+        simulation.advance(int(sample_ns[reached]))
+        if simulation.failure:
+            raise FailedFlight(whose + simulation.failure)
+        states[reached] = _state(simulation)
+        stop = which_is_met(stops, states[reached], context)
+        reached += 1
+    if simulation.refused:
+        # A row whose commands were refused in flight isn't the row that was asked for.
+        counts = (f"{count} commands refused: {reason}" for reason, count in simulation.refused.items())
+        raise FailedFlight(whose + "; ".join(counts))
+    return simulation, reached, stop
+
+
+def _state(simulation: Simulation) -> np.ndarray:
+    """State row and the string's energy (STATE,)."""
+    string = simulation.string
+    energy = string.potential_energy(simulation.setup.body, simulation.state) if string else 0.0
+    return np.array([*simulation.state.row, energy])
+
+
+# The table
 
 
 def _table(study: Study, rows: np.ndarray, columns: list[np.ndarray], flown: _Rows) -> dict[str, np.ndarray]:

@@ -40,7 +40,7 @@ from ..simulation.commands import (
 from ..simulation.setup import Setup
 from ..simulation.simulation import thrusts
 from ..simulation.thrusters import ThrusterControl
-from .forms import VERTEX, Draw
+from .sampling import VERTEX, Draw
 from .study import Study, Vary, script_entries
 from .variation import body_mesh_of, plain, vertex_number
 

@@ -28,9 +28,8 @@ from ..scene.scene_file import scene_file
 from ..scene.script import expand_script
 from ..scene.yaml_text import load_plain_yaml, read_text
 from .fields import mapping, number, whole
-from .forms import GRID, LIST, Draw, Points, read_form
 from .measures import Measures, read_measures
-from .sampling import MAX_SOBOL, SAMPLERS, uniforms
+from .sampling import GRID, LIST, MAX_SOBOL, SAMPLERS, Draw, Points, read_form, uniforms
 from .targets import Target, read_target
 
 MANY_ROWS = 10_000_000
@@ -48,9 +47,11 @@ class Vary:
     form: Points | Draw
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Study:
-    """parameters: of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
+    """Studies of the same content, which ``fingerprint`` tells, are equal.
+
+    parameters: of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
     samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise,
     or None.
     """
@@ -66,6 +67,12 @@ class Study:
     reference: Mapping[str, Value] | None
     measures: Measures
     fingerprint: str
+
+    def __hash__(self) -> int:
+        return hash(self.fingerprint)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Study) and self.fingerprint == other.fingerprint
 
     @property
     def entries(self) -> list:

@@ -21,7 +21,7 @@ from ..scene.parameters import Parameters
 from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
 from ..scene.script import expand_script
 from ..scene.yaml_text import dump_yaml
-from .forms import VERTEX, Draw
+from .sampling import VERTEX, Draw
 from .study import Study, script_entries
 
 MESHES_KEPT = 16

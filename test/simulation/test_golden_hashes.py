@@ -34,7 +34,7 @@ from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.scene.sensor_noise import sensor_noise
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.sweep.chunk import run_chunk
-from rigid_proto_ros.sweep.row_random import row_uniforms
+from rigid_proto_ros.sweep.sampling import row_uniforms
 
 FILE = Path(__file__).parents[1] / "golden_hashes.json"
 SECOND = 10**9

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from sweep_studies import HONEY, HUNG, POKES, PULLED, STRUCTURE, TIED, study
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.sweep.chunk import Chunk, run_chunk
-from rigid_proto_ros.sweep.row_flight import fly_row
+from rigid_proto_ros.simulation.batch import new_results
+from rigid_proto_ros.simulation.readings import floor_text
+from rigid_proto_ros.sweep.chunk import Chunk, FailedFlight, run_chunk, simulate_row
 from rigid_proto_ros.sweep.variation import variation
 
 
@@ -19,13 +21,20 @@ def same(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def differing_rows(own, chunk: Chunk) -> list[str]:
-    """Rows whose measures or reasons differ from those of the simulation."""
+    """Rows whose measures, floors or reasons differ from those of the simulation."""
     found = []
     for i, row in enumerate(chunk.columns["row"].tolist()):
-        alone = fly_row(own, variation(own, row))
+        alone, reason = new_results(1, len(own.measures.table)), None
+        try:
+            simulate_row(own, variation(own, row), 0, alone)
+        except (FailedFlight, InputError) as error:
+            reason = " ".join(str(error).split())
         measured = np.array([chunk.columns[name][i] for name in own.measures.columns])
-        if (alone.failure or None) != chunk.columns["failure"][i] or not same(alone.measured, measured):
-            found.append(f"row {row}: {alone.failure or 'other bits'}, not {chunk.columns['failure'][i]}")
+        floor = floor_text(alone.floors[0]) or None
+        if (reason, floor) != (chunk.columns["failure"][i], chunk.columns["accuracy_floor"][i]):
+            found.append(f"row {row}: {reason}, {floor}")
+        elif not same(alone.measured[0], measured):
+            found.append(f"row {row}: other bits")
     return found
 
 

@@ -10,7 +10,7 @@ from sweep_studies import POKES, STRUCTURE, study
 
 from rigid_proto_ros.base.bundled import body_names, study_names
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.sweep.row_random import normal_quantile, permuted, row_uniforms
+from rigid_proto_ros.sweep.sampling import normal_quantile, permuted, row_uniforms
 from rigid_proto_ros.sweep.study import read_study
 from rigid_proto_ros.sweep.variation import variation
 
