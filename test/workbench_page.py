@@ -213,3 +213,13 @@ def bare_page(port: int) -> Iterator:
     with connect(url, subprotocols=[protocol], max_size=None, max_queue=None) as page:
         page.send(msgspec.msgpack.encode(CAMERA_MESSAGE))
         yield page
+
+
+def said(page) -> str:
+    """The next of the texts that a server sends to ``bare_page``: its messages, without their arrays."""
+    import msgspec.msgpack
+    import zstandard
+
+    raw = page.recv(timeout=PATIENCE_S)
+    length = int.from_bytes(raw[8:16], "little")
+    return str(msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(raw[16 : 16 + length])))

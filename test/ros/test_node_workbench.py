@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""A node with its page: what comes by topic is seen on the page, and both end together."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed: no interactive page")
+
+from ros_process import RosProcess, run
+from workbench_page import bare_page, said
+
+SPEED = r"speed of the COM</td><td>([\d.e+-]+) m/s"
+
+
+def test_a_wrench_by_topic_is_read_off_the_page_of_the_node_which_ends_by_sigint(ros_environment, tmp_path) -> None:
+    node = RosProcess(
+        *("rigid_body_node", "--ros-args", "-p", "viewer:=workbench", "-p", "mesh:=book"),
+        environment=ros_environment,
+        log=tmp_path / "node",
+    )
+    try:
+        node.wait_for("the workbench is at")
+        port = int(re.search(r"the workbench is at http://127\.0\.0\.1:(\d+)", node.errors)[1])
+        with bare_page(port) as page:
+            while not (found := re.findall(SPEED, said(page))):
+                pass
+            assert found[-1] == "0"
+            sent = run("poke_client", "wrench", "--force", 1, 0, 0, "--for", 0.5, environment=ros_environment)
+            assert sent.returncode == 0, sent.stderr
+            while not (found := [x for x in re.findall(SPEED, said(page)) if float(x) > 0.0]):
+                pass
+    finally:
+        status = node.end()
+    assert status == 0, node.errors
+    assert "Traceback" not in node.errors
