@@ -68,8 +68,11 @@ SEEN_NS = 800_000_000
 TRAIL_NS = 4_000_000_000
 """[ns] Of the past that is drawn with a moment of it."""
 
-FORESEEN_S = {True: 3.0, False: 1.2}
-"""[s] Of the motion, that the picture makes room for: of a body on a string, or of one that falls."""
+FORESEEN_S = 3.0
+"""[s] Of the motion of a body on a string, that the picture makes room for."""
+
+LEAST_FALL_S, LONGEST_FALL_S = 0.6, 1.5
+"""[s] The same of one that falls, which has room until it is as high as at first."""
 
 COM_SIZE = 0.025
 """Radius of the centre of mass as drawn, in body sizes."""
@@ -449,9 +452,12 @@ class Page:
         points = [start]
         falls, held = bool(setup.gravity.any()), setup.string.attached
         if falls or held:
-            trial = Simulation(setup)
+            trial, foreseen_s = Simulation(setup), FORESEEN_S
+            if not held:
+                rise, pull = -float(setup.initial[7:10] @ setup.gravity), float(setup.gravity @ setup.gravity)
+                foreseen_s = min(max(2.0 * rise / pull, LEAST_FALL_S), LONGEST_FALL_S)
             for k in range(1, 41):
-                points.append(trial.advance(round(FORESEEN_S[held] * 1e9 * k / 40)).position)
+                points.append(trial.advance(round(foreseen_s * 1e9 * k / 40)).position)
         places = np.array(points)
         low, high = places.min(axis=0) - 0.5 * size, places.max(axis=0) + 0.5 * size
         if held:

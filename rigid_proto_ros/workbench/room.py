@@ -17,7 +17,7 @@ FIELD_OF_VIEW = math.radians(35.0)
 VIEW = np.array([0.50, -0.80, 0.34]) / math.sqrt(0.50**2 + 0.80**2 + 0.34**2)
 """Direction from the body to the camera, at first."""
 
-BODY_FILLS, PATH_FILLS = 0.62, 0.85
+BODY_FILLS, PATH_FILLS = 0.62, 0.9
 """Of the picture's height: the body's longest diagonal, so that the body as it stands fills a third, and the path of
 one that falls.
 """

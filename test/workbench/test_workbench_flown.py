@@ -22,10 +22,13 @@ from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
+from rigid_proto_ros.workbench.lesson_course import COURSES
 from rigid_proto_ros.workbench.lesson_panel import FREE
 from rigid_proto_ros.workbench.readouts import PLOTTED_S, SPEED
+from rigid_proto_ros.workbench.show_tab import SEE_INTO
 from rigid_proto_ros.workbench.status import motion_words
 
 
@@ -229,6 +232,49 @@ def test_a_body_of_any_size_fills_the_picture_alike_and_grows_in_sight(flown: Fl
     flown.set("Size ×", "9")
     flown.fly(0.1)
     assert backend.unit == picture.shape.size
+
+
+@pytest.mark.parametrize("name", sorted(COURSES))
+def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_things(
+    flown: FlownPage, name: str
+) -> None:
+    flown.set("Lesson", FREE)
+    flown.set("Lesson", lesson(name).title)
+    flown.until(lambda: flown.page.lessons._asked and not flown.page._undrawn, "question")
+    page, setup = flown.page, flown.scenario.setup
+    backend = page.backend
+
+    def seen(points) -> np.ndarray:
+        """World points (n, 3) [m] in half heights of the picture, across and up."""
+        camera = flown.server.initial_camera
+        away = camera.look_at - camera.position
+        away /= np.linalg.norm(away)
+        right = np.cross(away, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        from_camera = (np.asarray(points) - backend.origin) / backend.unit - camera.position
+        depth = from_camera @ away * np.tan(0.5 * camera.fov)
+        return np.column_stack([from_camera @ right, from_camera @ np.cross(right, away)]) / depth[:, np.newaxis]
+
+    vertices = flown.scenario.body_mesh.mesh.vertices * setup.body.scale - setup.body.center_of_mass
+    drawn = seen(page.state.position + vertices @ page.state.rotation.T)
+    assert np.abs(drawn).max() < 1.0
+    moves_away = setup.gravity.any() or setup.string.attached
+    # The least are the top on a string seven times its length, and the spinning top.
+    assert np.ptp(drawn, axis=0).max() / 2.0 > (0.07 if moves_away else 0.29), "of the height"
+    if setup.string.attached:
+        assert np.abs(seen([setup.string.target])).max() < 1.0, "the nail is beside the picture"
+        assert backend._nodes[style.STRING].visible and backend._nodes[style.HAND].visible
+    if setup.gravity.any():
+        trial = Simulation(setup)
+        path = [trial.advance(round(0.1e9 * k)).position for k in range(11)]
+        assert np.abs(seen(path)).max() < 1.0, "the path leaves the picture"
+    assert page.room._wall.visible == (bool(setup.gravity.any()) and not setup.string.attached)
+    assert sum(node.visible for node in backend._labels) <= 3
+    assert 3 <= len(page.lessons.course.numbers) <= 5
+    opacity = backend._nodes[style.BODY_MESH].opacity
+    assert (opacity is not None) == (SEE_INTO in page.lessons.course.shows)
+    if style.STRING_LINE in page.lessons.course.shows:
+        assert backend._nodes[style.STRING_LINE].visible
 
 
 def test_every_lesson_has_its_scene_text() -> None:
