@@ -18,9 +18,8 @@ from workbench_page import SOFTWARE_GL, Browser, Flown, chromium
 
 from rigid_proto_ros.scene.lessons import Lesson, lesson, lessons
 
-SIZE, MOVING_SIZE = (1400, 800), (1000, 560)
-SHOWN_SIZE = (800, 448)
-RATE = 12
+SIZE, MOVING_SIZE = (1400, 800), (800, 450)
+RATE = 10
 """[1/s] Pictures of the moving one, and of simulated time, which is shown as fast as it is."""
 COLOURS = 96
 
@@ -87,11 +86,12 @@ def show(page: Browser) -> None:
     flown = page.flown
     page.until(lambda: flown.page.state.time_ns == flown.live.state.time_ns, "state on the page")
     page.drawn()
+    print(f"{flown.live.state.time_ns * 1e-9:.2f} s", flush=True)
 
 
 def picture(page: Browser) -> Image.Image:
     with Image.open(io.BytesIO(page.page.screenshot())) as image:
-        return image.convert("RGB").resize(SHOWN_SIZE, Image.Resampling.LANCZOS)
+        return image.convert("RGB")
 
 
 def com(page: Browser) -> tuple[float, float]:
@@ -120,7 +120,7 @@ def draw_moving(page: Browser, file: Path) -> None:
     page.click(*com(page))
     time.sleep(0.3)
     pictures += play(page, 1.0, at_once=False)
-    pictures += pull(page, steps=18)
+    pictures += pull(page, steps=15)
     pictures += play(page, 0.5, at_once=False)
     page.release()
     time.sleep(0.3)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The lessons' pictures: each page's first command flown into out/, and its moment drawn; `make pictures` runs this."""
+"""The lessons' pictures: each page's first command flown into out/, and its moment drawn; and each lesson as one file to
+share, out/gallery/NAME.html. `make pictures` runs this.
+"""
 
 from __future__ import annotations
 
@@ -37,13 +39,14 @@ def draw(page: Path) -> int:
         "-o",
         picture,
     ]
-    return status or rigid_proto(snapshot)
+    file = f"out/gallery/{page.stem}.html"
+    return status or rigid_proto(snapshot) or rigid_proto(["lesson", page.stem, "--html", file])
 
 
 def main(names: list[str]) -> int:
     """Draw the pictures of these lessons, or of all; returns the first exit status that isn't 0."""
     os.chdir(HERE.parent.parent)
-    Path("out").mkdir(exist_ok=True)
+    Path("out/gallery").mkdir(parents=True, exist_ok=True)
     pages = [HERE / f"{name}.md" for name in names] or sorted(p for p in HERE.glob("*.md") if p.stem != "README")
     return next((status for page in pages if (status := draw(page))), 0)
 

@@ -288,7 +288,7 @@ def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | N
     moved = np.flatnonzero(high > low)
     targets = {
         f"{'span' if k < 3 else 'sag'} {'xyz'[k % 3]}": document.accessor(
-            np.repeat(shares[:, k] * (high - low)[k], len(around))[:, np.newaxis] * ways[k], bounds=True
+            np.repeat(shares[:, k] * (high - low)[k], len(around))[:, np.newaxis] * ways[k], VERTICES, bounds=True
         )
         for k in moved.tolist()
     }

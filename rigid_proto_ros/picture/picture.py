@@ -30,7 +30,6 @@ from .plots import Plots
 from .poinsot import PoinsotPicture
 from .string import StringRows, Strings, string_curves
 from .surface import ball_mesh, box_edges, box_mesh, shaded_surface
-from .trail import Trail
 
 RATE = 250
 """[1/s, simulated] Of what is only looked at, arrows, trails and plots; the body's place is that of every state."""
@@ -46,6 +45,9 @@ LABEL_BEYOND = 1.06
 
 TRAIL_SPACING = 1.5
 """Of a trail's points, in their radii."""
+
+POINTS_PER_PIECE_MAX = 16
+"""Points of a trail between two states."""
 
 LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
@@ -75,6 +77,44 @@ class Ticks:
         before = int(ticks[0]) - 1 if self._last is None else self._last
         self._last = int(ticks[-1])
         return np.flatnonzero(np.diff(ticks, prepend=before) > 0)
+
+
+class Trail:
+    """The path of one point of the body, as points so close that they look like a line."""
+
+    def __init__(self) -> None:
+        self._last: tuple[int, np.ndarray, np.ndarray] | None = None
+
+    def between(
+        self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray, point: np.ndarray, spacing: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Counts (n,) and points (m, 3) [world] on the path from the state before to each of rows (n, 13) with
+        attitudes R (n, 3, 3).
+
+        The body point (3,) moves between two states on the cubic that has its position and velocity at both.
+        """
+        at = rows[:, 0:3] + R @ point
+        velocity = rows[:, 7:10] + np.einsum("nij,nj->ni", R, np.cross(rows[:, 10:13], point))
+        if self._last is None:
+            self._last = (int(times_ns[0]), at[0], velocity[0])
+        first_ns, first_at, first_velocity = self._last
+        h = 1e-9 * np.diff(times_ns, prepend=first_ns)[:, np.newaxis]
+        start = np.vstack([first_at, at[:-1]])
+        start_slope, end_slope = np.vstack([first_velocity, velocity[:-1]]) * h, velocity * h
+        self._last = (int(times_ns[-1]), at[-1].copy(), velocity[-1].copy())
+
+        length = np.linalg.norm(at - start, axis=1)
+        counts = np.clip(np.ceil(length / spacing), 1, POINTS_PER_PIECE_MAX).astype(int)
+        piece = np.repeat(np.arange(len(at)), counts)
+        within = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+        u = (within / counts[piece])[:, np.newaxis]
+        points = (
+            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * start[piece]
+            + u * (1.0 - u) ** 2 * start_slope[piece]
+            + u * u * (3.0 - 2.0 * u) * at[piece]
+            - u * u * (1.0 - u) * end_slope[piece]
+        )
+        return counts, points
 
 
 class Shape:

@@ -14,8 +14,7 @@ import viser
 from ..mass.tensor import principal_axes
 from ..motion.state import State
 from ..picture import style
-from ..picture.plot_range import AXIS_PIXELS, PlotRange, plot_range
-from ..picture.plots import angle_to
+from ..picture.plots import AXIS_PIXELS, PlotRange, angle_to, plot_range
 from ..scene.scenario import Scenario
 from ..simulation.quantities import attitude_angle
 

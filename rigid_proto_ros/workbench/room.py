@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..picture.plot_range import nice_step
+from ..picture.plots import nice_step
 from ..picture.surface import BOX_CORNERS
 
 FIELD_OF_VIEW = math.radians(35.0)

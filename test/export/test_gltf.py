@@ -215,7 +215,7 @@ def painted_cube(file: Path) -> bytes:
     for half, material in ((BOX_TRIANGLES[:6], 0), (BOX_TRIANGLES[6:], 1)):
         mesh = document.mesh(
             "half",
-            {"POSITION": corners, "TEXCOORD_0": corners},
+            {"POSITION": corners},
             document.accessor(half.ravel(), INDICES),
             TRIANGLES,
             material,

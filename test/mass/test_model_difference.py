@@ -16,7 +16,7 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.model_difference import model_difference
 from rigid_proto_ros.mass.properties import INERTIA_MODELS, MassProperties, MeshMoments
 from rigid_proto_ros.scene.offline import read_scene
-from rigid_proto_ros.workbench.tensors import comparison
+from rigid_proto_ros.workbench.body_tab import comparison
 
 MODELS = [model for model in INERTIA_MODELS if model != "explicit"]
 

@@ -14,11 +14,10 @@ from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.picture.arrows import LONGEST, USUAL, ArrowScales
-from rigid_proto_ros.picture.picture import Picture, Shape
+from rigid_proto_ros.picture.picture import Picture, Shape, Trail
 from rigid_proto_ros.picture.plots import angle_to
 from rigid_proto_ros.picture.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
 from rigid_proto_ros.picture.surface import ball_mesh, box_mesh, shaded_surface
-from rigid_proto_ros.picture.trail import Trail
 from rigid_proto_ros.simulation.observer import BodySnapshot, ShownLoad, ShownString
 from rigid_proto_ros.simulation.quantities import attitude_angle
 

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.picture.picture import skewed
-from rigid_proto_ros.picture.plot_range import plot_range, with_two_ticks
+from rigid_proto_ros.picture.plots import plot_range, with_two_ticks
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view import streams
 from rigid_proto_ros.rerun_view.layout import TITLES, Finished, Layout, Subject

@@ -11,7 +11,7 @@ from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
-from rigid_proto_ros.rerun_view.run_log import readable
+from rigid_proto_ros.rerun_view.writer import readable
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
     BodySnapshot,

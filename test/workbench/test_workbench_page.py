@@ -57,7 +57,9 @@ def fly(page: Browser, scene) -> None:
         flown.page.lessons.leave()
 
     asyncio.run_coroutine_threadsafe(begin(), flown.page.loop).result(60.0)
-    page.until(lambda: not flown.page._new_scene and not flown.page._undrawn, "another body")
+    shown = flown.page
+    page.until(lambda: shown._scenes_seen == shown.flight.scenes_begun and not shown._new_scene, "another body")
+    page.until(lambda: not shown._undrawn, "its first state")
     page.drawn(3)
 
 
@@ -116,7 +118,7 @@ def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> 
     for modifier in ("", "Shift"):
         fly(page, {"mesh": "hollow_box", "poke_duration": 30.0})
         # So weak that the body, which it acts on for long, hardly moves meanwhile.
-        page.flown.page.tools.force *= 1e-3
+        page.flown.page.tools.force *= 0.1
         x, y = com_pixel(page)
         page.click(x + 30.0, y + 5.0, modifier)
         arrow = page.until(lambda: page.flown.node(shown), "arrow")

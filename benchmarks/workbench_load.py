@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""What a page costs the body that flies in its process: overruns and share of a core at 1 kHz, with a page and without, by
+turns; from a move of the hand to the string as it is sent to be drawn; memory, while somebody pokes and pulls.
+
+The page is a process of its own that reads what a browser would be sent. ``--minutes`` is for the memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import random
+import resource
+import statistics
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent), str(FOLDER.parent / "test")]
+
+from result_table import ResultTable
+
+ROUNDS, ROUND_S = 5, 6.0
+"""Of each, by turns."""
+MOVES = 100
+
+
+def read(port: int) -> None:
+    """The other process: a page."""
+    from workbench_page import bare_page
+
+    with bare_page(port) as page:
+        print("open", flush=True)
+        for _ in page:
+            pass
+
+
+@contextmanager
+def opened(port: int):
+    page = subprocess.Popen([sys.executable, __file__, "--read", str(port)], stdout=subprocess.PIPE)
+    page.stdout.readline()
+    time.sleep(1.0)
+    try:
+        yield
+    finally:
+        page.kill()
+        page.wait()
+
+
+def load(flown) -> tuple[float, float]:
+    """Overruns and CPU time, each a second, of this process."""
+    before, cpu, wall = flown.live.loop.timekeeping.overruns, time.process_time(), time.monotonic()
+    time.sleep(ROUND_S)
+    wall = time.monotonic() - wall
+    return (flown.live.loop.timekeeping.overruns - before) / wall, (time.process_time() - cpu) / wall
+
+
+def drawn_string_ms(flown) -> list[float]:
+    """From a move of the hand to another end of the string in what the browsers are sent."""
+    from rigid_proto_ros.picture import style
+
+    page, found = flown.page, []
+
+    async def moved(x: float) -> float:
+        hand = page.backend._nodes.get(style.HAND)
+        before, began = None if hand is None else tuple(hand.position), time.monotonic()
+        page.pointer.pull((x, 0.0, 0.0))
+        while (hand := page.backend._nodes.get(style.HAND)) is None or tuple(hand.position) == before:
+            await asyncio.sleep(0.0005)
+        return 1e3 * (time.monotonic() - began)
+
+    async def grab() -> None:
+        page.pointer.grab(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    asyncio.run_coroutine_threadsafe(grab(), page.loop).result(30.0)
+    for k in range(MOVES):
+        time.sleep(random.uniform(0.2, 0.24))  # the end has come to the target before, which takes 0.1 s
+        found.append(asyncio.run_coroutine_threadsafe(moved(0.2 + 1e-3 * k), page.loop).result(30.0))
+    page.loop.call_soon_threadsafe(page.pointer.let_go)
+    return found
+
+
+def memory_mb(flown, minutes: float) -> list[float]:
+    """Of this process, ten times, while it is poked every second and reset now and then."""
+    page, found = flown.page, []
+    end = time.monotonic() + 60.0 * minutes
+    for k in range(10):
+        while time.monotonic() < end - 60.0 * minutes * (9 - k) / 10:
+            page.loop.call_soon_threadsafe(page.flight.do, {"at": "com", "torque": [1e-3, 0.0, 0.0]})
+            time.sleep(1.0)
+        if k % 3 == 2:
+            flown.live.reset()
+        found.append(int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 1e6)
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--read", type=int, help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.read:
+        read(args.read)
+        return
+    from workbench_page import Flown
+
+    table = ResultTable(
+        FOLDER / "results" / "workbench_load.csv", ("what", "without_page", "with_page", "ratio", "load")
+    )
+
+    def tell(what: str, without: float, with_page: float) -> None:
+        row = {"what": what, "without_page": without, "with_page": with_page, "load": os.getloadavg()[0]}
+        row["ratio"] = with_page / without if without else float("nan")
+        table.add(row)
+        print(f"{what}: {without:.3g} without a page, {with_page:.3g} with one (load {row['load']:.1f})", flush=True)
+
+    flown = Flown("t_handle")
+    port = flown.server.get_port()
+    try:
+        flown.live.set_parameters({"publish_rate": 1000.0})
+        rounds = []
+        for _ in range(ROUNDS):
+            time.sleep(3.0)  # the page before is forgotten
+            alone = load(flown)
+            with opened(port):
+                rounds.append((alone, load(flown)))
+        for k, what in enumerate(("overruns a second", "share of a core")):
+            tell(what, *(statistics.median(pair[side][k] for pair in rounds) for side in (0, 1)))
+        with opened(port):
+            found = drawn_string_ms(flown)
+            tell("move of the hand to drawn string [ms], median", float("nan"), statistics.median(found))
+            tell("the same, 95 %", float("nan"), sorted(found)[int(0.95 * len(found))])
+            sizes = memory_mb(flown, args.minutes)
+            tell(f"memory [MB] after a tenth of {args.minutes:g} minutes", float("nan"), sizes[0])
+            tell("memory [MB] at their end", float("nan"), sizes[-1])
+    finally:
+        flown.end()
+    table.write()
+
+
+if __name__ == "__main__":
+    main()
