@@ -6,9 +6,11 @@ A signal that comes before Python has run our first line ends the interpreter as
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
+import time
 import weakref
 from collections.abc import Callable
 from typing import Any
@@ -19,6 +21,7 @@ AGAIN_S = 0.5
 """How soon an interrupt is raised anew where a library's code has swallowed it [s]."""
 
 _received = 0
+_done = False
 
 
 class Interrupted(KeyboardInterrupt):
@@ -33,7 +36,6 @@ def end_at_once(status: int | None = None) -> None:
     """From now on a signal ends the process right away, with this status: for as long as there is nothing to close, as
     while modules are imported.
     """
-    _stop_raising()
     for number in NUMBERS:
         signal.signal(number, lambda got, _: os._exit(128 + got if status is None else status))
 
@@ -48,8 +50,9 @@ def run(work: Callable[[], int], tell: Callable[[Exception], int]) -> int:
             status = work()
         except Exception as error:
             if _received:
-                # A library that is imported, or has files open, takes an interrupt for an error of its own.
-                raise KeyboardInterrupt from error
+                # A library takes an interrupt for an error of its own, as numpy does when it is imported.
+                done()
+                return 128 + _received
             status = tell(error)
         done()  # in here: a signal that comes now is handled, too
         return status
@@ -68,9 +71,11 @@ def _interrupt_once() -> None:
 
     def interrupt(got: int, _: object) -> None:
         global _received
-        _ignore()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         _received = got
         sys.unraisablehook = quiet
+        # Not by threading: what was interrupted may hold a lock of it.
+        _thread.start_new_thread(_raise_again, ())
         _raise()
 
     for number in NUMBERS:
@@ -78,7 +83,7 @@ def _interrupt_once() -> None:
 
 
 def _raise() -> None:
-    """Raise Interrupted, and again for as long as nobody handles it: only who handles an exception keeps it."""
+    """Raise Interrupted, and when SIGTERM is handled once more if nobody handles it: only who does that keeps it."""
     error = Interrupted()
     handled = weakref.ref(error)
 
@@ -86,12 +91,18 @@ def _raise() -> None:
         if handled() is None:
             _raise()
 
-    signal.signal(signal.SIGALRM, look)
-    signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+    signal.signal(signal.SIGTERM, look)
     try:
         raise error
     finally:
         del error  # the traceback holds this frame, which would hold the exception
+
+
+def _raise_again() -> None:
+    """On a thread, until ``done``: have the main thread look whether the interrupt is handled."""
+    while not _done:
+        time.sleep(AGAIN_S)
+        _thread.interrupt_main(signal.SIGTERM)
 
 
 def done() -> None:
@@ -99,15 +110,7 @@ def done() -> None:
 
     Python itself forgets its handlers before it ends, and would be killed by the signal then.
     """
-    _stop_raising()
-    _ignore()
-
-
-def _ignore() -> None:
+    global _done
+    _done = True
     for number in NUMBERS:
         signal.signal(number, signal.SIG_IGN)
-
-
-def _stop_raising() -> None:
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
