@@ -89,10 +89,10 @@ def keeps_rate(integrator, starts, h: float, accuracy: float) -> bool:
     exact = INTEGRATORS["dop853"]
     for p, y, elapsed in starts:
         mine, fine = y.copy(), y.copy()
-        if integrator.kernel_for(p)(mine, p, h, 1) != 1:
+        if integrator.kernel(mine, p, h, 1) != 1:
             return False
         substeps = max(SUBSTEPS, math.ceil(h * float(np.linalg.norm(y[SPIN : SPIN + 3])) / RADIANS))
-        if exact.kernel_for(p)(fine, p, h / substeps, substeps) != substeps:
+        if exact.kernel(fine, p, h / substeps, substeps) != substeps:
             return False
         # Rounding of the judge's own substeps is not the judged one's.
         if not _difference(mine, fine, p, elapsed + h) <= accuracy * h + 2.0 * FLOOR:

@@ -27,15 +27,15 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
-from rigid_proto_ros.base.addresses import entry_of
 from rigid_proto_ros.base.compilation import njit
+from rigid_proto_ros.base.function_pointers import entry_of
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.simulation import flight as fl
 from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows
 from rigid_proto_ros.simulation.flight_arrays import _arrays
-from rigid_proto_ros.simulation.flight_measures import CODE, MEASURE
+from rigid_proto_ros.simulation.quantities import CODE, MEASURE
 from work_precision_ours import prepare_simulation, setup_of, simulation_of
 from work_precision_ratios import time_at_error
 

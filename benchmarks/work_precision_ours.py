@@ -164,7 +164,7 @@ def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None
     # A command at time 0 acts with the first advance beyond it.
     simulation.advance(1)
     segment = simulation._segment
-    p, kernel = segment.problem, INTEGRATORS[integrator].kernel_for(segment.problem)
+    p, kernel = segment.problem, INTEGRATORS[integrator].kernel
     if kernel is None:
         return None
     begin = time.perf_counter()

@@ -26,7 +26,7 @@ from rigid_proto_ros.motion.integrators.integrator import (
 )
 from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import StringSettings, Tied, tie
+from rigid_proto_ros.motion.string import StringSettings, StringState, tie
 
 TENSOR = ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9))
 MASS = 2.0
@@ -65,7 +65,7 @@ class Scene:
         )
         return problem, state
 
-    def tied(self, body, state) -> Tied | None:
+    def tied(self, body, state) -> StringState | None:
         return tie(self.string, self.string.attach, self.string.target, body, state, 0) if self.string else None
 
     def reference(self, times) -> list:

@@ -7,14 +7,13 @@ import numpy as np
 
 from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.motion.body import LENGTH, Body
-from rigid_proto_ros.motion.integrators.control import CONTROL
 from rigid_proto_ros.motion.integrators.integrator import Integrator
+from rigid_proto_ros.motion.integrators.series_steps import CONTROL, degree_for
 from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel, workspace_size
-from rigid_proto_ros.motion.integrators.taylor_adaptive import degree_for
 from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.problem import PROBLEM, begin_body, begin_problem, begin_string
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import Tied
+from rigid_proto_ros.motion.string import StringState
 from rigid_proto_ros.motion.variables import STORED, to_variables
 from rigid_proto_ros.simulation import flight as fl
 
@@ -27,7 +26,7 @@ def make_problem(
     angular_damping: float,
     gyroscopic: bool,
     state: State,
-    string: Tied | None = None,
+    string: StringState | None = None,
     length: float = 1.0,
 ) -> np.record:
     """The segment's problem for a body under summed loads, and a string if tied, from a state on."""

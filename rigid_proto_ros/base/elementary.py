@@ -59,6 +59,7 @@ _HALF_PI_1 = 1.5707963267341256
 _HALF_PI_2 = 6.077100506303966e-11
 _HALF_PI_3 = 2.0222662487959506e-21
 _PAIR_HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
+_THIRD_OF_HALF_PI = -1.4973849048591833e-33
 
 _AS_ITSELF = 1e-9
 """|x| below which x²/2 is lost beside 1, so that sine, tangent and their like are x."""
@@ -70,246 +71,76 @@ _NEAR_MULTIPLE = 2.0**-30
 # Minimax polynomials in the square (exp: in the argument itself) of what is left after
 # sin r = r + r³ S, cos r = 1 − r²/2 + r⁴ C, eʳ = 1 + r + r²/2 + r³ E, artanh s = s + s³ T, arctan z = z + z³ A.
 _SIN = (
-    -0.1666666666666663,
-    0.008333333333322108,
-    -0.00019841269829580234,
-    2.7557313618034487e-06,
-    -2.5050747220107847e-08,
-    1.5896197712199157e-10,
+    *(-0.1666666666666663, 0.008333333333322108, -0.00019841269829580234, 2.7557313618034487e-06),
+    *(-2.5050747220107847e-08, 1.5896197712199157e-10),
 )
 _COS = (
-    0.041666666666666595,
-    -0.001388888888887304,
-    2.480158728884145e-05,
-    -2.755731417625541e-07,
-    2.087570041819921e-09,
-    -1.1358514060814301e-11,
+    *(0.041666666666666595, -0.001388888888887304, 2.480158728884145e-05, -2.755731417625541e-07),
+    *(2.087570041819921e-09, -1.1358514060814301e-11),
 )
 _EXP = (
-    0.16666666666666682,
-    0.0416666666666667,
-    0.008333333333316857,
-    0.001388888888886516,
-    0.00019841269896821913,
-    2.480158736512563e-05,
-    2.75572344355906e-06,
-    2.755723865038956e-07,
-    2.5112179990753723e-08,
-    2.092568857645337e-09,
+    *(0.16666666666666682, 0.0416666666666667, 0.008333333333316857, 0.001388888888886516),
+    *(0.00019841269896821913, 2.480158736512563e-05, 2.75572344355906e-06, 2.755723865038956e-07),
+    *(2.5112179990753723e-08, 2.092568857645337e-09),
 )
 _ATANH = (
-    0.33333333333333676,
-    0.1999999999970468,
-    0.14285714371842764,
-    0.11111099214521343,
-    0.0909178617639457,
-    0.0765691609772075,
-    0.07399129342169176,
+    *(0.33333333333333676, 0.1999999999970468, 0.14285714371842764, 0.11111099214521343),
+    *(0.0909178617639457, 0.0765691609772075, 0.07399129342169176),
 )
 _ATAN = (
-    -0.3333333333333333,
-    0.199999999999999,
-    -0.14285714285675663,
-    0.11111111103649086,
-    -0.0909090827462691,
-    0.0769225367843588,
-    -0.06664458490498826,
-    0.05827632965465174,
-    -0.04502428537208239,
+    *(-0.3333333333333333, 0.199999999999999, -0.14285714285675663, 0.11111111103649086),
+    *(-0.0909090827462691, 0.0769225367843588, -0.06664458490498826, 0.05827632965465174),
+    *(-0.04502428537208239,),
 )
 
 # arctan k/8, π/2 ∓ it, π − it for k = 0 … 8, and what doubles lack of them.
 _ANGLES = np.array(
     [
-        [
-            0.0,
-            0.12435499454676144,
-            0.24497866312686414,
-            0.35877067027057225,
-            0.4636476090008061,
-            0.5585993153435624,
-            0.6435011087932844,
-            0.7188299996216245,
-            0.7853981633974483,
-        ],
-        [
-            1.5707963267948966,
-            1.446441332248135,
-            1.3258176636680326,
-            1.2120256565243244,
-            1.1071487177940904,
-            1.0121970114513341,
-            0.9272952180016122,
-            0.8519663271732721,
-            0.7853981633974483,
-        ],
-        [
-            1.5707963267948966,
-            1.695151321341658,
-            1.8157749899217608,
-            1.9295669970654687,
-            2.0344439357957027,
-            2.129395642138459,
-            2.214297435588181,
-            2.289626326416521,
-            2.356194490192345,
-        ],
-        [
-            3.141592653589793,
-            3.017237659043032,
-            2.896613990462929,
-            2.782821983319221,
-            2.677945044588987,
-            2.5829933382462307,
-            2.498091544796509,
-            2.4227626539681686,
-            2.356194490192345,
-        ],
+        *(0.0, 0.12435499454676144, 0.24497866312686414, 0.35877067027057225),
+        *(0.4636476090008061, 0.5585993153435624, 0.6435011087932844, 0.7188299996216245),
+        *(0.7853981633974483, 1.5707963267948966, 1.446441332248135, 1.3258176636680326),
+        *(1.2120256565243244, 1.1071487177940904, 1.0121970114513341, 0.9272952180016122),
+        *(0.8519663271732721, 0.7853981633974483, 1.5707963267948966, 1.695151321341658),
+        *(1.8157749899217608, 1.9295669970654687, 2.0344439357957027, 2.129395642138459),
+        *(2.214297435588181, 2.289626326416521, 2.356194490192345, 3.141592653589793),
+        *(3.017237659043032, 2.896613990462929, 2.782821983319221, 2.677945044588987),
+        *(2.5829933382462307, 2.498091544796509, 2.4227626539681686, 2.356194490192345),
     ]
-)
+).reshape(4, 9)
 _ANGLES_LOW = np.array(
     [
-        [
-            0.0,
-            -3.1253241424539383e-18,
-            1.0698755618734451e-17,
-            -2.4623815582638635e-17,
-            2.2698777452961687e-17,
-            -5.4556305485916264e-18,
-            1.5834785051444286e-17,
-            -2.1478388444456983e-17,
-            3.061616997868383e-17,
-        ],
-        [
-            6.123233995736766e-17,
-            9.211323971545052e-17,
-            -8.824429373951136e-17,
-            3.034500430874847e-17,
-            9.40447137356638e-17,
-            6.668797050595929e-17,
-            4.5397554905923374e-17,
-            -2.831157406069101e-17,
-            3.061616997868383e-17,
-        ],
-        [
-            6.123233995736766e-17,
-            3.0351440199284805e-17,
-            -1.133563127078463e-17,
-            9.211967560598685e-17,
-            2.841996617907152e-17,
-            5.577670940877603e-17,
-            1.880894274713276e-16,
-            3.975395151291068e-17,
-            9.184850993605148e-17,
-        ],
-        [
-            1.2246467991473532e-16,
-            -6.869902525221314e-17,
-            1.950326511428876e-16,
-            9.157734426611613e-17,
-            1.5527705369303147e-16,
-            1.2792031046332694e-16,
-            -4.392407599224622e-18,
-            1.439430683591923e-16,
-            9.184850993605148e-17,
-        ],
+        *(0.0, -3.1253241424539383e-18, 1.0698755618734451e-17, -2.4623815582638635e-17),
+        *(2.2698777452961687e-17, -5.4556305485916264e-18, 1.5834785051444286e-17, -2.1478388444456983e-17),
+        *(3.061616997868383e-17, 6.123233995736766e-17, 9.211323971545052e-17, -8.824429373951136e-17),
+        *(3.034500430874847e-17, 9.40447137356638e-17, 6.668797050595929e-17, 4.5397554905923374e-17),
+        *(-2.831157406069101e-17, 3.061616997868383e-17, 6.123233995736766e-17, 3.0351440199284805e-17),
+        *(-1.133563127078463e-17, 9.211967560598685e-17, 2.841996617907152e-17, 5.577670940877603e-17),
+        *(1.880894274713276e-16, 3.975395151291068e-17, 9.184850993605148e-17, 1.2246467991473532e-16),
+        *(-6.869902525221314e-17, 1.950326511428876e-16, 9.157734426611613e-17, 1.5527705369303147e-16),
+        *(1.2792031046332694e-16, -4.392407599224622e-18, 1.439430683591923e-16, 9.184850993605148e-17),
     ]
-)
-
-_LIMB = 28
-_LIMB_MASK = (1 << _LIMB) - 1
-_TWO_OVER_PI = np.array(
-    [
-        0x0000000,
-        0x0000000,
-        0xA2F9836,
-        0xE4E4415,
-        0x29FC275,
-        0x7D1F534,
-        0xDDC0DB6,
-        0x295993C,
-        0x439041F,
-        0xE5163AB,
-        0xDEBBC56,
-        0x1B7246E,
-        0x3A424DD,
-        0x2E00649,
-        0x2EEA09D,
-        0x1921CFE,
-        0x1DEB1CB,
-        0x129A73E,
-        0xE88235F,
-        0x52EBB44,
-        0x84E99C7,
-        0x026B45F,
-        0x7E41399,
-        0x1D63983,
-        0x5339F49,
-        0xC845F8B,
-        0xBDF9283,
-        0xB1FF897,
-        0xFFDE059,
-        0x80FEF2F,
-        0x118B5A0,
-        0xA6D1F6D,
-        0x367ECF2,
-        0x7CB09B7,
-        0x4F463F6,
-        0x69E5FEA,
-        0x2D7527B,
-        0xAC7EBE5,
-        0xF17B3D0,
-        0x739F78A,
-        0x5292EA6,
-        0xBFB5FB1,
-        0x1F8D5D0,
-        0x8560330,
-        0x46FC7B6,
-    ],
-    np.int64,
-)
-"""2/π in limbs of 28 bits, two limbs of zeros before the point."""
+).reshape(4, 9)
 
 
 @njit(cache=True, error_model="numpy")
-def _reduced_exactly(x: float) -> tuple[int, float, float]:
-    """As ``_reduced`` for any finite x, with as many digits of 2/π as that takes (Payne and Hanek, SIGNUM Newsletter 18
-    (1983) 19): those whose product with x is a multiple of four quarter turns are left out.
+def _reduced_in_pairs(x: float) -> tuple[int, float, float]:
+    """As ``_reduced``, for |x| < 2⁵¹ with three doubles of π/2. Beyond, neighbours are further apart than an angle is
+    of use: then x is taken modulo the double that is nearest to 2π.
     """
-    bits = bits_of(abs(x))
-    mantissa = (bits & MANTISSA) | (1 << MANTISSA_BITS)
-    # The last bit of x counts 2**(first − 1022): from bit ``first`` on, the product's top two bits are the quadrant.
-    first = (bits >> MANTISSA_BITS) - BIAS - MANTISSA_BITS - 2 + 2 * _LIMB
-    at, shift = first // _LIMB, first % _LIMB
-    low, high = mantissa & _LIMB_MASK, mantissa >> _LIMB
-    product = np.empty(7, np.int64)
-    carry, after = 0, 0
-    for k in range(6, -1, -1):
-        limb = ((_TWO_OVER_PI[at + k] << shift) | (_TWO_OVER_PI[at + k + 1] >> (_LIMB - shift))) & _LIMB_MASK
-        total = limb * low + after * high + carry
-        carry, after = total >> _LIMB, limb
-        product[k] = total & _LIMB_MASK
-    quarters = product[0] >> (_LIMB - 2)
-    product[0] &= _LIMB_MASK >> 2
-    negative = product[0] >> (_LIMB - 3) == 1
-    if negative:
-        quarters += 1
-        borrow = 0
-        for k in range(6, -1, -1):
-            difference = -product[k] - borrow
-            product[k] = difference & _LIMB_MASK
-            borrow = 1 if difference < 0 else 0
-        product[0] &= _LIMB_MASK >> 2
-    part, part_low, weight = 0.0, 0.0, 2.0 ** (2 - _LIMB)
-    for k in range(7):
-        part, lost = two_sum(part, float(product[k]) * weight)
-        part_low += lost
-        weight *= 2.0**-_LIMB
-    part, part_low = fast_two_sum(part, part_low)
-    r, r_low = pair_multiply(part, part_low, _PAIR_HALF_PI[0], _PAIR_HALF_PI[1])
-    if negative != (x < 0.0):
-        r, r_low = -r, -r_low
-    return -quarters if x < 0.0 else quarters, r, r_low
+    if abs(x) >= 2.0**51:
+        x = x % (2.0 * math.pi)
+    whole = (x * (2.0 / math.pi) + _TO_NEAREST) - _TO_NEAREST
+    for _ in range(2):
+        product, product_low = two_product(whole, _PAIR_HALF_PI[0])
+        r, low = pair_add(x, 0.0, -product, -product_low)
+        product, product_low = two_product(whole, _PAIR_HALF_PI[1])
+        r, low = pair_add(r, low, -product, -product_low)
+        r, low = pair_add(r, low, -whole * _THIRD_OF_HALF_PI, 0.0)
+        # The quotient's own rounding may have missed the nearest whole number.
+        if abs(r) <= 0.25 * math.pi:
+            break
+        whole += math.copysign(1.0, r)
+    return int(whole), r, low
 
 
 @njit(cache=True, error_model="numpy")
@@ -327,7 +158,7 @@ def _reduced(x: float) -> tuple[int, float, float]:
             return int(whole), r, low
     if not size < math.inf:
         return 0, math.nan, 0.0
-    return _reduced_exactly(x)
+    return _reduced_in_pairs(x)
 
 
 @njit(cache=True, error_model="numpy")
@@ -367,19 +198,13 @@ def sine_cosine(x: float) -> tuple[float, float]:
 @njit(cache=True, error_model="numpy")
 def sine(x: float) -> float:
     """sin x."""
-    if abs(x) < _AS_ITSELF:
-        return x
-    n, r, low = _reduced(x) if not abs(x) <= 0.25 * math.pi else (0, x, 0.0)
-    s = _cosine(r, low) if n & 1 else _sine(r, low)
-    return -s if n & 2 else s
+    return sine_cosine(x)[0]
 
 
 @njit(cache=True, error_model="numpy")
 def cosine(x: float) -> float:
     """cos x."""
-    n, r, low = _reduced(x) if not abs(x) <= 0.25 * math.pi else (0, x, 0.0)
-    c = _sine(r, low) if n & 1 else _cosine(r, low)
-    return -c if (n + 1) & 2 else c
+    return sine_cosine(x)[1]
 
 
 @njit(cache=True, error_model="numpy")
@@ -418,7 +243,7 @@ def exponential_of(x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _exponential_less_one(x: float) -> tuple[float, float]:
+def _expm1(x: float) -> tuple[float, float]:
     """eˣ − 1 as a pair, |x| < 709."""
     n, r, t, t_low = _exponential_parts(x)
     if n == 0:
@@ -431,13 +256,13 @@ def _exponential_less_one(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def exponential_less_one(x: float) -> float:
+def expm1(x: float) -> float:
     """eˣ − 1, without cancellation for small x."""
     if not -40.0 < x < 709.0:
         return -1.0 if x < 0.0 else exponential_of(x)
     if abs(x) < 1e-17:
         return x
-    return _exponential_less_one(x)[0]
+    return _expm1(x)[0]
 
 
 @njit(cache=True, error_model="numpy")
@@ -489,7 +314,7 @@ def hyperbolic_tangent(x: float) -> float:
         return math.copysign(1.0, x) if size > 0.0 else x
     if size < _AS_ITSELF:
         return x
-    high, low = _exponential_less_one(2.0 * size)
+    high, low = _expm1(2.0 * size)
     below, below_low = pair_add(high, low, 2.0, 0.0)
     return math.copysign(pair_divide(high, low, below, below_low)[0], x)
 
@@ -597,21 +422,3 @@ def inverse_tangent_of(y: float, x: float) -> float:
     less, more = min(across, along), max(across, along)
     octant = (3 if back else 0) if across <= along else (2 if back else 1)
     return math.copysign(_angle(less, more, octant), y)
-
-
-@njit(cache=True, error_model="numpy")
-def cube_root(x: float) -> float:
-    """∛x by Halley's iteration from the exponent's third; the last step's residual is taken in pairs."""
-    if x == 0.0 or not abs(x) < math.inf:
-        return x
-    m, exponent = math.frexp(abs(x))
-    third = exponent // 3
-    m = math.ldexp(m, exponent - 3 * third)  # ½ ≤ m < 4
-    y = 0.6 + 0.3 * m - 0.02 * m * m
-    for _ in range(3):
-        cube = y * y * y
-        y *= (cube + 2.0 * m) / (2.0 * cube + m)
-    square, square_low = two_product(y, y)
-    cube, cube_low = pair_multiply(square, square_low, y, 0.0)
-    y -= ((cube - m) + cube_low) / (3.0 * square)
-    return math.copysign(math.ldexp(y, third), x)

@@ -18,7 +18,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import models, overload, register_model
 
-from .compilation import INTERPRETED, intrinsic
+from .compilation import INTERPRETED, intrinsic, njit
 
 _DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 LINE = 8
@@ -46,7 +46,7 @@ def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
     vector that crosses two takes twice as long.
     """
     whole = np.zeros(shape[0] * shape[1] + LINE)
-    first = -(whole.ctypes.data // 8 + before) % LINE
+    first = -(whole.__array_interface__["data"][0] // 8 + before) % LINE
     return whole[first : first + shape[0] * shape[1]].reshape(shape)
 
 
@@ -201,6 +201,18 @@ def number(_typing_context: Any, vector: Any, at: Any) -> tuple:
     return types.float64(vector, at), lambda _, builder, _signature, arguments: builder.extract_element(
         arguments[0], index
     )
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def four(a: float, b: float, c: float, d: float) -> Packed:
+    """Four numbers side by side. What was stored one by one and is loaded together has to wait until it is written."""
+    return joined(filled(a, 1), filled(b, 1), filled(c, 1), filled(d, 1))
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def triple(array: np.ndarray, at: int, last: float) -> Packed:
+    """Three numbers of an array from ``at`` on, and ``last``."""
+    return four(array[at], array[at + 1], array[at + 2], last)
 
 
 def _operation(name: str) -> Callable:

@@ -117,6 +117,8 @@ def _print_session(name: str, session: RecordedSession) -> None:
         print(f"  truncated: {session.readable_bytes} of {session.file_bytes} bytes are complete")
     if session.missing:
         print(f"  without {', '.join(session.missing)}")
+    if session.accuracy_floor:
+        print(f"  the accuracy asked for is not held throughout: {session.accuracy_floor}")
     for time_ns, line in session.refusals[:REFUSALS_SHOWN]:
         print(f"  refused at {time_ns / 1e9:.9g} s: {line}")
     if (more := len(session.refusals) - REFUSALS_SHOWN) > 0:

@@ -12,15 +12,15 @@ from functools import cache, cached_property
 import numpy as np
 from numba import from_dtype, int64, types
 
+from ..base.borrowed_views import copy_numbers
 from ..base.compilation import njit
 from ..base.rotation import quaternion_of_axes, rotate_inverse
-from ..base.uncounted_arrays import copy_numbers
 from ..mass.tensor import principal_axes_kernel
 from ..motion import body as of_body
 from ..motion import loads as ld
 from ..motion.integrators.auto import AUTO
+from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
-from ..motion.integrators.taylor_adaptive import degree_for
 from ..motion.problem import begin_body
 from ..simulation import flight as fl
 

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import boolean, float64
 
-from ..base.addresses import entry_of
 from ..base.compilation import njit
 from ..base.errors import CommandRefused
+from ..base.function_pointers import entry_of
 from ..base.rotation import Numbers, Vector, matrix_elements, transposed_times, vector
 from . import body as of_body
 from .body import Body
@@ -114,7 +114,7 @@ def is_zero(load: np.ndarray) -> bool:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def share_of(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
+def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
     """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r
     Fᵀ of a world force.
     """
@@ -244,7 +244,7 @@ class LoadSum:
     """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F
     world).
 
-    All are parts of ``values`` (LOADS_SIZE,), in the order of ``share_of``.
+    All are parts of ``values`` (LOADS_SIZE,), in the order of ``accumulate_load``.
     """
 
     def __init__(self, values: np.ndarray | None = None) -> None:

@@ -135,7 +135,7 @@ class StringSettings:
 
 
 @dataclass(frozen=True)
-class Tied:
+class StringState:
     """A tied string. attach: the knot in mesh coordinates. The free end goes evenly from ``origin`` at begin_ns to
     ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns: when it lets
     go, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as computed.
@@ -194,7 +194,7 @@ class Tied:
         """½ k x² while it pulls [J]."""
         return energy_of(self._span(body, state), self.stiffness, self.rest_length, self.bilateral)
 
-    def moved(self, target: Numbers, time_ns: int, timeout_ns: int) -> Tied:
+    def moved(self, target: Numbers, time_ns: int, timeout_ns: int) -> StringState:
         """The hand goes to a new target: over the time since the last one, at most RAMP_NS."""
         ramp_ns = min(time_ns - self.last_target_ns, RAMP_NS)
         return replace(
@@ -207,7 +207,7 @@ class Tied:
             release_ns=time_ns + timeout_ns if timeout_ns else None,
         )
 
-    def with_spring(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> Tied:
+    def with_spring(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> StringState:
         """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the
         effective mass of the body as it is.
         """
@@ -236,14 +236,14 @@ def tie(
     state: State,
     timeout_ns: int,
     mass: float = 0.0,
-) -> Tied:
+) -> StringState:
     """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
 
     timeout_ns 0 never lets go. mass: as ``with_spring`` takes it.
     """
     now_ns = state.time_ns
     point = np.asarray(target, dtype=float)
-    tied = Tied(
+    tied = StringState(
         attach=vector(attach),
         origin=point,
         target=point,

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.elementary import exponential_less_one
+from ..base.elementary import expm1
 from ..base.rotation import multiply
 
 ATTITUDE = 0  # (4,)
@@ -41,7 +41,7 @@ def damping_functions(z: float) -> tuple[float, float]:
         for k in range(13, -1, -1):
             phi2 = (1.0 - z * phi2) / (k + 2.0)
         return 1.0 - z * phi2, phi2
-    phi1 = -exponential_less_one(-z) / z
+    phi1 = -expm1(-z) / z
     return phi1, (1.0 - phi1) / z
 
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..base.errors import InputError, is_missing
 from ..simulation.observer import (
+    AccuracyFloor,
     BodyChanged,
     Effort,
     Event,
@@ -78,7 +79,7 @@ class RerunObserver(Observer):
     takes = frozenset(
         {
             *(*_REMEMBERED, Published, GhostPublished, Reset),
-            *(LoadBegan, LoadEnded, Logged, Refused, StatusChanged, Effort),
+            *(LoadBegan, LoadEnded, Logged, Refused, StatusChanged, AccuracyFloor, Effort),
         }
     )
 

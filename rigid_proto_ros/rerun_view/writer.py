@@ -16,6 +16,7 @@ from ..picture.picture import Picture, skewed
 from ..picture.plots import plot_range, with_two_ticks
 from ..simulation.mailbox import Block, Note
 from ..simulation.observer import (
+    AccuracyFloor,
     BodyChanged,
     BodySnapshot,
     Effort,
@@ -208,6 +209,8 @@ class SceneWriter:
                 self._change_scene(time_ns, wall_ns, scene)
             case StatusChanged(time_ns, track, value):
                 self._state_timeline.change(time_ns, wall_ns, track, value)
+            case AccuracyFloor(time_ns, floor):
+                self._state_timeline.change(time_ns, wall_ns, "accuracy", floor)
             case Effort():
                 self._add_effort(note.event, wall_ns)
             case Logged(time_ns, line):

@@ -114,6 +114,11 @@ class OfflineRun(ScenarioRun):
         self.simulation.advance(until_ns)
         return not self.simulation.failure
 
+    def end(self) -> None:
+        """Tell the observer what the flight has cost up to here, which is told from time to time alone before."""
+        if self._is_observed:
+            self.simulation.notify_end()
+
 
 def run_with_progress(run: OfflineRun, duration_ns: int, warn: Callable[[str], None] | None = None) -> float:
     """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s].
@@ -129,6 +134,7 @@ def run_with_progress(run: OfflineRun, duration_ns: int, warn: Callable[[str], N
             if not run.advance(duration_ns * part // 100):
                 break
             progress.fraction(part, 100)
+    run.end()
     return time.perf_counter() - start
 
 

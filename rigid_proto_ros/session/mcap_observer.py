@@ -24,9 +24,20 @@ from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
 from ..simulation.mailbox import Block, Mailbox, Note
-from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Published, Reset, SceneChanged, Started
+from ..simulation.observer import (
+    AccuracyFloor,
+    Applied,
+    BodyChanged,
+    Event,
+    Logged,
+    Observer,
+    Published,
+    Reset,
+    SceneChanged,
+    Started,
+)
 from .recorded_session import file_sha256, scene_sha256
-from .runs import MADE_WITH
+from .runs import MADE_WITH, floor_name
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -51,7 +62,7 @@ class McapObserver(Observer):
     another thread; ``error`` keeps it. Raises InputError where the file can't be opened.
     """
 
-    takes = frozenset({Published, Logged, Applied, BodyChanged, SceneChanged, Started, Reset})
+    takes = frozenset({Published, Logged, Applied, BodyChanged, SceneChanged, Started, Reset, AccuracyFloor})
 
     def __init__(
         self,
@@ -65,7 +76,7 @@ class McapObserver(Observer):
         self._path = path
         self._on_error = on_error or _logger.error
         self._simulated_log = simulated_log
-        self._run_begins_ns = self._latest_log_ns = self._chunk = 0
+        self._run_begins_ns = self._latest_log_ns = self._chunk = self._run = 0
         world, self._body_frame = frame_names(parameters or Parameters(), node_name)
         self._templates = {name: cdr.StampedTemplate(world, count) for name, count in (("pose", 7), ("twist", 6))}
         self._scene = ""
@@ -190,6 +201,7 @@ class McapObserver(Observer):
         event = note.event
         if isinstance(event, Reset):
             self._run_begins_ns = self._latest_log_ns + 1
+            self._run += 1
             return
         log_time = self._log_time(event.time_ns, note.wall_ns)
         match event:
@@ -204,6 +216,10 @@ class McapObserver(Observer):
                 frame, com = f"{self._body_frame}/mesh", body.center_of_mass.tolist()
                 data = session_messages.inertia_bytes(time_ns, frame, body.mass, com, tensor)
                 self._write_message(writer, "inertia", log_time, data)
+            case AccuracyFloor(time_ns, floor):
+                # It only rises within a run: the last one says all.
+                self._end_chunk(writer)
+                writer.add_metadata(floor_name(self._run), {"time_ns": str(time_ns), "floor": floor})
             case Started(scene=scene) | SceneChanged(scene=scene):
                 self._write_scene(writer, log_time, scene)
 

@@ -35,7 +35,8 @@ class RecordedSession:
     A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
     those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics'
     names. missing: topics that a check would need. attachments: (name, bytes) of files inside; made_with: the
-    processor, and versions by package; folder: where the session lies.
+    processor, and versions by package; accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of
+    ours says it; folder: where the session lies.
     """
 
     scene: str = ""
@@ -56,6 +57,7 @@ class RecordedSession:
     missing: tuple[str, ...] = ()
     attachments: list[tuple[str, bytes]] = field(default_factory=list)
     made_with: dict[str, str] = field(default_factory=dict)
+    accuracy_floor: str = ""
     folder: Path | None = None
 
     @property

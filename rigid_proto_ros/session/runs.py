@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 MADE_WITH = "rigid_proto_ros"
 """Name of the metadata that say which versions recorded."""
 
+
+def floor_name(run: int) -> str:
+    """Name of the metadata that say why a run, counted from 0, is held to less than its accuracy."""
+    return f"accuracy_floor of run {run}"
+
+
 RESET_WINDOW_NS = 1_000_000_000
 """Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
 
@@ -69,6 +75,7 @@ def session_runs(content: BagContent, path: Path, node: str = "") -> list[Record
     for k in range(len(resets) + 1):
         run = replace(whole, scene=_scene_at(scenes, resets[k - 1] if k else None))
         run.mesh_sha256 = scene_sha256(run.scene)
+        run.accuracy_floor = content.metadata.get(floor_name(k), {}).get("floor", "")
         begin = resets[k - 1] if k else None
         end = resets[k] if k < len(resets) else None
         run.events = [

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.borrowed_views import borrowed, copy_numbers
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
 from ..base.records import record_type
 from ..base.rotation import Vector
 from ..base.simd import aligned
-from ..base.uncounted_arrays import copy_numbers, uncounted
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
@@ -32,8 +32,7 @@ from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_bod
 from ..motion.state import fill_initial_row
 from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 from . import flight as fl
-from .flight_measures import measure_flight
-from .quantities import CONTEXT, STATE, begin, which_is_met
+from .quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
 from .setup import Setup
 
 _NUMBERS: list[tuple] = [
@@ -402,7 +401,7 @@ def _fly_row(
             return 0, -1
         copy_numbers(flight.row, states[sample, :13])
         states[sample, 13] = _string_energy(flight)
-        stop = which_is_met(stops, states[sample], context)
+        stop = first_satisfied(stops, states[sample], context)
         if stop >= 0:
             return sample + 1, stop
     return sample_ns.shape[0], -1
@@ -422,10 +421,10 @@ def _fly_rows(
     room: tuple,
 ) -> None:
     """All rows of a batch, each beside that of the references if there are any."""
-    own, references = uncounted(own), uncounted(references)
-    sample_ns, watched, stops, measures = uncounted((sample_ns, watched, stops, measures))
-    status, end_ns, stop, measured, floors = uncounted(results)
-    context, flights, tables, states, others = uncounted(room)
+    own, references = borrowed(own), borrowed(references)
+    sample_ns, watched, stops, measures = borrowed((sample_ns, watched, stops, measures))
+    status, end_ns, stop, measured, floors = borrowed(results)
+    context, flights, tables, states, others = borrowed(room)
     # One place that flies, whichever it is: a second one would be compiled a second time.
     sides, kept, ends = (references, own), (others, states), (stops[:0], stops)
     for i in range(status.shape[0]):

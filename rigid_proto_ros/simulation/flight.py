@@ -13,17 +13,17 @@ import math
 
 import numpy as np
 
+from ..base.borrowed_views import copy_numbers
 from ..base.compilation import njit
 from ..base.records import record_type
-from ..base.uncounted_arrays import copy_numbers
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.control import CONTROL, begin_control
-from ..motion.integrators.equations import accelerations, stretch, tension_margin
+from ..motion.integrators.equations import accelerations, tension_margin
 from ..motion.integrators.error_measure import FLOOR
 from ..motion.integrators.integrator import ADAPTIVE, MAX_SPEED, NOTHING, ONE_STEP
+from ..motion.integrators.series_steps import CONTROL, begin_control
 from ..motion.integrators.stepping import commit, is_provided, reach
-from ..motion.loads import LOAD, LOADS_SIZE, apply_impulse, is_zero, share_of
+from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
 from ..motion.variables import HAND_WORK, HEAT, STORED, to_good_row, to_variables
 
@@ -254,9 +254,8 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
     p = problem[0]
     complete_problem(flight, flight.row, flight.now_ns, p)
     to_variables(flight.row, p, y)
-    x, rate = stretch(y, p)
     q, w, d, u = (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
-    ex, ey, ez, ax, ay, az, _, _ = accelerations(*q, *w, *d, *u, p, tension_margin(x, rate, p) > 0.0)
+    ex, ey, ez, ax, ay, az, _, _ = accelerations(*q, *w, *d, *u, p, tension_margin(y, p) > 0.0)
     a, v, P, c = p.reference_acceleration, p.reference_velocity, p.principal_axes, p.reference_damping
     return (
         *(a[0] - c * v[0] + ax, a[1] - c * v[1] + ay, a[2] - c * v[2] + az),
@@ -278,7 +277,7 @@ def last_good_state(flight: np.record, row: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def stop_in_last_good_state(flight: np.record) -> None:
-    """Stay where the last good step ended, or at NOW_NS where that is later."""
+    """Stay where the last good step ended, or at now_ns where that is later."""
     row = flight.trial
     last_good_state(flight, row)
     good = flight.committed_ns >= flight.now_ns
@@ -305,7 +304,7 @@ def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> None:
-    """Take into ``floors`` (FLOOR_KINDS,) what no method can better in the segment up to NOW_NS: a state is held in
+    """Take into ``floors`` (FLOOR_KINDS,) what no method can better in the segment up to now_ns: a state is held in
     doubles. A spin known to ε turns into an attitude known to ε|ω|t, a place is known to half a unit in its last digit,
     and a slender body's tensor given in axes other than its own holds its smallest moment, and the difference of the
     others, to ε I₃ alone.
@@ -330,7 +329,7 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
-    """Keep the segment's counts and begin another from the state at NOW_NS."""
+    """Keep the segment's counts and begin another from the state at now_ns."""
     note_floors(flight, methods, flight.floors)
     flight.steps_before += steps_of_segment(flight)
     flight.evaluations_before += evaluations_of_segment(flight, methods)
@@ -343,7 +342,7 @@ def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, ro
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def cut_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
-    """End the segment at NOW_NS by the step that sampling there took, and begin another."""
+    """End the segment at now_ns by the step that sampling there took, and begin another."""
     if flight.now_ns > flight.committed_ns and not methods[flight.method].sleeps:
         flight.taken += 1
     finish_segment(flight, loads, methods, room)
@@ -365,7 +364,7 @@ def _keep(loads: np.ndarray, kept: int, row: int) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
-    """End what ends at NOW_NS or should have before; whether anything did."""
+    """End what ends at now_ns or should have before; whether anything did."""
     kept = 0
     for row in range(flight.acting):
         if loads[row].end_ns > flight.now_ns:
@@ -410,6 +409,16 @@ def end_of_held(flight: np.record, begin_ns: int) -> int:
     return max(begin_ns + flight.timeout_ns, flight.now_ns) if flight.timeout_ns != 0 else NEVER
 
 
+@njit(cache=True, error_model="numpy", allocates=False)
+def take_body(flight: np.record, loads: np.ndarray) -> None:
+    """What the loads that act add to the sums, for another body and other settings."""
+    for row in range(flight.acting):
+        acting = loads[row]
+        accumulate_load(acting.load, flight.body, acting.share)
+        if acting.kind == HELD_WRENCH:
+            acting.end_ns = end_of_held(flight, acting.at_ns)
+
+
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
     """Let the load of a row act from now_ns until ``end_ns``, as the last of those that act."""
@@ -417,13 +426,13 @@ def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
     _keep(loads, to, row)
     acting = loads[to]
     acting.at_ns, acting.end_ns, acting.id = flight.now_ns, end_ns, flight.load_ids
-    share_of(acting.load, flight.body, acting.share)
+    accumulate_load(acting.load, flight.body, acting.share)
     flight.acting += 1
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) -> None:
-    """Apply the command of a row at NOW_NS. Rows before it may be taken by loads that act."""
+    """Apply the command of a row at now_ns. Rows before it may be taken by loads that act."""
     kind, load = loads[row].kind, loads[row].load
     if kind != CLEAR:
         flight.load_ids += 1

@@ -11,16 +11,19 @@ from typing import NamedTuple
 import numpy as np
 from numba import int64
 
-from ..base.addresses import address_of_array, array_at, doubles_at, entry_of
 from ..base.compilation import njit
+from ..base.function_pointers import address_of_array, array_at, doubles_at, entry_of
 from ..base.records import place_of, record_type
+from ..base.rotation import length
 from ..base.simd import aligned
-from ..motion.integrators.integrator import Method
+from ..motion.integrators.auto import fastest_swing
+from ..motion.integrators.equations import stretch
+from ..motion.integrators.integrator import FIXED_STEPS, Method
 from ..motion.integrators.stepping import METHOD, provide_kernel
-from ..motion.loads import Load, load_of_row, share_of
+from ..motion.loads import Load, load_of_row
 from ..motion.problem import PROBLEM
 from ..motion.state import State
-from ..motion.string import Tied
+from ..motion.string import StringState
 from ..motion.variables import STORED
 from . import flight as fl
 from .commands import Pending
@@ -49,18 +52,19 @@ _held_at, _loads_at, _events_at, _methods_at = map(array_at, (HELD, LOAD_ROW, EV
 
 _ROW_BYTES, _pack = LOAD_ROW.itemsize, struct.Struct("=6q").pack_into
 _LOAD_AT = place_of(LOAD_ROW, "load")
-_EVENT_NUMBERS = EVENT.itemsize // 8
+_ROW_NUMBERS, _EVENT_NUMBERS, _ATTITUDE = LOAD_ROW.itemsize // 8, EVENT.itemsize // 8, place_of(EVENT, "attitude") // 8
 
 
-# Where integers that are looked up at every advance or reset stand in the memory of what is held: Python reads single
-# numbers fastest so.
+# Where integers that are looked up at every advance or reset stand in the memory of what is held: Python reads and
+# writes single numbers fastest so, and arrays of integers are made in a tenth of the time that those of records take.
 def _numbers(kind: np.dtype, *names: str) -> list[int]:
     return [place_of(kind, name) // 8 for name in names]
 
 
 _NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(FLIGHT, "now_ns", "acting", "due", "due_end", "events")
 TIMEOUTS, _LOAD_IDS = _numbers(FLIGHT, "timeouts", "load_ids")
-_METHODS_AT, _METHODS, _ROOM = _numbers(HELD, "methods_at", "methods", "room")
+_LOADS_AT, _EVENTS_AT, _ROWS = _numbers(HELD, "loads_at", "events_at", "rows")
+_METHODS_AT, _METHODS, _ROOM_AT, _ROOM = _numbers(HELD, "methods_at", "methods", "room_at", "room")
 _NUMBERS = FLIGHT.itemsize // 8
 _REACHED = fl.REACHED
 
@@ -101,100 +105,65 @@ def _arrays(at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np
     )
 
 
+_FLY, _BEGIN, _APPLY, _CUT, _FINISH, _END_DUE, _END_ALL, _TAKE_BODY = range(8)
+
+
 @njit(cache=True, error_model="numpy")
-def _fly_at(at: int, until_ns: int) -> int:
+def _call_at(at: int, what: int, until_ns: int) -> int:
+    """One of these on the flight that is held at this address; how it came back."""
     held, loads, events, methods, room = _arrays(at)
     flight = held[0].flight
-    return fl.fly(flight, loads, events, methods, room, until_ns)
-
-
-@njit(cache=True, error_model="numpy")
-def _begin_at(at: int) -> int:
-    held, loads, _, methods, room = _arrays(at)
-    flight = held[0].flight
-    fl.begin_segment(flight, loads, methods, room)
-    return 0
-
-
-@njit(cache=True, error_model="numpy")
-def _share_anew(at: int) -> int:
-    """What the loads that act add to the sums, for another body."""
-    held, loads, _, _, _ = _arrays(at)
-    flight = held[0].flight
-    for row in range(flight.acting):
-        acting = loads[row]
-        share_of(acting.load, flight.body, acting.share)
-        if acting.kind == fl.HELD_WRENCH:
-            acting.end_ns = fl.end_of_held(flight, acting.at_ns)
-    return 0
-
-
-@njit(cache=True, error_model="numpy")
-def _apply_at(at: int) -> int:
-    held, loads, events, _, _ = _arrays(at)
-    flight = held[0].flight
+    if what == _FLY:
+        return fl.fly(flight, loads, events, methods, room, until_ns)
+    if what == _BEGIN:
+        fl.begin_segment(flight, loads, methods, room)
+        return 0
+    if what == _CUT:
+        fl.cut_segment(flight, loads, methods, room)
+        return 0
+    if what == _FINISH:
+        fl.finish_segment(flight, loads, methods, room)
+        return 0
+    if what == _TAKE_BODY:
+        fl.take_body(flight, loads)
+        return 0
     flight.events, flight.timeouts = 0, 0
-    while flight.due < flight.due_end:
-        fl.apply(flight, loads, events, flight.due)
-        flight.due += 1
-    return 0
-
-
-@njit(cache=True, error_model="numpy")
-def _cut_at(at: int) -> int:
-    held, loads, _, methods, room = _arrays(at)
-    flight = held[0].flight
-    fl.cut_segment(flight, loads, methods, room)
-    return 0
-
-
-@njit(cache=True, error_model="numpy")
-def _finish_at(at: int) -> int:
-    held, loads, _, methods, room = _arrays(at)
-    flight = held[0].flight
-    fl.finish_segment(flight, loads, methods, room)
-    return 0
-
-
-@njit(cache=True, error_model="numpy")
-def _end_due_at(at: int) -> bool:
-    held, loads, events, _, _ = _arrays(at)
-    return fl.end_due(held[0].flight, loads, events)
-
-
-@njit(cache=True, error_model="numpy")
-def _end_all_at(at: int) -> int:
-    held, loads, events, _, _ = _arrays(at)
-    fl.end_all(held[0].flight, loads, events)
+    if what == _APPLY:
+        while flight.due < flight.due_end:
+            fl.apply(flight, loads, events, flight.due)
+            flight.due += 1
+    elif what == _END_ALL:
+        fl.end_all(flight, loads, events)
+    else:
+        return int(fl.end_due(flight, loads, events))
     return 0
 
 
 @functools.cache
-def _entries() -> tuple[Callable, Callable, Callable]:
-    return (
-        entry_of(_fly_at, int64(int64, int64)),
-        entry_of(_begin_at, int64(int64)),
-        entry_of(_apply_at, int64(int64)),
-    )
+def _entry() -> Callable[[int, int, int], int]:
+    return entry_of(_call_at, int64(int64, int64, int64))
 
 
 class FlightArrays:
-    """flight: the record (simulation/flight.py); integers: its memory as integers, as Python reads single numbers
-    fastest. What isn't a matter of arrays is the simulation's.
+    """integers: the memory of a flight's record; row (13,): its state. What isn't a matter of arrays is the
+    simulation's.
     """
 
     def __init__(self, setup: Setup) -> None:
         self.first_due = 0
-        self._fly, self._begin, self._apply = _entries()
-        self._memory = np.zeros(1, HELD)
+        self._loads: np.ndarray
+        self._call = _entry()
+        self._memory = np.zeros(HELD.itemsize // 8, np.int64)
         self._at = address_of_array(self._memory)
-        self._held = self._memory[0]
-        self.flight = self._held.flight
-        self.row = self.flight.row
-        self.integers = self._memory.view(np.uint8).view(np.int64).data
-        self._loads = np.zeros(0, LOAD_ROW)
+        self.integers = self._memory.data
+        self.row = np.ndarray(13, np.float64, self._memory, place_of(FLIGHT, "row"))
         self._make_tables(FIRST_ROWS)
         self._take_methods(setup, setup.flight_start)
+
+    @functools.cached_property
+    def flight(self) -> np.record:
+        """The record (simulation/flight.py)."""
+        return np.ndarray(1, HELD, self._memory)[0].flight
 
     def _take_methods(self, setup: Setup, start: FlightStart) -> None:
         self.integrator, self.methods = setup.integrator, start.methods
@@ -202,7 +171,7 @@ class FlightArrays:
         if numbers[_ROOM] < max(start.room, 1):
             # The workspace begins a line of the processor's cache.
             self.room = aligned((1, max(start.room, 1)))[0]
-            self._held.room_at, self._held.room = address_of_array(self.room), len(self.room)
+            numbers[_ROOM_AT], numbers[_ROOM] = address_of_array(self.room), len(self.room)
         numbers[_METHODS_AT], numbers[_METHODS] = start.methods_at, len(start.methods)
 
     def take(self, setup: Setup) -> None:
@@ -214,9 +183,9 @@ class FlightArrays:
         flight.body[:], flight.common = new.body, new.common
         flight.accuracy, flight.degree, flight.chooses = new.accuracy, new.degree, new.chooses
         flight.step_ns, flight.timeout_ns, flight.poke_ns = new.step_ns, new.timeout_ns, new.poke_ns
-        _share_anew(self._at)
+        self._call(self._at, _TAKE_BODY, 0)
 
-    def start_over(self, setup: Setup, tied: Tied | None) -> None:
+    def start_over(self, setup: Setup, tied: StringState | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
         start, numbers = setup.flight_start, self.integers
         load_ids = numbers[_LOAD_IDS]
@@ -225,9 +194,9 @@ class FlightArrays:
         numbers[_LOAD_IDS] = load_ids
         if tied is not None:
             self.tie(tied)
-        self._begin(self._at)
+        self._call(self._at, _BEGIN, 0)
 
-    def tie(self, tied: Tied | None) -> None:
+    def tie(self, tied: StringState | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""
         flight = self.flight
         flight.tied = tied is not None
@@ -242,7 +211,7 @@ class FlightArrays:
         numbers = self.integers
         first = self.first_due = numbers[_ACTING]
         last = first + len(due)
-        if last > len(self._loads):
+        if last > numbers[_ROWS]:
             self._make_tables(2 * last)
         table, at = self._table_bytes, _ROW_BYTES * first
         for pending in due:
@@ -259,7 +228,7 @@ class FlightArrays:
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
-        while (came := self._fly(self._at, until_ns)) != _REACHED:
+        while (came := self._call(self._at, _FLY, until_ns)) != _REACHED:
             if came == fl.FAILED:
                 return False
             provide_kernel(self.integrator, self.methods, int(self.flight.method))
@@ -267,38 +236,35 @@ class FlightArrays:
 
     def apply(self) -> None:
         """Apply the commands put last, at the time of the flight."""
-        self._apply(self._at)
+        self._call(self._at, _APPLY, 0)
 
     def end_due(self) -> bool:
         """End what ends at the time of the flight; whether anything did."""
-        self.integers[_EVENTS] = self.integers[TIMEOUTS] = 0
-        return bool(_end_due_at(self._at))
+        return bool(self._call(self._at, _END_DUE, 0))
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
-        self.integers[_EVENTS] = self.integers[TIMEOUTS] = 0
-        if self.integers[_ACTING]:
-            _end_all_at(self._at)
+        self._call(self._at, _END_ALL, 0)
 
     def last_events(self) -> list[list[int]]:
         """What the last call began and ended: time_ns, what, load_id and row of each."""
-        return self._event_numbers[: self.integers[_EVENTS], :4].tolist()
+        return self._events[: self.integers[_EVENTS], :4].tolist()
 
     def attitude_at(self, number: int) -> np.ndarray:
         """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""
-        return self._events[number].attitude.copy()
+        return self._events[number, _ATTITUDE : _ATTITUDE + 4].view(np.float64).copy()
 
     # Segments
 
     def cut_segment(self) -> None:
         """End the segment at the time of the flight by the step that sampling there took, and begin another."""
-        _cut_at(self._at)
+        self._call(self._at, _CUT, 0)
 
     def finish_segment(self) -> None:
         """Keep the segment's counts and begin another from the present state."""
-        _finish_at(self._at)
+        self._call(self._at, _FINISH, 0)
 
-    # Readings
+    # Observables
 
     @property
     def time_ns(self) -> int:
@@ -322,7 +288,7 @@ class FlightArrays:
 
     def acting(self) -> Iterator[ActingLoad]:
         """The loads that act, in the order in which they began."""
-        for row in self._loads[: self.integers[_ACTING]]:
+        for row in np.ndarray(self.integers[_ACTING], LOAD_ROW, self._loads):
             load = load_of_row(row.load)
             yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))
 
@@ -367,12 +333,92 @@ class FlightArrays:
 
     def _make_tables(self, rows: int) -> None:
         """Tables of so many rows; what acts goes on."""
-        held, kept = self._held, self.integers[_ACTING]
-        loads = np.zeros(rows, LOAD_ROW)
+        numbers = self.integers
+        loads = np.zeros(rows * _ROW_NUMBERS, np.int64)
+        kept = numbers[_ACTING] * _ROW_NUMBERS
         if kept:
             loads[:kept] = self._loads[:kept]
-        self._loads, self._events = loads, np.zeros(4 * rows + 4, EVENT)
-        self._table_bytes = loads.view(np.uint8).data
-        self._event_numbers = self._events.view(np.uint8).view(np.int64).reshape(-1, _EVENT_NUMBERS)
-        held.loads_at, held.events_at = address_of_array(self._loads), address_of_array(self._events)
-        held.rows = rows
+        self._loads, self._events = loads, np.zeros((4 * rows + 4, _EVENT_NUMBERS), np.int64)
+        self._table_bytes = loads.data.cast("B")
+        numbers[_LOADS_AT], numbers[_EVENTS_AT] = address_of_array(loads), address_of_array(self._events)
+        numbers[_ROWS] = rows
+
+
+class Segment:
+    """The segment that a flight is in: a stretch of time in which all commands are constant. Reads current values.
+
+    Steps count from the segment's start, and only full ones are committed; sampling a time in between takes one shorter
+    step on a copy. So the motion depends on where segments begin and end, that is on commands and their times, and not
+    on how often or in which portions it was asked for.
+
+    number: of segments begun before it and itself. start: state at the segment's start. committed_ns: where the last
+    full step ended. problem: motion/problem.py. variables: motion/variables.py, at the last committed step.
+    """
+
+    def __init__(self, arrays: FlightArrays) -> None:
+        self._arrays = arrays
+
+    @property
+    def number(self) -> int:
+        """Which segment of the flight it is, counted from 1."""
+        return int(self._arrays.flight.segments)
+
+    @property
+    def start(self) -> State:
+        """State at the segment's start."""
+        return State(int(self._arrays.flight.start_ns), self._arrays.flight.start.copy())
+
+    @property
+    def committed_ns(self) -> int:
+        """Where its last full step ended [ns]."""
+        return int(self._arrays.flight.committed_ns)
+
+    @property
+    def problem(self) -> np.record:
+        """Its problem (motion/problem.py)."""
+        return self._arrays.flight.problem
+
+    @property
+    def variables(self) -> np.ndarray:
+        """Its variables at the last committed step (motion/variables.py)."""
+        return self._arrays.flight.variables
+
+    @property
+    def sampled(self) -> np.ndarray:
+        """The variables at the time last advanced to."""
+        flight = self._arrays.flight
+        return flight.trial if flight.now_ns > flight.committed_ns else flight.variables
+
+    @property
+    def steps(self) -> int:
+        """Steps committed so far."""
+        return int(fl.steps_of_segment(self._arrays.flight))
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the equations of motion in them."""
+        return int(fl.evaluations_of_segment(self._arrays.flight, self._arrays.methods))
+
+    def expected_effort(self, now: State) -> tuple[float, float]:
+        """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
+        method = self._arrays.method
+        if method.way == FIXED_STEPS:
+            steps = 1e9 / int(self._arrays.flight.step_ns)
+            return steps, steps * method.evaluations
+        if method.radians == 0.0:
+            return 0.0, 0.0
+        fastest = length(now.angular_velocity_body)
+        if method.on_string and stretch(self.sampled, self.problem)[0] > 0.0:
+            fastest = max(fastest, fastest_swing(self.problem))
+        return fastest / method.radians, fastest / method.radians
+
+    @property
+    def choice(self) -> str:
+        """Which method, and why."""
+        step_s = int(self._arrays.flight.step_ns) * 1e-9
+        return self._arrays.method.choice(self.problem, step_s, float(self._arrays.flight.accuracy))
+
+    @property
+    def floor_binds(self) -> bool:
+        """Some step's error allowance was set by rounding and not by the accuracy asked for."""
+        return bool(self._arrays.flight.control.floor_rate)

@@ -187,6 +187,13 @@ class StatusChanged(NamedTuple):
     value: str
 
 
+class AccuracyFloor(NamedTuple):
+    """Why, since start or reset, the motion is held to less than its accuracy; empty while it isn't."""
+
+    time_ns: int
+    floor: str
+
+
 class Effort(NamedTuple):
     """What the motion has cost since start or reset; comes some times a simulated second."""
 
@@ -223,6 +230,7 @@ Event = (
     | Logged
     | Refused
     | StatusChanged
+    | AccuracyFloor
     | Effort
     | GhostChanged
     | GhostPublished

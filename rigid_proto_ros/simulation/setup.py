@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.addresses import address_of_array
+from ..base.function_pointers import address_of_array
 from ..base.records import new_record
 from ..base.rotation import length
 from ..motion.body import LENGTH, Body
 from ..motion.integrators.integrator import Integrator
+from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import method_table, workspace_size
-from ..motion.integrators.taylor_adaptive import degree_for
 from ..motion.loads import light_amount
 from ..motion.problem import PROBLEM, begin_body
 from ..motion.string import StringSettings

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The simulation: commands in, motion out.
 
-Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/segment.py); within one,
+Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/flight.py); within one,
 commands are constant and an integrator advances the body. ``advance`` is the whole story.
 """
 
@@ -38,8 +38,8 @@ from .commands import (
 from .event_log import EventLog, OtherEvent
 from .flight_arrays import TIMEOUTS, FlightArrays
 from .notifier import EventNotifier, snapshot
+from .observables import Observables
 from .observer import Applied, BodySnapshot, LoadEnded, Logged, MeshChanged, Observer, Refused, Reset
-from .readings import Readings
 from .setup import Setup
 from .string_control import StringControl
 from .thrusters import ThrusterControl
@@ -65,8 +65,8 @@ class Follower(Protocol):
         """Take a command that acts at ``when_ns``."""
 
 
-class Simulation(Readings):
-    """One body under commands; what can be read off it is in readings.py.
+class Simulation(Observables):
+    """One body under commands; what can be read off it is in observables.py.
 
     Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
     ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place
@@ -106,6 +106,10 @@ class Simulation(Readings):
     def notify_status(self, paused: bool = False) -> None:
         """Tell the observer what the body is doing, where that changed since it was last told."""
         self._notifier.status(self, paused)
+
+    def notify_end(self) -> None:
+        """Tell the observer, at the end of a flight, what it has cost and how far it was held to its accuracy."""
+        self._notifier.cost(self)
 
     def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
         """The body as an observer is told of it; of another setup, when one is given."""

@@ -12,7 +12,7 @@ from ..base.rotation import Vector, transposed_times, vector
 from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State
-from ..motion.string import Tied, tie
+from ..motion.string import StringState, tie
 from .checks import check_rates
 from .commands import MoveString, TieString
 from .setup import Setup
@@ -24,7 +24,7 @@ class StringControl:
     def __init__(self, setup: Setup, state: State) -> None:
         settings = setup.string
         self.attach = settings.attach
-        self.tied: Tied | None = None
+        self.tied: StringState | None = None
         if settings.attached:
             mass = setup.initial_string_mass
             self.tied = tie(settings, settings.attach, settings.target, setup.body, state, 0, mass)
@@ -99,7 +99,7 @@ def _attach(command: TieString, setup: Setup, state: State) -> Vector:
     return vector(point)
 
 
-def _checked(tied: Tied, body: Body, state: State) -> Tied:
+def _checked(tied: StringState, body: Body, state: State) -> StringState:
     """Raises CommandRefused (``magnitude``) when the string would pull beyond MAX_ACCELERATION."""
     # Where the free end goes counts, not only where it is.
     farthest = max(

@@ -20,9 +20,8 @@ from ..scene.declaration import Value
 from ..scene.offline import OfflineRun
 from ..scene.scenario import Scenario
 from ..simulation.batch import Results, fly_rows, new_results
-from ..simulation.flight_measures import measure_flight
-from ..simulation.quantities import CONTEXT, STATE, begin, which_is_met
-from ..simulation.readings import floor_text
+from ..simulation.observables import floor_text
+from ..simulation.quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
 from ..simulation.simulation import Simulation
 from .rows import Group, NotBatchable, is_structural
 from .sampling import VERTEX, Draw, as_text
@@ -180,7 +179,7 @@ def _simulate(
         if simulation.failure:
             raise FailedFlight(whose + simulation.failure)
         states[reached] = _state(simulation)
-        stop = which_is_met(stops, states[reached], context)
+        stop = first_satisfied(stops, states[reached], context)
         reached += 1
     if simulation.refused:
         # A row whose commands were refused in flight isn't the row that was asked for.

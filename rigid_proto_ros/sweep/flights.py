@@ -104,6 +104,7 @@ class Flight:
     def close(self) -> None:
         """Finish the recording."""
         if self._observer is not None:
+            self._run.end()
             self._observer.close()
 
 

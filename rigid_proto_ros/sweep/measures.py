@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..scene.scenario import nanoseconds, publication_ns
-from ..simulation import flight_measures as fm
+from ..simulation import quantities as fm
 from ..simulation.quantities import DIFFERENCES, NAMES, QUANTITIES, TURNED
 from .fields import known_name, mapping, names, number
 

@@ -3,6 +3,8 @@
 last good state; never a NaN and never an exception.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flights import flight, wrench
@@ -20,7 +22,12 @@ def magnitude(rng, low, high):
     return 10.0 ** rng.uniform(low, high)
 
 
-def hostile_flight(name, seed):
+FOLLOWED = 1e5
+"""rad/s and 1/s that auto follows whatever the direction."""
+
+
+def hostile_flight(name, seed, followed=False):
+    """followed: with damping and string cut down to rates that auto follows."""
     rng, integrator = np.random.default_rng(seed), INTEGRATORS[name]
     moments = np.sort(rng.uniform(0.5, 1.0, 3)) * magnitude(rng, -9, 9)
     body = make_body(magnitude(rng, -9, 9), (0.0, 0.0, 0.0), np.diag(moments))
@@ -40,14 +47,22 @@ def hostile_flight(name, seed):
             rest_length=rng.choice((0.0, 0.5)),
             bilateral=bool(rng.random() < 0.5),
         )
+    step_s, gravity = magnitude(rng, -9, 3), np.array((0.0, 0.0, -9.81)) * rng.integers(0, 2)
+    linear = rng.choice((0.0, magnitude(rng, -12, 9)))
+    angular = rng.choice((0.0, magnitude(rng, -12, 9))) if ANGULAR_DAMPING in integrator.supports else 0.0
+    if followed:
+        linear, angular = min(linear, FOLLOWED * body.mass), min(angular, FOLLOWED * body.principal_moments[0])
+        yields = 1.0 / body.mass + sum(r * r for r in string.attach) / body.principal_moments[0]
+        most = min(FOLLOWED**2 / yields, (0.5 * FOLLOWED / yields) ** 2 / body.mass)
+        string = replace(string, stiffness=min(string.stiffness, most))
     return rng, flight(
         body,
         integrator=name,
-        step_s=magnitude(rng, -9, 3),
+        step_s=step_s,
         initial=row,
-        gravity=np.array((0.0, 0.0, -9.81)) * rng.integers(0, 2),
-        linear_damping=rng.choice((0.0, magnitude(rng, -12, 9))),
-        angular_damping=rng.choice((0.0, magnitude(rng, -12, 9))) if ANGULAR_DAMPING in integrator.supports else 0.0,
+        gravity=gravity,
+        linear_damping=linear,
+        angular_damping=angular,
         string=string,
     )
 
@@ -58,7 +73,7 @@ def check(name, seed):
     except CommandRefused as refusal:
         assert (name, refusal.reason) == ("auto", "integrator")
         assert "for this body" in str(refusal)
-        return
+        rng, simulation = hostile_flight(name, seed, followed=True)
     setup = simulation.setup
     force, torque = (
         tuple(rng.normal(size=3) * magnitude(rng, -300, 300 if rng.random() < 0.3 else 6)) for _ in range(2)

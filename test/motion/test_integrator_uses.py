@@ -8,7 +8,7 @@ from one_segment import new_control
 from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.base.rotation import multiply
 from rigid_proto_ros.motion.integrators import INTEGRATORS, series_steps
-from rigid_proto_ros.motion.integrators.taylor_adaptive import MAX_DEGREE
+from rigid_proto_ros.motion.integrators.series_steps import MAX_DEGREE
 from rigid_proto_ros.motion.problem import PROBLEM
 from rigid_proto_ros.motion.variables import STORED
 
@@ -35,11 +35,11 @@ def flown(name, p, y, step, duration):
 def exact_flow(y, p, accuracy, h_ns):
     """Variables after h_ns by the power series of the whole motion at a rate a thousandth of the accuracy."""
     control = new_control(1e-3 * accuracy, MAX_DEGREE)
-    room, following, y = series_steps.workspace(MAX_DEGREE), np.zeros(STORED), y.copy()
-    far = series_steps.steps(y, p, control, following, room, h_ns, False)
+    room, following, y = series_steps.motion_workspace(MAX_DEGREE), np.zeros(STORED), y.copy()
+    far = series_steps.motion_steps(y, p, control, following, room, h_ns, False)
     assert not control.failed
     if far < h_ns:
-        assert series_steps.steps(y, p, control, following, room, h_ns - far, True) == h_ns - far
+        assert series_steps.motion_steps(y, p, control, following, room, h_ns - far, True) == h_ns - far
     return y
 
 

@@ -31,7 +31,7 @@ def drifts(name: str, steps: int) -> tuple[np.ndarray, np.ndarray, float]:
     simulation = flight(make_body(2.0, np.zeros(3), TENSOR), integrator=name, initial=spinning(SPIN))
     segment = simulation._segment
     p, y = segment.problem, segment.variables.copy()
-    moments, kernel = p.moments.copy(), INTEGRATORS[name].kernel_for(p)
+    moments, kernel = p.moments.copy(), INTEGRATORS[name].kernel
     start = invariants(y, moments)
     L = np.linalg.norm(start[1:4])
     counts = np.unique(np.round(10.0 ** np.arange(2.0, np.log10(steps) + 0.01, 0.25)).astype(int))
@@ -72,7 +72,7 @@ def test_energy_and_momentum_walk_at_random_for_a_hundred_million_steps(name):
 def test_attitudes_stay_rotations_for_a_million_steps(name):
     simulation = flight(make_body(2.0, np.zeros(3), TENSOR), integrator=name, initial=spinning((0.07, 0.19, -0.06)))
     segment = simulation._segment
-    y, kernel = segment.variables.copy(), INTEGRATORS[name].kernel_for(segment.problem)
+    y, kernel = segment.variables.copy(), INTEGRATORS[name].kernel
     for _ in range(100):
         assert kernel(y, segment.problem, 1e-3, STEPS // 100) == STEPS // 100
         # |RᵀR − 1| of the matrix of q is at most twice this.

@@ -12,6 +12,7 @@ from reference_motion import angle_between, free_motion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.simulation.commands import ReleaseString
 
 BOX = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
@@ -73,12 +74,16 @@ def test_a_floor_that_has_bound_is_told_until_the_reset_whatever_follows():
     assert simulation.accuracy_floor == ""
 
 
-def test_simulate_tells_of_a_floor_in_its_json(capsys):
+def test_simulate_and_a_recording_tell_of_a_floor(capsys, tmp_path):
     fast = ["--set", "initial.angular_velocity=[60000, 70000, -30000]", "--set", "accuracy=1e-12"]
     for changes, words in (([], ""), (fast, "rounding of the spin")):
-        assert main(["simulate", "t_handle", "--duration", "0.01", "--json", *changes]) == 0
+        file = str(tmp_path / f"{len(changes)}.mcap")
+        assert main(["simulate", "t_handle", "--duration", "0.01", "--json", "--bag", file, *changes]) == 0
         told = json.loads(capsys.readouterr().out)["accuracy_floor"]
         assert words in told and bool(told) == bool(words)
+        assert main(["replay", file]) == 0
+        assert told in capsys.readouterr().out
+        assert read_runs(file)[0].accuracy_floor == told
 
 
 def test_fixed_steps_promise_no_accuracy_and_report_no_floor():

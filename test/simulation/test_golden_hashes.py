@@ -176,8 +176,8 @@ def arguments() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 OF_ONE = {
-    **dict.fromkeys(("sine", "cosine", "inverse_tangent", "cube_root", "logarithm"), 0),
-    **dict.fromkeys(("exponential_of", "exponential_less_one", "hyperbolic_tangent", "hyperbolic_secant"), 1),
+    **dict.fromkeys(("sine", "cosine", "inverse_tangent", "logarithm"), 0),
+    **dict.fromkeys(("exponential_of", "expm1", "hyperbolic_tangent", "hyperbolic_secant"), 1),
     "inverse_hyperbolic_tangent": 2,
 }
 """Elementary functions of one argument, and which of ``arguments`` they are given."""

@@ -8,7 +8,7 @@ from sweep_studies import HONEY, HUNG, POKES, PULLED, STRUCTURE, TIED, study
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.simulation.batch import new_results
-from rigid_proto_ros.simulation.readings import floor_text
+from rigid_proto_ros.simulation.observables import floor_text
 from rigid_proto_ros.sweep.chunk import Chunk, FailedFlight, run_chunk, simulate_row
 from rigid_proto_ros.sweep.variation import variation
 

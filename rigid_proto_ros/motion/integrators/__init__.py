@@ -14,12 +14,11 @@ from __future__ import annotations
 from ...base.errors import CommandRefused, InputError
 from .auto import AUTO
 from .dop853 import DOP853
-from .euler import EULER
 from .free_body import FREE_BODY
 from .free_body_strang import FREE_BODY_STRANG
+from .gram_schmidt import EULER, MIDPOINT
 from .integrator import Integrator
 from .lie_midpoint import LIE_MIDPOINT
-from .midpoint import MIDPOINT
 from .rk4 import RK4
 from .semi_implicit_euler import SEMI_IMPLICIT_EULER
 from .taylor import TAYLOR

@@ -25,7 +25,6 @@ from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
 from ..string import most_yielding
 from ..variables import damping_functions
-from . import series_steps, taylor_adaptive
 from .equations import stretch
 from .free_body import free_body_steps
 from .integrator import (
@@ -38,10 +37,9 @@ from .integrator import (
     STRING,
     Integrator,
     Method,
+    is_good,
 )
-from .runge_kutta import is_good
-from .series_steps import degree_of_motion
-from .taylor_adaptive import degree_for
+from .series_steps import degree_for, degree_of_motion, motion_steps, motion_workspace, spin_steps, spin_workspace
 
 FASTEST = 5e5
 """rad/s of a string's swing, and 1/s of damping, that a core can follow in real time: 3.3e5 steps a second, each 2 to 3
@@ -133,7 +131,6 @@ def _series(why: str, degree: Callable[[int], int] = int) -> Callable[..., str]:
 
 def _methods(_integrator: Integrator) -> tuple[Method, ...]:
     """A method for each kind of segment."""
-    series = (series_steps.steps, series_steps.workspace)
     by_kind = {
         ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
         COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
@@ -141,18 +138,18 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
         FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, one exact step without torque"), 1),
         TURNING_LOADS: Method(
             ADAPTIVE,
-            taylor_adaptive.steps,
+            spin_steps,
             _series("the loads turn with the body"),
             0,
-            taylor_adaptive.workspace,
+            spin_workspace,
             radians=RADIANS_A_STEP,
         ),
         ANY_LOADS: Method(
             ADAPTIVE,
-            series[0],
+            motion_steps,
             _series("loads that depend on the attitude", degree_of_motion),
             0,
-            series[1],
+            motion_workspace,
             radians=RADIANS_A_STEP,
         ),
         SLACK_AT_REST: Method(
@@ -164,9 +161,9 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
         ),
         ON_STRING: Method(
             ADAPTIVE,
-            series[0],
+            motion_steps,
             _series("a string of up to {:.3g} rad/s", degree_of_motion),
-            workspace=series[1],
+            workspace=motion_workspace,
             on_string=True,
             radians=RADIANS_A_STEP,
         ),

@@ -12,38 +12,17 @@ import numpy as np
 
 from ...base.compilation import njit
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
-from .runge_kutta import advance, is_good, rates, stages, tableau_steps_on_string
+from .runge_kutta import repeated, tableau_step
 from .stepping import fixed_steps
 
 # Row i: weights of the earlier stages for stage i (0 to 11).
 STAGES = np.zeros((12, 12))
-STAGES[1, [0]] = [
-    0.05260015195876773,
-]
-STAGES[2, [0, 1]] = [
-    0.0197250569845379,
-    0.0591751709536137,
-]
-STAGES[3, [0, 2]] = [
-    0.02958758547680685,
-    0.08876275643042054,
-]
-STAGES[4, [0, 2, 3]] = [
-    0.2413651341592667,
-    -0.8845494793282861,
-    0.924834003261792,
-]
-STAGES[5, [0, 3, 4]] = [
-    0.037037037037037035,
-    0.17082860872947386,
-    0.12546768756682242,
-]
-STAGES[6, [0, 3, 4, 5]] = [
-    0.037109375,
-    0.17025221101954405,
-    0.06021653898045596,
-    -0.017578125,
-]
+STAGES[1, [0]] = [0.05260015195876773]
+STAGES[2, [0, 1]] = [0.0197250569845379, 0.0591751709536137]
+STAGES[3, [0, 2]] = [0.02958758547680685, 0.08876275643042054]
+STAGES[4, [0, 2, 3]] = [0.2413651341592667, -0.8845494793282861, 0.924834003261792]
+STAGES[5, [0, 3, 4]] = [0.037037037037037035, 0.17082860872947386, 0.12546768756682242]
+STAGES[6, [0, 3, 4, 5]] = [0.037109375, 0.17025221101954405, 0.06021653898045596, -0.017578125]
 STAGES[7, [0, 3, 4, 5, 6]] = [
     0.03709200011850479,
     0.17038392571223998,
@@ -125,23 +104,14 @@ ERROR_3[[0, 5, 6, 7, 8, 9, 10, 11]] = [
 
 
 @njit(cache=True, error_model="numpy")
-def dop853_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """Up to n steps of h seconds in place; returns the number of good ones."""
-    k, z, new = np.zeros((12, 15)), np.empty(15), y.copy()
-    for done in range(n):
-        rates(y, p, False, k[0])
-        stages(y, p, h, False, STAGES, 12, k, z)
-        advance(y, p, h, WEIGHTS, 12, k, new)
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+def _step(y: np.ndarray, p: np.record, h: float, pulls: bool, k: np.ndarray, out: np.ndarray) -> None:
+    tableau_step(y, p, h, pulls, k, out, STAGES, WEIGHTS)
 
 
 @njit(cache=True, error_model="numpy")
-def dop853_string_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """The same, each step cut where the string turns slack or taut."""
-    return tableau_steps_on_string(y, p, h, n, STAGES, WEIGHTS)
+def dop853_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+    """Up to n steps of h seconds in place; returns the number of good ones."""
+    return repeated(_step, y, p, h, n, 12)
 
 
 DOP853 = Integrator(
@@ -153,6 +123,5 @@ DOP853 = Integrator(
     stability_limit=2.0,
     supports=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=dop853_steps,
-    string_kernel=dop853_string_steps,
     make_methods=fixed_steps,
 )

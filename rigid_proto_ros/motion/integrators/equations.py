@@ -3,7 +3,7 @@
 
 q xyzw takes principal to world axes, ω is in principal axes, d and u are the added displacement and velocity in world
 axes (motion/variables.py), p is the segment's problem (motion/problem.py). ``taut`` says whether the string's law of
-tension holds; where it changes is found by integrators/slack.py.
+tension holds; where it changes is found by integrators/string_law.py.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def string_pull(
     return fx, fy, fz, ry * bz - rz * by, rz * bx - rx * bz, rx * by - ry * bx, work, heat
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def accelerations(
     qx: float,
     qy: float,
@@ -167,11 +167,17 @@ def accelerations(
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
+def knot_of(y: np.ndarray, p: np.record) -> tuple[float, ...]:
+    """``knot`` at variables y: six numbers."""
+    return knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
 def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p.bilateral or not p.has_string:
         return 1.0, 0.0
-    ax, ay, az, vx, vy, vz = knot(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p)
+    ax, ay, az, vx, vy, vz = knot_of(y, p)
     length = math.sqrt(ax * ax + ay * ay + az * az)
     if length == 0.0:
         return -p.rest_length, 0.0
@@ -179,7 +185,8 @@ def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def tension_margin(x: float, rate: float, p: np.record) -> float:
-    """Positive exactly while the string pulls: min(k x, k x + c x')."""
+def tension_margin(y: np.ndarray, p: np.record) -> float:
+    """min(k x, k x + c x'): positive exactly while the string pulls."""
+    x, rate = stretch(y, p)
     spring = p.stiffness * x
     return min(spring, spring + p.string_damping * rate)

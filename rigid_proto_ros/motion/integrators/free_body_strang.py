@@ -18,8 +18,7 @@ from ...base.rotation import rotate
 from ..variables import damping_functions
 from .equations import undamped_torque
 from .free_body_step import free_step
-from .integrator import ANGULAR_DAMPING, LOADS, Integrator
-from .runge_kutta import is_good
+from .integrator import ANGULAR_DAMPING, LOADS, Integrator, is_good
 from .stepping import fixed_steps
 
 

@@ -3,16 +3,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from ...base.compilation import njit
 from ..loads import Load
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
+
+
+@njit(cache=True, error_model="numpy")
+def is_good(y: np.ndarray) -> bool:
+    """Whether variables y are finite and no runaway."""
+    size = 0.0
+    for j in range(4, 13):
+        size += abs(y[j])
+    # Negated sense, so that NaN counts as a runaway.
+    return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])
+
 
 BODY_TORQUE = "a torque"
 WORLD_TORQUE = "a torque fixed in the world or a world force off the centre of mass"
@@ -44,10 +57,10 @@ class Method:
     """A way to step, and the kernel that does it.
 
     kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps,
-    or samples; control: integrators/control.py. choice(p, step_s, accuracy): what it is and why, in words. evaluations:
-    of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
-    sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or swing that a
-    step covers, about; 0 where steps don't follow it.
+    or samples; control: CONTROL of integrators/series_steps.py. choice(p, step_s, accuracy): what it is and why, in
+    words. evaluations: of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room
+    for the kernel. sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or
+    swing that a step covers, about; 0 where steps don't follow it.
     """
 
     way: int
@@ -66,7 +79,7 @@ class Integrator:
     it is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h
     of a string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
     kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result
-    isn't finite or passes MAX_SPEED is undone. string_kernel: the same where a string is tied, if it needs another.
+    isn't finite or passes MAX_SPEED is undone.
     make_methods: the ways in which segments are stepped; chooses: by what a segment holds
     (auto), else by whether a string is tied.
     """
@@ -80,7 +93,6 @@ class Integrator:
     supports: frozenset[str]
     kernel: Callable[[np.ndarray, np.record, float, int], int] | None
     make_methods: Callable[[Integrator], tuple[Method, ...]]
-    string_kernel: Callable[[np.ndarray, np.record, float, int], int] | None = None
     chooses: bool = False
 
     @cached_property
@@ -92,10 +104,6 @@ class Integrator:
     def supports_loads(self) -> bool:
         """Whether it supports every wrench and poke."""
         return self.supports >= LOADS
-
-    def kernel_for(self, problem: np.record) -> Callable[[np.ndarray, np.record, float, int], int] | None:
-        """The kernel that steps this problem; only the ones used are ever compiled."""
-        return self.string_kernel if problem.has_string and self.string_kernel else self.kernel
 
     def lacks(self, needs: frozenset[str]) -> frozenset[str]:
         """What of a scene's needs it doesn't support; empty when it fits."""

@@ -25,8 +25,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
 from .equations import torque
-from .integrator import ANGULAR_DAMPING, LOADS, Integrator
-from .runge_kutta import is_good
+from .integrator import ANGULAR_DAMPING, LOADS, Integrator, is_good
 from .stepping import fixed_steps
 
 _MAX_ITERATIONS = 60

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One step of an explicit Runge-Kutta method given by its tableau, on all variables of a segment at once, and the loops
-over steps of one length.
+"""Explicit Runge-Kutta methods by their tableau, and the loop over steps of one length that all such methods share.
 
 Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1. The quaternion is
 normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere.
@@ -8,142 +7,144 @@ normalized after the step; the right-hand side takes its direction only, so stag
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 
+from ...base.borrowed_views import copy_numbers
 from ...base.compilation import njit
 from ...base.rotation import normalize
-from ..variables import VARIABLES
-from . import slack
-from .equations import accelerations
-from .integrator import MAX_SPEED
+from ...base.simd import Packed, filled, four, joined, load, number, store
+from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY
+from .equations import accelerations, stretch, tension_margin
+from .integrator import is_good
+from .string_law import excursion, is_one_sided, shortening_heat
 
-_Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray], None]
-"""One step: (y, p, h, taut, out)."""
+Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray], None]
+"""One step (y, p, h, pulls, k, out) of h seconds from variables y into out with the string's law given; k (s, 16):
+room for the rates of s stages.
+"""
+
+_MAX_PARTS = 1000
+"""Of one step: more is chatter of a step far too long for its string, and the rest of it is taken with one law."""
+_MAX_TRIALS = 120
+_SECANTS = 60
+"""Trials of a step that find any simple root; what is left then is halved."""
+_RESOLUTION = 2.0**-49
+"""Of a step: to that much a change of the law is known."""
 
 
-@njit(cache=True, error_model="numpy")
-def integrated(p: np.record) -> int:
-    """How many of the variables change: attitude and spin; with added motion also that; with a string
-    also its energies.
-    """
-    if p.has_string:
-        return VARIABLES
-    return 13 if p.translates else 7
-
-
-@njit(cache=True, error_model="numpy")
-def rates(z: np.ndarray, p: np.record, taut: bool, k: np.ndarray) -> None:
-    """Time derivatives k of variables z, both (15,)."""
-    qx, qy, qz, qw = z[0], z[1], z[2], z[3]
-    wx, wy, wz = z[4], z[5], z[6]
-    k[0] = 0.5 * (qw * wx + qy * wz - qz * wy)
-    k[1] = 0.5 * (qw * wy - qx * wz + qz * wx)
-    k[2] = 0.5 * (qw * wz + qx * wy - qy * wx)
-    k[3] = -0.5 * (qx * wx + qy * wy + qz * wz)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
+    """Time derivatives of the variables z, four by four: q; ω and the hand's work; d and the damper's heat; u."""
+    qx, qy, qz, qw = number(z, 0), number(z, 1), number(z, 2), number(z, 3)
+    wx, wy, wz = number(z, 4), number(z, 5), number(z, 6)
+    ux, uy, uz = number(z, 12), number(z, 13), number(z, 14)
+    turned = four(
+        0.5 * (qw * wx + qy * wz - qz * wy),
+        0.5 * (qw * wy - qx * wz + qz * wx),
+        0.5 * (qw * wz + qx * wy - qy * wx),
+        -0.5 * (qx * wx + qy * wy + qz * wz),
+    )
     if p.translates or p.has_world_torque:
         qx, qy, qz, qw = normalize(qx, qy, qz, qw)
-    k[4], k[5], k[6], k[10], k[11], k[12], k[13], k[14] = accelerations(
-        qx, qy, qz, qw, wx, wy, wz, z[7], z[8], z[9], z[10], z[11], z[12], p, taut
-    )
-    k[7], k[8], k[9] = z[10], z[11], z[12]
+    dx, dy, dz = number(z, 8), number(z, 9), number(z, 10)
+    ex, ey, ez, ax, ay, az, work, heat = accelerations(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, pulls)
+    return joined(turned, four(ex, ey, ez, work), four(ux, uy, uz, heat), four(ax, ay, az, 0.0))
 
 
-@njit(cache=True, error_model="numpy")
-def stages(
-    y: np.ndarray, p: np.record, h: float, taut: bool, A: np.ndarray, count: int, k: np.ndarray, z: np.ndarray
+@njit(cache=True, error_model="numpy", forceinline=True)
+def tableau_step(
+    y: np.ndarray, p: np.record, h: float, pulls: bool, k: np.ndarray, out: np.ndarray, A: np.ndarray, b: np.ndarray
 ) -> None:
-    """Fill the stage derivatives k (count, 15); k[0] must hold the rates at y. z (15,) is scratch."""
-    size = integrated(p)
-    for i in range(1, count):
-        for j in range(size):
-            z[j] = 0.0
-        for m in range(i):
-            a = A[i, m]
-            if a != 0.0:
-                for j in range(size):
-                    z[j] += a * k[m, j]
-        for j in range(size):
-            z[j] = y[j] + h * z[j]
-        rates(z, p, taut, k[i])
-
-
-@njit(cache=True, error_model="numpy")
-def advance(y: np.ndarray, p: np.record, h: float, B: np.ndarray, count: int, k: np.ndarray, out: np.ndarray) -> None:
-    """The new variables from the stages: out = y + h Σ bᵢ kᵢ with a unit quaternion."""
-    size = integrated(p)
-    for j in range(size):
-        total = 0.0
-        for i in range(count):
-            total += B[i] * k[i, j]
-        out[j] = y[j] + h * total
-    for j in range(size, VARIABLES):
-        out[j] = y[j]
-    out[0], out[1], out[2], out[3] = normalize(out[0], out[1], out[2], out[3])
-
-
-@njit(cache=True, error_model="numpy")
-def is_good(y: np.ndarray) -> bool:
-    """Finite and no runaway."""
-    size = 0.0
-    for j in range(4, 13):
-        size += abs(y[j])
-    # Negated sense, so that NaN counts as a runaway.
-    return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])
+    """A ``Step`` by the method with stages A (s, s) and weights b (s,): kᵢ = f(y + h Σ Aᵢⱼ kⱼ), out = y + h Σ bᵢ kᵢ."""
+    # What was stored one by one is loaded one by one: nothing waits until it is written.
+    start = joined(
+        four(y[0], y[1], y[2], y[3]),
+        four(y[SPIN], y[SPIN + 1], y[SPIN + 2], y[HAND_WORK]),
+        four(y[DISPLACEMENT], y[DISPLACEMENT + 1], y[DISPLACEMENT + 2], y[HEAT]),
+        four(y[VELOCITY], y[VELOCITY + 1], y[VELOCITY + 2], 0.0),
+    )
+    total = filled(0.0, 16)
+    for i in range(b.shape[0]):
+        z = filled(0.0, 16)
+        for j in range(i):
+            if A[i, j] != 0.0:
+                z = z + load(k, 16 * j, z) * A[i, j]
+        rate = _rates(start + z * h, p, pulls)
+        store(k, 16 * i, rate)
+        total = total + rate * b[i]
+    end = start + total * h
+    out[0], out[1], out[2], out[3] = normalize(number(end, 0), number(end, 1), number(end, 2), number(end, 3))
+    out[SPIN], out[SPIN + 1], out[SPIN + 2] = number(end, 4), number(end, 5), number(end, 6)
+    out[DISPLACEMENT], out[DISPLACEMENT + 1], out[DISPLACEMENT + 2] = number(end, 8), number(end, 9), number(end, 10)
+    out[VELOCITY], out[VELOCITY + 1], out[VELOCITY + 2] = number(end, 12), number(end, 13), number(end, 14)
+    out[HAND_WORK], out[HEAT] = number(end, 7), number(end, 11)
 
 
 @njit(inline="always", error_model="numpy")
-def repeated(step: _Step, y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """Up to n steps of h seconds in place; returns the number of good ones. step: a kernel.
+def repeated(step: Step, y: np.ndarray, p: np.record, h: float, n: int, stages: int) -> int:
+    """Up to n steps of h seconds in place, each cut where a pull-only string turns slack or taut; returns the number of
+    good ones.
 
     Put into the kernel that calls it, since numba keeps no compiled code that was handed a function.
     """
-    new = y.copy()
+    new, k = y.copy(), np.zeros((stages, 16))
     for done in range(n):
-        step(y, p, h, False, new)
+        if is_one_sided(p):
+            _step_on_string(step, y, p, h, k, new)
+        else:
+            step(y, p, h, True, k, new)
         if not is_good(new):
             return done
-        y[:] = new
+        copy_numbers(new, y)
     return n
 
 
 @njit(inline="always", error_model="numpy")
-def repeated_on_string(step: _Step, y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """``repeated``, each step cut where the string turns slack or taut."""
-    new, trial = y.copy(), y.copy()
-    search = slack.new_search()
-    for done in range(n):
-        new[:] = y
-        slack.begin(search, new, p, h)
-        while search[slack.REMAINING] > 0.0:
-            step(new, p, search[slack.TRIAL], search[slack.TAUT] != 0.0, trial)
-            if slack.check_trial(search, trial, p):
-                new[:] = trial
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
-
-
-@njit(cache=True, error_model="numpy")
-def tableau_steps_on_string(y: np.ndarray, p: np.record, h: float, n: int, A: np.ndarray, B: np.ndarray) -> int:
-    """The same for the method of stages A (s, s) and weights B (s,)."""
-    count = len(B)
-    k, z, new, trial = np.zeros((count, VARIABLES)), np.empty(VARIABLES), y.copy(), y.copy()
-    search = slack.new_search()
-    for done in range(n):
-        new[:] = y
-        slack.begin(search, new, p, h)
-        while search[slack.REMAINING] > 0.0:
-            taut = search[slack.TAUT] != 0.0
-            rates(new, p, taut, k[0])
-            stages(new, p, search[slack.TRIAL], taut, A, count, k, z)
-            advance(new, p, search[slack.TRIAL], B, count, k, trial)
-            if slack.check_trial(search, trial, p):
-                new[:] = trial
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+def _step_on_string(step: Step, y: np.ndarray, p: np.record, h: float, k: np.ndarray, end: np.ndarray) -> None:
+    """A step of h seconds from y into ``end``: the law of tension has a kink (a jump, with a damper) where it changes,
+    and a step across that would lose its order.
+    """
+    here, left, resolution = y.copy(), h, h * _RESOLUTION
+    for part in range(_MAX_PARTS):
+        # 1. All that is left, with the law at its start.
+        low, high, at_low = 0.0, left, tension_margin(here, p)
+        pulls = at_low > 0.0
+        step(here, p, left, pulls, k, end)
+        at_high = tension_margin(end, p)
+        # 2. Within it the law may change and change back: where that is likely the step is looked at.
+        look = excursion(here, end, left, p, pulls)
+        if look > 0.0:
+            step(here, p, look, pulls, k, end)
+            margin = tension_margin(end, p)
+            if (margin > 0.0) == pulls:
+                low, at_low = look, margin
+            else:
+                high, at_high = look, margin
+        # 3. The first change is closed in on: regula falsi, Illinois variant (Dowell and Jarratt, BIT 11, 1971).
+        if (at_high > 0.0) != pulls and part < _MAX_PARTS - 1:
+            for trial in range(_MAX_TRIALS):
+                if high - low <= resolution:
+                    break
+                middle = 0.5 * (low + high)
+                if trial < _SECANTS and at_high != at_low:
+                    root = high - at_high * (high - low) / (at_high - at_low)
+                    middle = root if low <= root <= high else middle
+                # A root at one end is closed in on from the other side by the smallest step.
+                middle = min(max(middle, low + 0.5 * resolution), high - 0.5 * resolution)
+                step(here, p, middle, pulls, k, end)
+                margin = tension_margin(end, p)
+                if (margin > 0.0) == pulls:
+                    low, at_low, at_high = middle, margin, 0.5 * at_high
+                else:
+                    high, at_high, at_low = middle, margin, 0.5 * at_low
+        else:
+            high = left
+        step(here, p, high, pulls, k, end)
+        if not pulls:
+            end[HEAT] += shortening_heat(p, stretch(here, p)[0], stretch(end, p)[0])
+        left -= high
+        if left <= resolution:
+            break
+        copy_numbers(end, here)

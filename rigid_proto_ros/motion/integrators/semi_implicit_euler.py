@@ -14,16 +14,15 @@ from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize
 from .equations import accelerations
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
-from .runge_kutta import repeated, repeated_on_string
+from .runge_kutta import repeated
 from .stepping import fixed_steps
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y: np.ndarray, p: np.record, h: float, taut: bool, out: np.ndarray) -> None:
-    """One step of h seconds from y into out, the string's law given."""
+def _step(y: np.ndarray, p: np.record, h: float, pulls: bool, _k: np.ndarray, out: np.ndarray) -> None:
     qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     ex, ey, ez, ax, ay, az, work, heat = accelerations(
-        qx, qy, qz, qw, wx, wy, wz, y[7], y[8], y[9], y[10], y[11], y[12], p, taut
+        qx, qy, qz, qw, wx, wy, wz, y[7], y[8], y[9], y[10], y[11], y[12], p, pulls
     )
     wx, wy, wz = wx + h * ex, wy + h * ey, wz + h * ez
     rx, ry, rz, rw = exponential(h * wx, h * wy, h * wz)
@@ -38,13 +37,7 @@ def _step(y: np.ndarray, p: np.record, h: float, taut: bool, out: np.ndarray) ->
 @njit(cache=True, error_model="numpy")
 def semi_implicit_euler_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    return repeated(_step, y, p, h, n)
-
-
-@njit(cache=True, error_model="numpy")
-def semi_implicit_euler_string_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """The same, each step cut where the string turns slack or taut."""
-    return repeated_on_string(_step, y, p, h, n)
+    return repeated(_step, y, p, h, n, 1)
 
 
 SEMI_IMPLICIT_EULER = Integrator(
@@ -57,6 +50,5 @@ SEMI_IMPLICIT_EULER = Integrator(
     stability_limit=0.1,
     supports=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=semi_implicit_euler_steps,
-    string_kernel=semi_implicit_euler_string_steps,
     make_methods=fixed_steps,
 )

@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numba import boolean, float64, from_dtype, int64, types
 
-from ...base.addresses import address_of, function_at
 from ...base.compilation import njit
+from ...base.function_pointers import address_of, function_at
 from ...base.records import record_type
 from ..problem import PROBLEM
-from .control import CONTROL
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Integrator, Method
+from .series_steps import CONTROL
 
 STEPS = types.FunctionType(int64(float64[::1], from_dtype(PROBLEM), float64, int64))
 """A kernel (y, p, h, n)."""
@@ -38,7 +38,7 @@ def fixed_steps(integrator: Integrator) -> tuple[Method, ...]:
         return f"{integrator.name}: fixed steps of {step_s:g} s"
 
     without = Method(FIXED_STEPS, integrator.kernel, choice, integrator.evaluations)
-    return without, replace(without, kernel=integrator.string_kernel or integrator.kernel, on_string=True)
+    return without, replace(without, on_string=True)
 
 
 METHOD = record_type(

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Which law a pull-only string obeys, and the first time at which it changes along a power series of the motion.
+"""Which law a pull-only string obeys, and when it changes: along a power series, or along a fixed step.
 
 It is slack while x = l − rest length ≤ 0; else it pulls while k x + c l' > 0; else it is stretched but shortens faster
-than its damper lets it pull. Each law ends where a polynomial rises above zero, and the first such time is found
-(integrators/first_root.py): slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial however
-near the knot passes its free end; the other two where the tension, or the stretch, changes sign, whose series are at
-hand.
+than its damper lets it pull. A step of a series ends where a polynomial rises above zero, and the first such time is
+found (integrators/first_root.py): slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial
+however near the knot passes its free end; the other two where the tension, or the stretch, changes sign, whose series
+are at hand. Of a fixed step the knot is known at both ends alone: |a|² − rest² on the cubic through place and velocity
+there says where to look (``excursion``), and the step itself is repeated until the change is known to a double's digits
+(integrators/runge_kutta.py).
 
 A bilateral string with a rest length pushes at the full length of that when its knot meets the free end, in a
 direction n = a/l that has no limit at l = 0. A knot that goes straight through meets no pole of its series, which lead
-on as if l became negative; one that passes at a small distance b meets a pair of them at b/|a'| from the nearest point,
-too weak to show in any coefficient. So steps end before the nearest point, and the nanoseconds around it are a step of
-their own, without the string: before and after that point it pushes alike, in opposite directions, so that little is
-lost of its impulse, but no accuracy is kept, and that is reported.
+on as if l became negative. So steps keep from the free end, and the nanoseconds around it are a step of their own,
+without the string: before and after that point it pushes alike, in opposite directions, so that little is lost of its
+impulse, but no accuracy is kept, and that is reported.
 """
 
 from __future__ import annotations
@@ -22,20 +23,11 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.simd import filled, load, number
 from ..string import NO_DIRECTION
-from .equations import knot as moving_knot
+from .equations import knot_of, stretch
 from .first_root import NONE, first_rise
 from .knot import Knot, knot_and_stretch
-from .motion_series import (
-    A_KNOT,
-    COLUMNS,
-    DISTANCE,
-    STRETCH,
-    TENSION,
-    distance_series,
-    stretch_at,
-)
+from .series import A_KNOT, DISTANCE, STRETCH, TENSION, distance_series, stretch_at
 
 SLACK, PULLS, SHORTENS, PASSES = 0.0, 1.0, 2.0, 3.0
 """PASSES: of a step past the free end of a string that pushes at no length."""
@@ -51,19 +43,17 @@ of it.
 _NEGLIGIBLE = 1e-19
 """Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
 
-AT_ONCE = 4e-9
+_AT_ONCE = 4e-9
 """Before the nearest point [s]: nearer than this a step of a series would be too short."""
-FARTHEST = 64e-9
-"""From the nearest point [s], by the knot's speed: farther than this steps of series are always long enough."""
-MISSES = 1e-9
+_NEAR = 64e-9
+"""From the free end, by the knot's speed [s]: farther than this steps of series are always long enough."""
+_MISSES = 1e-9
 """Distance of the nearest point by the knot's speed [s], below which series say nothing of it."""
+_APPROACH = 0.75
+"""Of its distance from the free end, the knot of a string that pushes moves no more in a step."""
 
-_NEAR = 0.2
-"""Of the distance at a step's start: a point no nearer than this shows in the coefficients."""
-_SAMPLES = 8
-_HALVINGS = 40
-_BEFORE = 0.75
-"""Of the time until the nearest point, a step is no longer."""
+_SAMPLES = 16
+"""Of a cubic, between which its first maximum is looked for."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -88,11 +78,19 @@ def law_of(y: np.ndarray, p: np.record, knot: Knot) -> float:
     ax, ay, az, length, x = knot
     if x <= 0.0:
         return SLACK
-    _, _, _, vx, vy, vz = moving_knot(
-        y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12], p
-    )
+    _, _, _, vx, vy, vz = knot_of(y, p)
     rate = (ax * vx + ay * vy + az * vz) / length
     return PULLS if p.stiffness * x + p.string_damping * rate > 0.0 else SHORTENS
+
+
+@njit(cache=True, error_model="numpy")
+def shortening_heat(p: np.record, before: float, after: float) -> float:
+    """What the damper takes while the string doesn't pull [J]: all of ½ k x² lost from one stretch to another."""
+    before, after = max(before, 0.0), max(after, 0.0)
+    return 0.5 * p.stiffness * (before - after) * (before + after)
+
+
+# Along a series
 
 
 @njit(cache=True, error_model="numpy")
@@ -126,6 +124,18 @@ def next_law(
 
 
 @njit(cache=True, error_model="numpy")
+def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
+    """Coefficients of |a|² − rest² from those of a (n, 3); x: the stretch at 0, known to more digits than |a|."""
+    last = a.shape[0] - 1
+    g = np.zeros(2 * last + 1)
+    for i in range(last + 1):
+        for j in range(last + 1):
+            g[i + j] += a[i, 0] * a[j, 0] + a[i, 1] * a[j, 1] + a[i, 2] * a[j, 2]
+    g[0] = x * (2.0 * rest + x)
+    return g
+
+
+@njit(cache=True, error_model="numpy")
 def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
     """When |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
     rest = p.rest_length
@@ -144,14 +154,7 @@ def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
         for j in range(3):
             a[k, j] = c[k, A_KNOT + j] * power
         power *= h
-    g = np.zeros(2 * last + 1)
-    for i in range(last + 1):
-        x, y, z = a[i]
-        for j in range(last + 1):
-            g[i + j] += x * a[j, 0] + y * a[j, 1] + z * a[j, 2]
-    # l² − rest² from the stretch, which is known to more digits than l.
-    x = min(c[0, STRETCH], 0.0)
-    g[0] = x * (2.0 * rest + x)
+    g = _square_less_rest(a, min(c[0, STRETCH], 0.0), rest)
     left_out, top = 0.0, 2 * last
     while top > 2:
         left_out += abs(g[top])
@@ -204,6 +207,45 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
     return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed
 
 
+# Along a fixed step
+
+
+@njit(cache=True, error_model="numpy")
+def excursion(y: np.ndarray, end: np.ndarray, h: float, p: np.record, pulls: bool) -> float:
+    """When, within a step of h seconds from variables y to ``end``, the knot is first farthest on the other side of the
+    rest length than a string is that pulls, or doesn't; 0 where it stays on its side.
+    """
+    rest, x = p.rest_length, stretch(y, p)[0]
+    if (x > 0.0) != pulls:
+        return 0.0
+    start, stop = knot_of(y, p), knot_of(end, p)
+    a = np.empty((4, 3))
+    for k in range(3):
+        # a(s h) = a₀ + r₀ s + (3Δ − 2 r₀ − r₁) s² + (r₀ + r₁ − 2Δ) s³ with r = a' h.
+        r0, r1, change = start[3 + k] * h, stop[3 + k] * h, stop[k] - start[k]
+        a[0, k], a[1, k] = start[k], r0
+        a[2, k], a[3, k] = 3.0 * change - 2.0 * r0 - r1, r0 + r1 - 2.0 * change
+    g = _square_less_rest(a, x, rest)
+    if pulls:
+        g *= -1.0
+    begin = first_rise(g, 6)
+    if begin == NONE or begin >= 1.0:
+        return 0.0
+    time, most = begin, 0.0
+    for k in range(1, _SAMPLES + 1):
+        t = begin + (1.0 - begin) * (k / _SAMPLES)
+        value = 0.0
+        for j in range(6, -1, -1):
+            value = value * t + g[j]
+        if value < most:
+            break
+        time, most = t, value
+    return time * h
+
+
+# Past the free end
+
+
 @njit(cache=True, error_model="numpy")
 def may_pass(p: np.record) -> bool:
     """Whether the string is one that pushes at no length."""
@@ -212,70 +254,31 @@ def may_pass(p: np.record) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def before_passage(c: np.ndarray, p: np.record, degree: int, knot: Knot, h: float) -> tuple[float, int]:
-    """h cut down so that a step along the series c ends before the knot passes its free end; or, where that is at hand,
+    """h cut down so that a step along the series c keeps from the free end; or, where the knot is about to pass that,
     the length [ns] of the step that passes it, else 0. knot: at the series' start.
     """
     ax, ay, az, length, _ = knot
     vx, vy, vz = c[1, A_KNOT], c[1, A_KNOT + 1], c[1, A_KNOT + 2]
     square = vx * vx + vy * vy + vz * vz
     speed, shortest = math.sqrt(square), NO_DIRECTION * p.rest_length
-    if speed > 0.0 and length <= FARTHEST * speed:
-        nearest = -(ax * vx + ay * vy + az * vz) / square
-        bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest
-        straight = math.sqrt(bx * bx + by * by + bz * bz) <= MISSES * speed
-        inside = length < shortest and speed * 1e-9 > shortest
-        if h * 1e9 < 1.0 or inside or (straight and 0.0 <= nearest <= AT_ONCE):
-            return h, max(int(math.ceil((2.0 * nearest if nearest > 0.0 else -nearest) * 1e9)), 2)
-    if length < shortest:
-        # No direction, no tension: not for longer than until there is one.
-        push = abs(c[2, A_KNOT]) + abs(c[2, A_KNOT + 1]) + abs(c[2, A_KNOT + 2])
-        leaves = math.inf
-        if speed > 0.0:
-            leaves = shortest / speed
-        if push > 0.0:
-            leaves = min(leaves, math.sqrt(shortest / push))
-        return min(h, max(leaves, 1.1e-9)), 0
-    return min(h, _BEFORE * _nearest_time(c, degree, length, h)), 0
+    # Within ``shortest`` there is no direction and no pull.
+    room = max(_APPROACH * length, shortest)
+    while h * 1e9 >= 1.0 and _moves(c, degree, h) > room:
+        h *= 0.5
+    if length > max(_NEAR * speed, shortest):
+        return h, 0
+    nearest = -(ax * vx + ay * vy + az * vz) / square if speed > 0.0 else 0.0
+    bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest
+    straight = math.sqrt(bx * bx + by * by + bz * bz) <= _MISSES * speed
+    if h * 1e9 < 1.0 or (straight and 0.0 <= nearest <= _AT_ONCE and speed > 0.0):
+        return h, max(int(math.ceil(2e9 * abs(nearest))), 2)
+    return h, 0
 
 
 @njit(cache=True, error_model="numpy")
-def _at(c: np.ndarray, degree: int, t: float) -> tuple[float, float]:
-    """l² and a·a' at time t of the series."""
-    a, b = filled(0.0, 4), filled(0.0, 4)
-    at = degree * COLUMNS + A_KNOT
-    for _ in range(degree + 1):
-        b = b * t + a
-        a = a * t + load(c, at, a)
-        at -= COLUMNS
-    x, y, z = number(a, 0), number(a, 1), number(a, 2)
-    return x * x + y * y + z * z, x * number(b, 0) + y * number(b, 1) + z * number(b, 2)
-
-
-@njit(cache=True, error_model="numpy")
-def _nearest_time(c: np.ndarray, degree: int, length: float, h: float) -> float:
-    """When the knot first is much nearer to its free end than before and after, infinite if never within h seconds."""
-    reach, power = 0.0, 1.0
-    for k in range(1, degree + 1):
-        power *= h
-        reach += (abs(c[k, A_KNOT]) + abs(c[k, A_KNOT + 1]) + abs(c[k, A_KNOT + 2])) * power
-    if reach < (1.0 - _NEAR) * length:
-        return math.inf
-    low, approaches = 0.0, _at(c, degree, 0.0)[1] < 0.0
-    for i in range(1, _SAMPLES + 1):
-        high = h * (i / _SAMPLES)
-        approached = approaches
-        approaches = _at(c, degree, high)[1] < 0.0
-        if approached and not approaches:
-            least = math.inf
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                square, slope = _at(c, degree, middle)
-                least = min(least, square)
-                if slope < 0.0:
-                    low = middle
-                else:
-                    high = middle
-            if least < (_NEAR * length) ** 2:
-                return low
-        low = h * (i / _SAMPLES)
-    return math.inf
+def _moves(c: np.ndarray, degree: int, h: float) -> float:
+    """A bound of how far the knot moves within h seconds [m]."""
+    reach = 0.0
+    for k in range(degree, 0, -1):
+        reach = (reach + abs(c[k, A_KNOT]) + abs(c[k, A_KNOT + 1]) + abs(c[k, A_KNOT + 2])) * h
+    return reach

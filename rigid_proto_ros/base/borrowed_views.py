@@ -29,16 +29,16 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 if TYPE_CHECKING or INTERPRETED:
 
-    def uncounted(arrays: _Arrays) -> _Arrays:
-        """The same array, or tuple with arrays in it, as uncounted views. Whoever calls the compiled function keeps the
-        arrays: what that function has allocated itself may be gone after its last use.
+    def borrowed(arrays: _Arrays) -> _Arrays:
+        """The same array, or tuple with arrays in it, as borrowed views, whose references nobody counts. Whoever calls
+        the compiled function keeps the arrays: what that function has allocated itself may be gone after its last use.
         """
         return arrays
 
 else:
 
     @intrinsic
-    def uncounted(_typing_context: Any, arrays: Any) -> tuple:
+    def borrowed(_typing_context: Any, arrays: Any) -> tuple:
         """As above."""
 
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -12,10 +12,9 @@ import numpy as np
 from ..base.rotation import Numbers, Vector, cross, dot, length, times, transposed_times
 from ..motion.loads import LoadSum
 from ..motion.state import State
-from ..motion.string import Tied
+from ..motion.string import StringState
 from .flight import FLOOR_KINDS
-from .flight_arrays import ActingLoad, FlightArrays
-from .segment import Segment
+from .flight_arrays import ActingLoad, FlightArrays, Segment
 from .setup import Setup
 from .string_control import StringControl
 from .thrusters import ThrusterControl
@@ -40,7 +39,7 @@ def floor_text(floors: Iterable[float]) -> str:
     return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
 
 
-class Readings:
+class Observables:
     """The readings of a Simulation at the time it was last advanced to; none of them changes it."""
 
     setup: Setup
@@ -121,7 +120,7 @@ class Readings:
         return f"{self.choice}: {steps:.2g} steps for a second of the motion, slower than real time"
 
     @property
-    def string(self) -> Tied | None:
+    def string(self) -> StringState | None:
         """The string as it is tied, or None."""
         return self._string.tied
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Uncounted arrays are the caller's own, written where they stand and never let go by compiled code."""
+"""Borrowed arrays are the caller's own, written where they stand and never let go by compiled code."""
 
 import sys
 
@@ -9,19 +9,19 @@ from numba import float64, njit
 from numba.core.errors import NumbaError
 
 from rigid_proto_ros.base import compilation
-from rigid_proto_ros.base.uncounted_arrays import copy_numbers, uncounted
+from rigid_proto_ros.base.borrowed_views import borrowed, copy_numbers
 
 
 @njit
 def add_to_rows(arrays):
-    (first, some), second = uncounted(arrays)
+    (first, some), second = borrowed(arrays)
     for k in range(first.shape[0]):
         row = first[k]
         row[:] += second[k]
     return some
 
 
-def test_an_uncounted_array_is_the_callers_own() -> None:
+def test_a_borrowed_array_is_the_callers_own() -> None:
     first, second = np.zeros((3, 2)), np.array([1.0, 2.0, 3.0])
     arrays = (first, True), second
     before = sys.getrefcount(first), sys.getrefcount(second)

@@ -68,7 +68,7 @@ def function_at(taken_as: types.FunctionType) -> Callable:
 
 def address_of_array(array: np.ndarray) -> int:
     """Where the first number of an array stands, which may be written to."""
-    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
+    return int(array.ctypes.data) if array.dtype.names else int(array.__array_interface__["data"][0])
 
 
 def _pointer_to(kind: types.Type) -> Callable:
