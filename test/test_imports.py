@@ -51,6 +51,7 @@ ALLOWED = {
     "argcomplete": ("base.command_line",),
     "rich": ("cli", "base.progress"),
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
+    "trimesh": ("mesh.other_formats",),
     "collada": ("mesh.collada",),
     "DracoPy": ("mesh.gltf",),
     "mujoco": ("robots.mjcf",),

@@ -7,98 +7,57 @@ import re
 
 import numpy as np
 
-from ..base.compilation import njit
 from ..base.errors import MeshError
-from .numbers_in_text import EXACT, error_at, excerpt, finish_numbers, line_end, read_number, read_point, skip_blanks
+from .ascii_floats import as_numbers, excerpt
 
-_OK, _ENDED, _BAD_VERTEX, _BAD_FACE = 0, 1, 2, 3
-_VERTEX = "a vertex: three numbers"
-
-
-@njit(cache=True, nogil=True)
-def _next_line(buffer: np.ndarray, i: int) -> int:
-    """Start of the next line's first token, past blank lines and comments."""
-    i = skip_blanks(buffer, i, True)
-    while i < buffer.shape[0] and buffer[i] == 35:
-        i = skip_blanks(buffer, line_end(buffer, i), True)
-    return i
+_HEADER = re.compile(rb"\s*(ST)?C?N?(4)?(n)?OFF\b[ \t]*(BINARY)?")
 
 
-@njit(cache=True, nogil=True)
-def _read(
-    buffer: np.ndarray, i: int, vertices: np.ndarray, starts: np.ndarray, corners: np.ndarray, slow: np.ndarray
-) -> tuple[int, int, int, int]:
-    """Fill the arrays from i on; slow (k, 3) as in ``read_point``.
-
-    Returns (status, position or rows read when the file ended, numbers noted in slow, corners read).
-    """
-    end = buffer.shape[0]
-    slow_count = 0
-    for v in range(vertices.shape[0]):
-        line = i = _next_line(buffer, i)
-        if i >= end:
-            return _ENDED, v, slow_count, 0
-        i, slow_count, whole = read_point(buffer, i, vertices, v, slow, slow_count, False)
-        if not whole:
-            return _BAD_VERTEX, line, slow_count, 0
-        i = line_end(buffer, i)
-    corner = 0
-    starts[0] = 0
-    for f in range(starts.shape[0] - 1):
-        line = i = _next_line(buffer, i)
-        if i >= end:
-            return _ENDED, vertices.shape[0] + f, slow_count, corner
-        value, i, status = read_number(buffer, i)
-        size = int(value)
-        if status != EXACT or size != value or size < 3 or size > end:
-            return _BAD_FACE, line, slow_count, corner
-        for _ in range(size):
-            value, i, status = read_number(buffer, skip_blanks(buffer, i, False))
-            if status != EXACT or value != int(value) or not 0 <= value < vertices.shape[0]:
-                return _BAD_FACE, line, slow_count, corner
-            corners[corner] = int(value)
-            corner += 1
-        starts[f + 1] = corner
-        i = line_end(buffer, i)
-    return _OK, 0, slow_count, corner
+def _rows(text: bytes) -> list[bytes]:
+    """The lines that aren't blank, without comments."""
+    if b"#" in text:
+        text = re.sub(rb"#[^\n]*", b"", text)
+    return [line for line in text.split(b"\n") if line and not line.isspace()]
 
 
-def _announced(data: bytes, name: str) -> tuple[int, int, int]:
-    """(vertices, faces, position of the body) from the header."""
-    header = re.match(rb"\s*(ST)?C?N?(4)?(n)?OFF\b[ \t]*(BINARY)?", data)
+def read_off(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices (n, 3), polygon corners (c,) and their starts (p + 1,); raises MeshError naming what is wrong."""
+    header = _HEADER.match(data)
     if header is None:
         raise MeshError(name, excerpt(data, 0), "an .off file: its first line is OFF")
     if header.group(2) or header.group(3) or header.group(4):
         raise MeshError(name, excerpt(data, 0), "ASCII OFF in three dimensions")
-    body = re.compile(rb"(?:\s|#[^\n]*\n)*").match(data, header.end())
-    start = header.end() if body is None else body.end()
-    counts = re.compile(rb"(\d{1,18})[ \t]+(\d{1,18})(?:[ \t]+-?\d+)?[^\n]*").match(data, start)
-    if counts is None:
-        raise MeshError(name, excerpt(data, start), "numbers of vertices, faces and edges after OFF")
-    return int(counts.group(1)), int(counts.group(2)), counts.end()
-
-
-def read_off(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices (n, 3), polygon corners (c,) and their starts (p + 1,); raises MeshError naming file and line."""
-    n, p, start = _announced(data, name)
-    # A vertex takes six bytes or more ("0 0 0\n"), a triangle eight.
-    if 6 * n + 8 * p > len(data) - start + 8:
-        announced = f"the {n} vertices and {p} faces that the header announces; the file may be truncated"
-        raise MeshError(name, f"{len(data)} bytes can't hold {announced}")
+    rows = _rows(data[header.end() :])
+    counts = [int(word) for word in (rows[0].split()[:2] if rows else ()) if word.isdigit() and len(word) <= 18]
+    if len(counts) < 2:
+        raise MeshError(name, excerpt(rows[0], 0) if rows else "", "numbers of vertices, faces and edges after OFF")
+    n, p = counts
     if p > max_triangles:
         raise MeshError(name, f"{p} faces are more than {max_triangles}; --max-triangles raises the limit")
-    buffer = np.frombuffer(data, np.uint8)
-    vertices, starts = np.empty((n, 3)), np.empty(p + 1, np.int64)
-    corners = np.empty((len(data) - start) // 2 + 1, np.int64)
-    slow = np.empty((3 * n, 3), np.int64)
-    status, position, slow_count, used = _read(buffer, start, vertices, starts, corners, slow)
-    if status == _ENDED:
-        received = f"{min(position, n)} vertices and {max(0, position - n)} faces"
+    if n + p > len(rows) - 1:
+        received = f"{min(n, len(rows) - 1)} vertices and {max(0, len(rows) - 1 - n)} faces"
         raise MeshError(
             name, f"{received}, but the header announces {n} vertices and {p} faces; the file may be truncated"
         )
-    if status != _OK:
-        face = f"a face: its number of corners (3 or more), then vertex numbers from 0 to {n - 1}"
-        raise error_at(data, position, name, _VERTEX if status == _BAD_VERTEX else face)
-    finish_numbers(vertices, slow[:slow_count], data, name, _VERTEX)
-    return vertices, corners[:used].copy(), starts
+    places = [row.split()[:3] for row in rows[1 : n + 1]]
+    points, whole = as_numbers(b" ".join([word for row in places for word in row]), 3 * n)
+    short = next((k for k, row in enumerate(places) if len(row) < 3), n)
+    if short < n or not whole:
+        raise MeshError(name, excerpt(rows[1 + min(short, len(points) // 3)], 0), "a vertex: three numbers")
+    face = f"a face: its number of corners (3 or more), then vertex numbers from 0 to {n - 1}"
+    corners: list[bytes] = []
+    sizes = np.zeros(p, np.int64)
+    for k, row in enumerate(rows[n + 1 : n + p + 1]):
+        words = row.split()
+        size = int(words[0]) if words[0].isdigit() and len(words[0]) < 10 else 0
+        if size < 3 or size >= len(words):
+            raise MeshError(name, excerpt(row, 0), face)
+        corners += words[1 : size + 1]
+        sizes[k] = size
+    starts = np.cumsum(np.concatenate([np.zeros(1, np.int64), sizes]))
+    numbers, whole = as_numbers(b" ".join(corners), len(corners), int)
+    wrong = np.flatnonzero((numbers < 0) | (numbers >= n))
+    if len(wrong) or not whole:
+        first = int(wrong[0]) if len(wrong) else len(numbers)
+        raise MeshError(name, excerpt(rows[n + int(np.searchsorted(starts, first, side="right"))], 0), face)
+    return points.reshape(-1, 3), numbers, starts

@@ -3,38 +3,38 @@
 
 from __future__ import annotations
 
+import itertools
+import struct
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.compilation import njit
 from ..base.errors import MeshError
-from .numbers_in_text import error_at, excerpt, read_numbers
+from .ascii_floats import as_numbers, error_at, excerpt, word_position
 
-_TYPES = {
-    "char": "i1",
-    "uchar": "u1",
-    "short": "i2",
-    "ushort": "u2",
-    "int": "i4",
-    "uint": "u4",
-    "float": "f4",
-    "double": "f8",
-    "float32": "f4",
-    "float64": "f8",
-    **{f"{sign}int{bits}": f"{kind}{bits // 8}" for sign, kind in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)},
+_NAMES = {
+    "b": ("char", "int8"),
+    "B": ("uchar", "uint8"),
+    "h": ("short", "int16"),
+    "H": ("ushort", "uint16"),
+    "i": ("int", "int32"),
+    "I": ("uint", "uint32"),
+    "q": ("int64",),
+    "Q": ("uint64",),
+    "f": ("float", "float32"),
+    "d": ("double", "float64"),
 }
+_TYPES = {name: kind for kind, names in _NAMES.items() for name in names}
+"""By the header's names, those of the modules struct and numpy."""
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 _FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 MAX_HEADER = 1_000_000
 """Bytes; a header has some lines of 20 to 60."""
 
-_Lists = dict[str, tuple[np.ndarray, np.ndarray]]  # an element's list of vertex numbers: starts (rows + 1,), items
-
 
 @dataclass(frozen=True)
 class _Property:
-    """A scalar of NumPy type ``type``, or a list of them when ``count_type`` says how its length is written."""
+    """A scalar of one of _TYPES, or a list of them when ``count_type`` says how its length is written."""
 
     name: str
     type: str
@@ -50,20 +50,16 @@ class _Element:
     properties: list[_Property] = field(default_factory=list)
 
     @property
-    def lists(self) -> list[int]:
-        """Numbers of the properties that are lists."""
-        return [k for k, p in enumerate(self.properties) if p.count_type]
-
-    @property
     def index_column(self) -> int:
         """Number of the list property that names vertices, or −1."""
-        return next((k for k in self.lists if self.properties[k].name in _INDEX_NAMES), -1)
+        names = [p.name if p.count_type else "" for p in self.properties]
+        return next((k for k, name in enumerate(names) if name in _INDEX_NAMES), -1)
 
     def least_bytes(self, text: bool) -> int:
         """Least number of bytes that a row takes."""
         if text:
             return 2 * len(self.properties)
-        return sum(np.dtype(p.count_type or p.type).itemsize for p in self.properties)
+        return sum(struct.calcsize("<" + (p.count_type or p.type)) for p in self.properties)
 
 
 def _header(data: bytes, name: str) -> tuple[str, list[_Element], int]:
@@ -106,126 +102,120 @@ def _header_line(words: list[str], elements: list[_Element]) -> None:
         raise ValueError
 
 
-@njit(cache=True, nogil=True)
-def _walk_text(
-    values: np.ndarray, i: int, rows: int, kinds: np.ndarray, wanted: int, starts: np.ndarray, items: np.ndarray
-) -> tuple[int, int, int]:
-    """Read rows of scalars (kind 0) and lists (kind 1) from numbers; keep the list property ``wanted``.
+class _Body:
+    """The rows behind the header. Those of a text are read as binary ones of doubles, for so its numbers are kept."""
 
-    Returns (rows read, position, items kept).
-    """
-    kept = 0
-    n = values.shape[0]
-    for row in range(rows):
-        for p in range(kinds.shape[0]):
-            if i >= n:
-                return row, i, kept
-            if kinds[p] == 0:
-                i += 1
-                continue
-            size = int(values[i])
-            if size != values[i] or size < 0 or i + 1 + size > n:
-                return row, i, kept
-            if p == wanted:
-                items[kept : kept + size] = values[i + 1 : i + 1 + size]
-                kept += size
-            i += 1 + size
-        starts[row + 1] = kept
-    return rows, i, kept
+    def __init__(self, data: bytes, position: int, layout: str, name: str) -> None:
+        self.name = name
+        self.text = layout == "ascii"
+        self.order = ">" if layout == "binary_big_endian" else "<"
+        self.data, self.position = data, position
+        if self.text:
+            values, whole = as_numbers(data[position:])
+            if not whole:
+                end = position + word_position(data[position:], len(values))
+                raise error_at(data, end, name, "numbers in the body of a .ply file")
+            self.data, self.position = values.astype("<f8").tobytes(), 0
 
+    def _type(self, kind: str) -> str:
+        return self.order + ("d" if self.text else kind)
 
-@njit(cache=True, nogil=True)
-def _unsigned(buffer: np.ndarray, i: int, size: int, big: bool) -> np.int64:
-    """The unsigned integer of ``size`` bytes at i, the most significant one first when ``big``."""
-    value = np.int64(0)
-    for k in range(size):
-        value |= np.int64(buffer[i + k]) << (8 * (size - 1 - k if big else k))
-    return value
+    def _size(self, kind: str, at: int) -> int:
+        """The length of a list, written at ``at``; −1 where there is none."""
+        if at + struct.calcsize(self._type(kind)) > len(self.data):
+            return -1
+        size = struct.unpack_from(self._type(kind), self.data, at)[0]
+        return int(size) if 0 <= size <= len(self.data) and size == int(size) else -1
 
+    def table(self, element: _Element) -> np.ndarray | None:
+        """All rows, if every list is as long as it is in the first one: fields p0, p1, …, and of lists n0, n1, …"""
+        fields: list[tuple] = []
+        for k, p in enumerate(element.properties):
+            if p.count_type:
+                before = np.dtype(fields).itemsize
+                size = self._size(p.count_type, self.position + before)
+                if not 0 <= size * struct.calcsize(self._type(p.type)) <= len(self.data):
+                    return None
+                fields += [(f"n{k}", self._type(p.count_type)), (f"p{k}", self._type(p.type), (size,))]
+            else:
+                fields.append((f"p{k}", self._type(p.type)))
+        kind = np.dtype(fields)
+        if self.position + element.count * kind.itemsize > len(self.data):
+            return None
+        rows = np.frombuffer(self.data, kind, count=element.count, offset=self.position)
+        if any(np.any(rows[n] != rows[n][:1]) for n in kind.names or () if n.startswith("n")):
+            return None
+        self.position += element.count * kind.itemsize
+        return rows
 
-@njit(cache=True, nogil=True)
-def _walk_bytes(
-    buffer: np.ndarray, i: int, widths: np.ndarray, wanted: int, big: bool, offsets: np.ndarray, counts: np.ndarray
-) -> tuple[int, int]:
-    """Offsets and lengths of the list property ``wanted`` in each row, offsets and counts (rows,).
-
-    widths (p, 2): the bytes of each property's count, 0 for a scalar, and of one item. Returns (rows read, position).
-    """
-    n = buffer.shape[0]
-    for row in range(offsets.shape[0]):
-        for p in range(widths.shape[0]):
+    def lists(self, element: _Element, wanted: int) -> tuple[np.ndarray, np.ndarray]:
+        """The lists of property ``wanted``, row by row: sizes (rows,), items."""
+        at, sizes, parts = self.position, [], []
+        for row, (k, p) in itertools.product(range(element.count), enumerate(element.properties)):
             size = 1
-            if widths[p, 0]:
-                if i + widths[p, 0] > n:
-                    return row, i
-                size = _unsigned(buffer, i, widths[p, 0], big)
-                i += widths[p, 0]
-            if size < 0 or size > n or i + size * widths[p, 1] > n:
-                return row, i
-            if p == wanted:
-                offsets[row], counts[row] = i, size
-            i += size * widths[p, 1]
-    return offsets.shape[0], i
+            if p.count_type:
+                size = self._size(p.count_type, at)
+                at += struct.calcsize(self._type(p.count_type))
+            width = struct.calcsize(self._type(p.type))
+            if size < 0 or at + size * width > len(self.data):
+                raise self.short(element, row)
+            if k == wanted:
+                sizes.append(size)
+                parts.append(self.data[at : at + size * width])
+            at += size * width
+        self.position = at
+        kind = self._type(element.properties[wanted].type if wanted >= 0 else "d")
+        return np.array(sizes, np.int64), np.frombuffer(b"".join(parts), kind)
+
+    def short(self, element: _Element, rows: int) -> MeshError:
+        """The refusal of a body that has fewer rows than the header says."""
+        announced = f"the header announces {element.count}; the file may be truncated or damaged"
+        return MeshError(self.name, f"{rows} complete rows of {element.name}, but {announced}")
+
+    def vertices(self, element: _Element) -> np.ndarray:
+        """Vertices (n, 3)."""
+        names = [p.name for p in element.properties]
+        if not all(axis in names for axis in "xyz") or any(p.count_type for p in element.properties):
+            raise MeshError(self.name, names, "an element vertex with properties x, y, z and no lists")
+        rows = self.table(element)
+        if rows is None:
+            width = sum(struct.calcsize(self._type(p.type)) for p in element.properties)
+            raise self.short(element, (len(self.data) - self.position) // width)
+        return np.stack([rows[f"p{names.index(axis)}"].astype(np.float64) for axis in "xyz"], axis=1)
+
+    def polygons(self, element: _Element) -> tuple[np.ndarray, np.ndarray]:
+        """The element's lists of vertex numbers, if it has such: sizes (rows,), numbers; raises MeshError for one that
+        isn't whole."""
+        wanted, rows = element.index_column, None
+        if element.count:
+            rows = self.table(element)
+        if rows is None:
+            sizes, items = self.lists(element, wanted)
+        elif wanted < 0:
+            sizes, items = np.zeros(0, np.int64), np.zeros(0)
+        else:
+            sizes, items = rows[f"n{wanted}"].astype(np.int64), rows[f"p{wanted}"].reshape(-1)
+        with np.errstate(invalid="ignore"):  # NaN and what an int64 can't hold are found by the comparison
+            whole = items.astype(np.int64)
+        wrong = whole != items
+        if wrong.any():
+            raise MeshError(self.name, f"a face uses vertex {items[wrong][0]:g}; accepted: whole numbers")
+        return sizes, whole
 
 
-@njit(cache=True, nogil=True)
-def _gather(buffer: np.ndarray, offsets: np.ndarray, counts: np.ndarray, item_size: int, out: np.ndarray) -> None:
-    """Copy the lists' bytes one after the other."""
-    o = 0
-    for row in range(offsets.shape[0]):
-        for k in range(counts[row] * item_size):
-            out[o] = buffer[offsets[row] + k]
-            o += 1
-
-
-def _short(name: str, element: _Element, rows: int) -> MeshError:
-    announced = f"the header announces {element.count}; the file may be truncated or damaged"
-    return MeshError(name, f"{rows} complete rows of {element.name}, but {announced}")
-
-
-def _strips(starts: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangle strips, −1 separated, as corners and starts; every other triangle of a strip is turned."""
-    triangles = []
-    for row in range(len(starts) - 1):
-        strip = items[starts[row] : starts[row + 1]]
+def _strips(sizes: np.ndarray, items: np.ndarray) -> np.ndarray:
+    """The corners of triangle strips, −1 separated; every other triangle of a strip is turned."""
+    triangles = [np.empty((0, 3), np.int64)]
+    for strip in np.split(items, np.cumsum(sizes)[:-1]):
         for part in np.split(strip, np.nonzero(strip == -1)[0]):
             part = part[part != -1]
             if len(part) >= 3:
                 t = np.stack([part[:-2], part[1:-1], part[2:]], axis=1)
                 t[1::2] = t[1::2, [1, 0, 2]]
                 triangles.append(t)
-    corners = np.concatenate(triangles) if triangles else np.empty((0, 3), np.int64)
+    corners = np.concatenate(triangles)
     real = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
-    corners = corners[real].reshape(-1)
-    return corners, np.arange(0, len(corners) + 1, 3)
-
-
-def read_ply(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices (n, 3), polygon corners (c,) and their starts (p + 1,); raises MeshError naming what is wrong."""
-    layout, elements, position = _header(data, name)
-    text = layout == "ascii"
-    _check_counts(data, position, elements, text, max_triangles, name)
-    if text:
-        values, bad = read_numbers(data, position, len(data))
-        if bad is not None:
-            raise error_at(data, bad, name, "numbers in the body of a .ply file")
-        vertices, lists = _text_body(values, elements, name)
-    else:
-        vertices, lists = _binary_body(data, position, elements, layout == "binary_big_endian", name)
-    if vertices is None:
-        raise MeshError(name, [e.name for e in elements], "an element vertex with properties x, y, z")
-    starts, items = lists.get("face", (np.zeros(1, np.int64), np.empty(0, np.int64)))
-    if "tristrips" in lists:
-        corners, strip_starts = _strips(*lists["tristrips"])
-        items = np.concatenate([items, corners])
-        starts = np.concatenate([starts, starts[-1] + strip_starts[1:]])
-    sizes = np.diff(starts)
-    if sizes.size and sizes.min() < 3:
-        raise MeshError(name, f"face {int(np.argmin(sizes))} has {int(sizes.min())} corners; a face has three or more")
-    if items.size and (items.min() < 0 or items.max() >= len(vertices)):
-        wrong = int(items[(items < 0) | (items >= len(vertices))][0])
-        raise MeshError(name, f"a face uses vertex {wrong}, but the vertices are numbered 0 to {len(vertices) - 1}")
-    return vertices, items, starts
+    return corners[real].reshape(-1)
 
 
 def _check_counts(
@@ -241,77 +231,28 @@ def _check_counts(
             raise MeshError(name, f"{element.count} faces", limit)
 
 
-def _vertex_columns(element: _Element, name: str) -> list[int]:
-    names = [p.name for p in element.properties]
-    if not all(axis in names for axis in "xyz") or element.lists:
-        raise MeshError(name, names, "an element vertex with properties x, y, z and no lists")
-    return [names.index(axis) for axis in "xyz"]
-
-
-def _vertex_numbers(items: np.ndarray, name: str) -> np.ndarray:
-    """The items of a list of vertex numbers as int64; raises MeshError for one that isn't whole."""
-    with np.errstate(invalid="ignore"):  # NaN and what an int64 can't hold are found by the comparison
-        whole = items.astype(np.int64)
-    wrong = whole != items
-    if wrong.any():
-        raise MeshError(name, f"a face uses vertex {items[wrong][0]:g}; accepted: whole numbers")
-    return whole
-
-
-def _text_body(values: np.ndarray, elements: list[_Element], name: str) -> tuple[np.ndarray | None, _Lists]:
+def read_ply(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices (n, 3), polygon corners (c,) and their starts (p + 1,); raises MeshError naming what is wrong."""
+    layout, elements, position = _header(data, name)
+    _check_counts(data, position, elements, layout == "ascii", max_triangles, name)
+    body = _Body(data, position, layout, name)
     vertices: np.ndarray | None = None
-    lists: _Lists = {}
-    i = 0
+    sizes, items = np.zeros(0, np.int64), np.empty(0, np.int64)
     for element in elements:
-        width = len(element.properties)
         if element.name == "vertex":
-            columns = _vertex_columns(element, name)
-            if i + width * element.count > len(values):
-                raise _short(name, element, (len(values) - i) // width)
-            rows = values[i : i + width * element.count].reshape(-1, width)
-            vertices = np.ascontiguousarray(rows[:, columns])
-            i += width * element.count
+            vertices = body.vertices(element)
             continue
-        kinds = np.array([bool(p.count_type) for p in element.properties], np.int64)
-        starts = np.zeros(element.count + 1, np.int64)
-        items = np.empty(len(values) - i)
-        count, i, kept = _walk_text(values, i, element.count, kinds, element.index_column, starts, items)
-        if count < element.count:
-            raise _short(name, element, count)
-        lists[element.name] = starts, _vertex_numbers(items[:kept], name)
-    return vertices, lists
-
-
-def _binary_body(
-    data: bytes, position: int, elements: list[_Element], big: bool, name: str
-) -> tuple[np.ndarray | None, _Lists]:
-    order = ">" if big else "<"
-    buffer = np.frombuffer(data, np.uint8)
-    vertices: np.ndarray | None = None
-    lists: _Lists = {}
-    for element in elements:
-        if not element.lists:
-            dtype = np.dtype([(f"p{k}", order + p.type) for k, p in enumerate(element.properties)])
-            if position + element.count * dtype.itemsize > len(data):
-                raise _short(name, element, (len(data) - position) // max(1, dtype.itemsize))
-            if element.name == "vertex":
-                table = np.frombuffer(data, dtype, count=element.count, offset=position)
-                wanted = _vertex_columns(element, name)
-                vertices = np.stack([table[f"p{k}"].astype(np.float64) for k in wanted], axis=1)
-            position += element.count * dtype.itemsize
-            continue
-        if element.name == "vertex":
-            _vertex_columns(element, name)  # refuses its list
-        item = np.dtype(order + element.properties[element.index_column].type)
-        sizes = [(np.dtype(p.count_type).itemsize if p.count_type else 0) for p in element.properties]
-        widths = np.array([sizes, [np.dtype(p.type).itemsize for p in element.properties]]).T
-        offsets, counts = np.zeros(element.count, np.int64), np.zeros(element.count, np.int64)
-        rows, position = _walk_bytes(buffer, position, widths, element.index_column, big, offsets, counts)
-        if rows < element.count:
-            raise _short(name, element, rows)
-        if element.index_column >= 0:
-            raw = np.empty(int(counts.sum()) * item.itemsize, np.uint8)
-            _gather(buffer, offsets, counts, item.itemsize, raw)
-            numbers = _vertex_numbers(raw.view(item), name)
-            lists[element.name] = np.concatenate([[0], np.cumsum(counts)]), numbers
-    return vertices, lists
+        counts, numbers = body.polygons(element)
+        if element.name == "tristrips":
+            numbers = _strips(counts, numbers)
+            counts = np.full(len(numbers) // 3, 3)
+        if element.name in ("face", "tristrips"):
+            sizes, items = np.concatenate([sizes, counts]), np.concatenate([items, numbers])
+    if vertices is None:
+        raise MeshError(name, [e.name for e in elements], "an element vertex with properties x, y, z")
+    if sizes.size and sizes.min() < 3:
+        raise MeshError(name, f"face {int(np.argmin(sizes))} has {int(sizes.min())} corners; a face has three or more")
+    if items.size and (items.min() < 0 or items.max() >= len(vertices)):
+        wrong = int(items[(items < 0) | (items >= len(vertices))][0])
+        raise MeshError(name, f"a face uses vertex {wrong}, but the vertices are numbered 0 to {len(vertices) - 1}")
+    return vertices, items, np.cumsum(np.concatenate([np.zeros(1, np.int64), sizes]))

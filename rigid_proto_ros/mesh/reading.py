@@ -27,15 +27,17 @@ from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
 from .off import read_off
+from .other_formats import add_by_trimesh, other_formats
 from .ply import read_ply
 from .stl import is_ascii_stl, read_stl
 from .threemf import add_threemf
 
 OWN_FORMATS = ("obj", "off", "ply", "stl")
-"""Formats of one surface. trimesh 5.2 takes 2.5 to 20 times as long, and misreads some files of each in silence
-(tab-separated .obj, negative indices, strips in .ply, cut .off and .stl): benchmarks/mesh_readers.py."""
+"""Formats of one surface. trimesh 5.2 misreads some files of each in silence (tab-separated .obj, negative indices,
+strips and lists of several lengths in .ply, cut .off and .stl: benchmarks/mesh_readers.py) and keeps no polygons."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae", "zae")
-"""All readable formats; those beyond OWN_FORMATS are scenes of placed parts."""
+"""Formats read as they are specified; those beyond OWN_FORMATS are scenes of placed parts. What else trimesh reads is
+taken from it."""
 PACKED = ("gz", "bz2")
 """Endings of compressed files; before them stands the format's own, as in part.stl.gz."""
 MAX_TRIANGLES = 20_000_000
@@ -133,8 +135,10 @@ def _formats(path: Path) -> tuple[str, str]:
     """(format, packing or "") by the file's endings; raises MeshError for one that can't be read."""
     endings = [ending.lower().lstrip(".") for ending in path.suffixes[-2:]]
     packing = endings.pop() if endings and endings[-1] in PACKED else ""
-    if not endings or endings[-1] not in FORMATS:
-        accepted = f"{', .'.join(FORMATS)}, each also with .{' or .'.join(PACKED)} behind it"
+    if not endings or (endings[-1] not in FORMATS and endings[-1] not in other_formats()):
+        accepted = (
+            f"{', .'.join(FORMATS)}, nor one that trimesh reads, each also with .{' or .'.join(PACKED)} behind it"
+        )
         raise MeshError("mesh", f"{path.name!r} has none of the endings .{accepted}")
     return endings[-1], packing
 
@@ -213,8 +217,10 @@ def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Co
             add_gltf(data, beside, assembly)
         elif suffix == "3mf":
             unit = add_threemf(data, assembly)
-        else:
+        elif suffix in ("dae", "zae"):
             unit = add_collada(data, suffix == "zae", assembly)
+        else:
+            unit = add_by_trimesh(data, suffix, assembly)
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file leads to in a reader that takes it as specified

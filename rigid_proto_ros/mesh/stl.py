@@ -10,15 +10,16 @@ import struct
 
 import numpy as np
 
-from ..base.compilation import njit
 from ..base.errors import MeshError
-from .numbers_in_text import error_at, finish_numbers, read_point, skip_blanks, token_end
+from .ascii_floats import as_numbers, error_at
 from .topology import first_equal_rows
 
 _HEAD = 100
 """Words, however many blanks stand between them, within which an ASCII file names its first facet."""
 _SPARE = 2
 """Bytes that may follow the last facet: a line end, or one more attribute count."""
+_NAME = re.compile(rb"solid\b.*?(?=\bfacet\b|\Z)", re.DOTALL)  # with what follows, which may be any words
+_CORNER = re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)")
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -65,71 +66,18 @@ def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     return _merge(facets["corners"].reshape(-1, 3).astype(np.float64))
 
 
-_OTHER, _SOLID, _END_SOLID, _FACET_WORD, _END_FACET, _VERTEX = range(6)
-_WORDS = tuple(word.encode() for word in ("", "solid", "endsolid", "facet", "endfacet", "vertex"))
-_OK, _BAD_NUMBER, _NOT_THREE = 0, 1, 2
-
-
-@njit(cache=True, nogil=True)
-def _word(buffer: np.ndarray, i: int, stop: int) -> int:
-    """Which of the words that matter the token from i to stop is, in capitals or not."""
-    length = stop - i
-    for kind in range(1, len(_WORDS)):
-        word = _WORDS[kind]
-        if len(word) != length:
-            continue
-        same = True
-        for k in range(length):
-            same = same and (buffer[i + k] | 32) == word[k]
-        if same:
-            return kind
-    return _OTHER
-
-
-@njit(cache=True, nogil=True)
-def _facets(buffer: np.ndarray, points: np.ndarray, slow: np.ndarray) -> tuple[int, int, int, int, int]:
-    """Corner points into points (n, 3), token by token: line ends count as blanks; slow (k, 3) as in ``read_point``.
-
-    Returns (status, position, points, whole facets, numbers noted in slow).
-    """
-    i, end = 0, buffer.shape[0]
-    count = facets = in_facet = slow_count = 0
-    named = False  # within the name of a solid, which may hold any word
-    while True:
-        first = i = skip_blanks(buffer, i, True)
-        if i >= end:
-            return _OK, i, count, facets, slow_count
-        i = token_end(buffer, i)
-        kind = _word(buffer, first, i)
-        if kind in (_SOLID, _END_SOLID):
-            named = True
-        elif kind == _FACET_WORD:
-            named, in_facet = False, 0
-        elif kind == _END_FACET and not named:
-            if in_facet != 3:
-                return _NOT_THREE, first, count, facets, slow_count
-            facets += 1
-        elif kind == _VERTEX and not named:
-            if in_facet == 3 or count == points.shape[0]:
-                return _NOT_THREE, first, count, facets, slow_count
-            i, slow_count, whole = read_point(buffer, i, points, count, slow, slow_count, True)
-            if not whole:
-                return _BAD_NUMBER, first, count, facets, slow_count
-            in_facet += 1
-            count += 1
-
-
 def _ascii_points(data: bytes, name: str) -> np.ndarray:
-    """Corner points (3m, 3) in file order."""
-    accepted = "vertex with three numbers"
-    # A corner takes 12 bytes or more ("vertex 0 0 0"), and never more numbers than that are left to float().
-    room = len(data) // 12 + 1
-    points, slow = np.empty((room, 3)), np.empty((3 * room, 3), np.int64)
-    status, position, count, facets, slow_count = _facets(np.frombuffer(data, np.uint8), points, slow)
-    finish_numbers(points, slow[:slow_count], data, name, accepted)
-    if status == _BAD_NUMBER:
-        raise error_at(data, position, name, accepted)
-    if status == _NOT_THREE or count != 3 * facets:
-        received = f"{count} vertices in {facets} whole facets"
+    """Corner points (3m, 3) in file order: line ends count as blanks."""
+    text = _NAME.sub(b" ", data.lower().replace(b"endsolid", b"solid"))
+    facets = text.split(b"endfacet")[:-1]
+    corners = _CORNER.findall(text)
+    found = text.count(b"vertex")
+    if not found == len(corners) == 3 * len(facets) or any(facet.count(b"vertex") != 3 for facet in facets):
+        received = f"{found} vertices in {len(facets)} whole facets"
         raise MeshError(name, f"{received}, which is not three a facet; the file may be truncated")
-    return points[:count]
+    points, whole = as_numbers(b" ".join(corners), 9 * len(facets))
+    if not whole:
+        read = len(points) // 3
+        position = next((m.start() for k, m in enumerate(re.finditer(rb"\bvertex\b", data, re.I)) if k == read), 0)
+        raise error_at(data, position, name, "vertex with three numbers")
+    return points.reshape(-1, 3)

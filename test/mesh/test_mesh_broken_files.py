@@ -86,7 +86,7 @@ UNREADABLE = [
     ("stl_named.obj", stl_text(), "looks like .stl"),
     ("ply_named.stl", ply(), "looks like .ply"),
     ("off_named.ply", off(), "looks like .off"),
-    ("mesh.xyz", obj(), "obj"),
+    ("mesh.odt", obj(), "obj"),
     ("noextension", obj(), "obj"),
 ]
 

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""What the readers of text files share: words to numbers, and the refusal of a line."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import warnings
+
+import numpy as np
+
+from ..base.errors import MeshError
+
+
+def as_numbers(text: bytes, count: int = -1, kind: type = float) -> tuple[np.ndarray, bool]:
+    """The blank separated numbers (k,) at the beginning of a text, up to the first word that is none, and whether that
+    is all of it, ``count`` numbers if that isn't −1.
+
+    Doubles are the nearest to the decimals; nan and inf are numbers here, a verdict refuses them.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # as which older versions of NumPy tell it
+            numbers = np.fromstring(text, kind, sep=" ")
+            if count in (-1, len(numbers)) and b"\0" not in text:  # at which reading would end
+                return numbers, True
+    except (DeprecationWarning, ValueError):
+        pass
+    values = []
+    for word in text.split():
+        try:
+            values.append(float(kind(word.replace(b"_", b"?"))))  # which Python takes within a number
+        except (ValueError, OverflowError):
+            break
+    return np.array(values), False
+
+
+def word_position(text: bytes, count: int) -> int:
+    """Where the word behind the first ``count`` ones begins."""
+    word = next(itertools.islice(re.finditer(rb"\S+", text), count, None), None)
+    return len(text) if word is None else word.start()
+
+
+def error_at(data: bytes, position: int, name: str, accepted: str) -> MeshError:
+    """The refusal of what stands at byte ``position``: file, line, the text there, and what is accepted."""
+    line = data.count(b"\n", 0, position) + 1
+    return MeshError(f"{name} line {line}", excerpt(data, position), accepted)
+
+
+def excerpt(data: bytes, position: int) -> str:
+    """The rest of the line at ``position`` for a message: at most 40 printable characters."""
+    text = data[position : position + 40].split(b"\n")[0].decode("ascii", "replace").strip()
+    return "".join(c if c.isprintable() else "?" for c in text)
