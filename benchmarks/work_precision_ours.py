@@ -106,7 +106,7 @@ def submit(simulation: Simulation, wrenches: tuple[Wrench, ...]) -> None:
         elif w.end is not None:
             frame += f";duration={(round(w.end * 1e9) - round(w.begin * 1e9)) / 1e9!r}"
         held = w.end is None and not w.impulse
-        command = WrenchCommand(held, parse_frame(frame), w.force, w.torque, 0, frame)
+        command = WrenchCommand(held, parse_frame(frame), w.force, w.torque, frame)
         simulation.submit(command, round(w.begin * 1e9))
 
 

@@ -76,4 +76,4 @@ def spinning(angular_velocity_body, orientation_xyzw=(0.0, 0.0, 0.0, 1.0)) -> np
 
 def wrench(frame: str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), *, held: bool = True) -> WrenchCommand:
     """A wrench command as its message would give it."""
-    return WrenchCommand(held, parse_frame(frame), tuple(force), tuple(torque), 0, frame)
+    return WrenchCommand(held, parse_frame(frame), tuple(force), tuple(torque), frame)

@@ -12,7 +12,7 @@ from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
-from rigid_proto_ros.simulation.commands import Change, ClearWrench, Rank, ReleaseString, WrenchCommand
+from rigid_proto_ros.simulation.commands import Change, ClearWrench, ReleaseString, WrenchCommand
 from rigid_proto_ros.simulation.observer import Reset
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -61,17 +61,17 @@ class HandSession:
 
     def load(self, held: bool, frame_id: str, force, torque=(0.0, 0.0, 0.0), stamp_ns: int = 0) -> None:
         """A message of the wrench or the poke topic."""
-        frame = parse_frame(frame_id, self.scenario.setup.contacts)
+        frame = parse_frame(frame_id)
         force, torque = tuple(map(float, force)), tuple(map(float, torque))
-        self._submit(WrenchCommand(held, frame, force, torque, stamp_ns, frame_id))
+        self._submit(WrenchCommand(held, frame, force, torque, frame_id, stamp_ns=stamp_ns))
 
     def tie(self, frame_id: str, point) -> None:
         """A message of ~/string/attach."""
-        self._submit(string_attach(0, frame_id, tuple(map(float, point))))
+        self._submit(string_attach(frame_id, tuple(map(float, point))))
 
     def pull(self, point) -> None:
         """A message of ~/string/target."""
-        self._submit(string_target(0, "world", tuple(map(float, point))))
+        self._submit(string_target("world", tuple(map(float, point))))
 
     def release(self) -> None:
         self._submit(ReleaseString())
@@ -102,7 +102,7 @@ class HandSession:
             self.heard("scene", self.scenario.text)
             return self.scenario.setup
 
-        self._submit(Change(content, apply, "inertia", Rank.INERTIA))
+        self._submit(Change(content, apply, "inertia"))
 
     def pause(self) -> None:
         """The mark that stands in the log: commands now pile up at one instant."""

@@ -272,9 +272,9 @@ def _submit(run: OfflineRun, topic: str, message) -> None:
         point = message.point
         simulation.submit(string_target(0, frame_id, (point.x, point.y, point.z)))
         return
-    frame = parse_frame(frame_id, set(simulation.setup.contacts))
+    frame = parse_frame(frame_id)
     force, torque = ((v.x, v.y, v.z) for v in (message.wrench.force, message.wrench.torque))
-    simulation.submit(WrenchCommand(topic == "wrench", frame, force, torque, 0, frame_id))
+    simulation.submit(WrenchCommand(topic == "wrench", frame, force, torque, frame_id))
 
 
 def things_to_try() -> list[str]:
@@ -418,10 +418,10 @@ def test_frames_of_the_reference_are_read_and_are_what_it_says() -> None:
     frames = [code for row in rows for code in re.findall(r"`([^`]+)`", row) if code != "force.x"]
     assert len(frames) >= 10
     for frame in frames:
-        parse_frame(frame, {"tip"})
+        parse_frame(frame)
     # What stands alone means what stands before it.
     for short, whole in (("world", "world@com"), ("", "world@com"), ("body", "body@com"), ("tip", "body@tip")):
-        assert parse_frame(short, {"tip"}) == parse_frame(whole, {"tip"})
+        assert parse_frame(short) == parse_frame(whole)
 
 
 def test_tables_are_the_codes(capsys: pytest.CaptureFixture) -> None:

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     session.unlink(missing_ok=True)
     print(f"1. rigid_body_node: {scenario.parameters.mesh}, {scenario.setup.body.mass:.6g} kg", flush=True)
     # The last command has its time to act, and to be confirmed.
-    until_s = max(args.duration, read_script(script)[-1].t_ns * 1e-9 + CONFIRM_S)
+    until_s = max(args.duration, read_script(script)[-1].stamp_ns * 1e-9 + CONFIRM_S)
     with Processes() as processes:
         node = processes.start(
             [*node_executable, "--until", repr(until_s), "--ros-args", "--params-file", str(scene)]

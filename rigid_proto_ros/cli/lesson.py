@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     output_file("--html", args.html)
     own = example_path(shown.script) if shown.script else ""
     script = read_script(args.script or own) if args.script or own else []
-    last_ns = max((command.t_ns for command in script), default=0)
+    last_ns = max((command.stamp_ns for command in script), default=0)
     duration_ns = max(nanoseconds(10.0), last_ns + nanoseconds(1.0))
     if args.duration is not None:
         duration_ns = nanoseconds(args.duration)

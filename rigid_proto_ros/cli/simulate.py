@@ -102,9 +102,9 @@ def run(args: argparse.Namespace) -> int:
     for warning in scenario.warnings:
         _warn(warning)
     script = read_script(args.script) if args.script else []
-    last_ns = script[-1].t_ns if script else 0
+    last_ns = script[-1].stamp_ns if script else 0
     duration_ns = max(DURATION_NS, last_ns + AFTER_SCRIPT_NS) if args.duration is None else nanoseconds(args.duration)
-    if beyond := sum(command.t_ns >= duration_ns for command in script):
+    if beyond := sum(command.stamp_ns >= duration_ns for command in script):
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
     recordings = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
     if args.bag and not is_mcap(args.bag):

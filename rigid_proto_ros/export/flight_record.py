@@ -14,9 +14,9 @@ from ..picture.backend import Backend
 from ..picture.picture import Picture
 from ..scene.offline import OfflineRun
 from ..scene.scenario import Scenario, publication_ns
-from ..scene.script import ScriptCommand
 from ..session.recorded_session import RecordedSession
 from ..session.replay import Resimulation, resimulation
+from ..simulation.commands import Command
 from ..simulation.observer import (
     BodyChanged,
     BodySnapshot,
@@ -188,7 +188,7 @@ class _Look(Observer):
         return run.simulation.state.row, self._ghost
 
 
-def source_of_scene(scenario: Scenario, script: list[ScriptCommand]) -> Source:
+def source_of_scene(scenario: Scenario, script: list[Command]) -> Source:
     """The flight of a scene and its script."""
     return lambda observer: OfflineRun(scenario, script, observer)
 

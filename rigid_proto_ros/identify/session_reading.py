@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.loads import Load, resolve_load
-from ..scene.command_codec import command_of_event, frame_names
+from ..scene.command_codec import frame_names, of_event
 from ..scene.scenario import Scenario
 from ..session.recorded_session import RecordedSession
 from ..session.replay import session_scenario
@@ -82,8 +82,8 @@ def _load_history(
         time_ns, kind, content = decode_event(line, number)
         if time_ns > end_ns:
             break
-        command = command_of_event(kind, content, setup.contacts, frames)
-        if command is None and kind not in ("set", "inertia"):
+        command = of_event(kind, content, frames)
+        if command is None:
             continue
         if isinstance(command, ClearWrench):
             rows = [(begin, min(end, max(time_ns, begin)), row) for begin, end, row in rows]

@@ -5,15 +5,12 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused
-from ..motion.frames import Frame, parse_frame
-from ..scene.command_codec import ScriptCommand, core_command
-from ..scene.scenario import BodyMesh, check_inertia, nanoseconds
-from ..simulation.commands import Change, Command, WrenchCommand
-from ..simulation.setup import Setup
+from ..scene.scenario import check_inertia, nanoseconds
+from ..simulation.commands import Change, Command
 from .schedule import LONG_TEXT, BackgroundThread, ScheduleMessage
 
 if TYPE_CHECKING:
@@ -32,32 +29,27 @@ COUNTED_BY = {
 }
 """The counter of each kind of command; all others come by the schedule."""
 
-MOST_FRAMES = 1000
-"""Frames of wrenches that are kept as read."""
-
 DAY_NS = 24 * 3600 * 1_000_000_000
 
 
 class CommandReceiver:
-    """All on the physics thread. frames: what the node calls the world's and the body's frame.
+    """All on the physics thread.
 
     received counts every command by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now;
     refusals are the simulation's.
     """
 
-    def __init__(self, loop: SimulationLoop, frames: tuple[str, str]) -> None:
+    def __init__(self, loop: SimulationLoop) -> None:
         self.received: Counter[str] = Counter()
         self.late = 0
         self.wall_stamp = 0
         self._loop = loop
-        self._frames = frames
-        self._read_frames: dict[str, Frame] = {}
         self._schedules = 0
         self._background = BackgroundThread()
 
-    def receive(self, topic: str, command: Callable[[], ScriptCommand]) -> None:
-        """Count a command and submit it, to act at its ``t_ns`` read as the stamp of a message; raises CommandRefused,
-        counted, for what can be checked now.
+    def receive(self, topic: str, command: Callable[[], Command]) -> None:
+        """Count a command and submit it, to act at its stamp read as that of a message; raises CommandRefused, counted,
+        for what can be checked now.
 
         The loop catches up first, so that now is the tick's own time. topic: one of TOPICS. command() gives it, or
         raises CommandRefused.
@@ -66,8 +58,9 @@ class CommandReceiver:
         loop.catch_up()
         try:
             sent = command()
-            own = self._own_command(sent)
-            loop.simulation.submit(own, self._when(sent.t_ns))
+            if isinstance(sent, Change) and sent.kind == "inertia":
+                check_inertia(loop.scenario, sent.content)
+            loop.simulation.submit(sent, self._when(sent.stamp_ns))
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
             raise
@@ -76,26 +69,6 @@ class CommandReceiver:
             self.received[topic] += 1
         if sent.kind in ("wrench", "thrusters"):
             loop.request_step()
-
-    def _own_command(self, sent: ScriptCommand) -> Command:
-        if sent.kind in ("wrench", "poke"):
-            frame = self._frame(sent.frame_id)
-            return WrenchCommand(sent.kind == "wrench", frame, sent.force, sent.torque, sent.t_ns, sent.frame_id)
-        own = core_command(sent, sent.t_ns, (), self._change, self._frames, self._change_inertia)
-        if sent.kind == "inertia":
-            assert isinstance(own, Change)
-            check_inertia(self._loop.scenario, own.content)
-        return own
-
-    def _frame(self, frame_id: str) -> Frame:
-        # Contacts and frames' names are set at start only, so what was read once stays so.
-        frame = self._read_frames.get(frame_id)
-        if frame is None:
-            frame = parse_frame(frame_id, frozenset(self._loop.simulation.setup.contacts), *self._frames)
-            if len(self._read_frames) >= MOST_FRAMES:
-                self._read_frames.clear()
-            self._read_frames[frame_id] = frame
-        return frame
 
     def receive_schedule(self, text: Callable[[], str]) -> ScheduleMessage:
         """Take an entry or a list of entries as YAML, now or once what it needs is loaded and compiled
@@ -114,14 +87,14 @@ class CommandReceiver:
         else:
             quick = False
         if quick:
-            schedule.check(scenario, self._change)
+            schedule.check(scenario, loop.setup_of)
             self._submit_schedule(schedule)
             return schedule
 
         def work() -> None:
             if not schedule.commands:
                 schedule.read(scenario)
-            schedule.check(scenario, self._change)
+            schedule.check(scenario, loop.setup_of)
 
         self._background.give(schedule, work)
         return schedule
@@ -144,14 +117,14 @@ class CommandReceiver:
         try:
             if schedule.refusal is not None:
                 raise schedule.refusal
-            times = [self._effective(entry.t_ns, listed=True) for entry in schedule.entries]
+            times = [self._effective(entry.command.stamp_ns, listed=True) for entry in schedule.entries]
         except CommandRefused as refusal:
             schedule.refusal = refusal
             simulation.refuse(refusal, schedule.count)
         else:
             for counter in ("late", "wall_stamp"):
                 entries = {
-                    entry.number
+                    entry.command.entry
                     for entry, (_, counted) in zip(schedule.entries, times, strict=True)
                     if counted == counter
                 }
@@ -162,18 +135,6 @@ class CommandReceiver:
         schedule.is_submitted = True
 
     # When they act
-
-    def _change(self, changes: Mapping, at_hand: BodyMesh | None = None) -> Setup:
-        """A ``set`` acts."""
-        setup = self._loop.change(changes, at_hand=at_hand)
-        self._loop.endpoints.parameters_changed()
-        return setup
-
-    def _change_inertia(self, content: Mapping) -> Setup:
-        """An inertia message acts."""
-        setup = self._loop.change_inertia(content)
-        self._loop.endpoints.parameters_changed()
-        return setup
 
     def _when(self, stamp_ns: int) -> int:
         when_ns, counter = self._effective(stamp_ns)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
-from ..scene.command_codec import ScriptCommand, entry_of, frame_names
+from ..scene.command_codec import entry_of, frame_names
 from ..scene.offline import notify_start
 from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
@@ -55,7 +55,7 @@ class LiveSimulation:
         self.stamps = Stamps(clock)
         self.frames = frame_names(scenario.parameters, name)
         self.observers = LiveObservers(name, observers, self._recording_failed)
-        self.loop = SimulationLoop(scenario, self.observers.observer, self.endpoints, self.stamps, self.frames)
+        self.loop = SimulationLoop(scenario, self.observers.observer, self.endpoints, self.stamps)
         self.observers.record_to(self.observers.open_recorder(scenario))
         self.loop.watch(self.observers.observer)
         self._on_crash: Callable[[], None] = lambda: None
@@ -110,15 +110,15 @@ class LiveSimulation:
 
     # Commands
 
-    def submit(self, command: ScriptCommand) -> None:
-        """Take a command as if its message had come now: it acts at ``t_ns``, or now where that is 0; raises
+    def submit(self, command: Command) -> None:
+        """Take a command as if its message had come now: it acts at its stamp, or now where that is 0; raises
         CommandRefused, counted, for what can be checked now.
         """
         topic = COUNTED_BY.get(command.kind)
         if topic is not None:
             self.call(lambda: self.commands.receive(topic, lambda: command))
             return
-        self.schedule(flow({"t": command.t_ns / 1e9, **entry_of(command)}, quoted=True))
+        self.schedule(flow({"t": command.stamp_ns / 1e9, **entry_of(command)}, quoted=True))
 
     def schedule(self, text: str) -> None:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or

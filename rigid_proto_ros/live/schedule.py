@@ -10,17 +10,16 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..scene.command_codec import ScriptCommand, core_command
 from ..scene.scenario import BodyMesh, Scenario
 from ..scene.script import expand_schedule, read_schedule, with_contacts
 from ..simulation.checks import check_command
-from ..simulation.commands import Command, Listed
+from ..simulation.commands import Change, Command, Listed
 from ..simulation.setup import Setup
 from .warm_up import warm_up_change
 
@@ -38,13 +37,9 @@ SLOW = frozenset(
 
 @dataclass(frozen=True)
 class Entry:
-    """A command ready to be submitted: its own time, its place in its list, and what Simulation.submit
-    takes as checked.
-    """
+    """A command ready to be submitted: its place in its list, and what Simulation.submit takes as checked."""
 
     command: Command
-    t_ns: int
-    number: int
     listed: Listed | None
     checked: tuple[bytes, Setup]
 
@@ -59,7 +54,7 @@ class ScheduleMessage:
     text: str = ""
     count: int = 1
     is_list: bool = False
-    commands: list[ScriptCommand] = field(default_factory=list)
+    commands: list[Command] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
     refusal: CommandRefused | None = None
     is_submitted: bool = False
@@ -67,7 +62,7 @@ class ScheduleMessage:
     @property
     def is_slow(self) -> bool:
         """Whether it is to be checked in the background."""
-        return any(command.changes and SLOW & command.changes.keys() for command in self.commands)
+        return any(isinstance(command, Change) and SLOW & command.content.keys() for command in self.commands)
 
     def decode(self, text: Callable[[], str]) -> None:
         """Fill ``text``."""
@@ -81,11 +76,11 @@ class ScheduleMessage:
         """Fill ``commands``."""
         self._keep_refusal(self._read, scenario)
 
-    def check(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
-        """Fill ``entries``, each checked in the scene that those before it have made of this one; change(changes, mesh
+    def check(self, scenario: Scenario, setup_of: Callable[[Change, BodyMesh | None], Setup]) -> None:
+        """Fill ``entries``, each checked in the scene that those before it have made of this one; setup_of(change, mesh
         at hand) is called when a ``set`` acts.
         """
-        self._keep_refusal(self._check, scenario, change)
+        self._keep_refusal(self._check, scenario, setup_of)
 
     def _keep_refusal(self, work: Callable[..., None], *arguments: Any) -> None:
         """Do the message's work; what it raises becomes the refusal."""
@@ -104,24 +99,18 @@ class ScheduleMessage:
         commands = expand_schedule(listed)
         self.commands = with_contacts(commands, scenario.setup.contacts)
 
-    def _check(self, scenario: Scenario, change: Callable[[dict, BodyMesh | None], Setup]) -> None:
+    def _check(self, scenario: Scenario, setup_of: Callable[[Change, BodyMesh | None], Setup]) -> None:
         # In order of time; those of one time in the order of the list.
-        order = sorted(range(len(self.commands)), key=lambda k: self.commands[k].t_ns)
+        order = sorted(range(len(self.commands)), key=lambda k: self.commands[k].stamp_ns)
         for k in order:
             command = self.commands[k]
-            at_hand = None
-            if command.changes is not None:
-                before, scenario = scenario, scenario.with_changes(command.changes)
-                at_hand = scenario.body_mesh
+            if isinstance(command, Change):
+                before, scenario = scenario, scenario.with_changes(command.content)
                 warm_up_change(before, scenario)
-            own = core_command(command, command.t_ns, scenario.setup.contacts, partial(_with_mesh, change, at_hand))
-            checked = (check_command(own, scenario.setup), scenario.setup)
+                command = replace(command, apply=partial(setup_of, command, scenario.body_mesh))
+            checked = (check_command(command, scenario.setup), scenario.setup)
             listed = (self.number, k) if self.is_list else None
-            self.entries.append(Entry(own, command.t_ns, command.entry, listed, checked))
-
-
-def _with_mesh(change: Callable[[dict, BodyMesh | None], Setup], at_hand: BodyMesh | None, changes: dict) -> Setup:
-    return change(changes, at_hand)
+            self.entries.append(Entry(command, listed, checked))
 
 
 class BackgroundThread:

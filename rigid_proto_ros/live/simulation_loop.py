@@ -9,8 +9,9 @@ import time
 from collections.abc import Callable, Iterator
 
 from ..base.errors import InputError
-from ..scene.scenario import Scenario, nanoseconds
+from ..scene.scenario import BodyMesh, Scenario, nanoseconds
 from ..scene.scenario_run import ScenarioRun
+from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
@@ -43,7 +44,6 @@ class SimulationLoop(ScenarioRun):
     """observer: gets every publication, in bundles where nobody subscribes to the endpoints; without subscribers and an
     observer that takes states none is made, and the body crosses the time between two moments at which commands are
     taken at once. stamps: those of a clock that is followed from the start, a reset and the end of a pause on.
-    frames: what commands may call the world's and the body's frame.
     """
 
     def __init__(
@@ -52,13 +52,12 @@ class SimulationLoop(ScenarioRun):
         observer: Observer | None = None,
         endpoints: Endpoints | None = None,
         stamps: Stamps | None = None,
-        frames: tuple[str, str] = ("world", "body"),
     ) -> None:
         super().__init__(scenario, observer)
         self.timekeeping = Timekeeping(paused=scenario.parameters.start_paused)
         self.stamps = stamps or Stamps()
         self.endpoints = endpoints or Endpoints()
-        self.commands = CommandReceiver(self, frames)
+        self.commands = CommandReceiver(self)
         self._has_subscribers = self._has_listeners = True
         self._budget = WorkBudget()
         self._publications = Publications(scenario.parameters.publish_rate)
@@ -100,6 +99,12 @@ class SimulationLoop(ScenarioRun):
             self._pace.factor = scenario.parameters.real_time_factor
             if not self._pace.followed:
                 self._anchor()
+        return setup
+
+    def setup_of(self, command: Change, at_hand: BodyMesh | None = None) -> Setup:
+        """Put in force what a change says that acts now; returns the setup. at_hand: a mesh that may be its."""
+        setup = super().setup_of(command) if at_hand is None else self.change(command.content, at_hand=at_hand)
+        self.endpoints.parameters_changed()
         return setup
 
     def watch(self, observer: Observer) -> None:

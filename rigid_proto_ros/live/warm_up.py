@@ -46,7 +46,7 @@ def warm_up(setup: Setup) -> State:
 
 
 def _small_wrench(setup: Setup, frame: str) -> WrenchCommand:
-    return WrenchCommand(False, parse_frame(frame), (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0), 0, frame)
+    return WrenchCommand(False, parse_frame(frame), (1e-9 * setup.body.mass, 0.0, 0.0), (0.0, 0.0, 0.0), frame)
 
 
 def warm_up_change(before: Scenario, after: Scenario) -> None:

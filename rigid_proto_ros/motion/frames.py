@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from ..base.errors import CommandRefused, did_you_mean
@@ -72,18 +72,13 @@ def point_text(point: tuple) -> str:
     return "/".join([word, *(",".join(repr(float(x)) for x in triple) for triple in values)])
 
 
-def parse_frame(text: str, contacts: Collection[str] = (), world: str = "world", body: str = "body") -> Frame:
-    """Read a ``frame_id``.
+@functools.lru_cache(maxsize=1024)  # frames come again and again
+def parse_frame(text: str, world: str = "world", body: str = "body") -> Frame:
+    """Read a ``frame_id``. What can be the name of a contact is one: the body that a command comes to has it, or not.
 
-    contacts: the names of the body's contacts. world, body: names of this node's world and body frame, accepted beside
-    the words. Raises CommandRefused with reason ``frame``.
+    world, body: names of this node's world and body frame, accepted beside the words. Raises CommandRefused with
+    reason ``frame``.
     """
-    return _parsed(text, frozenset(contacts), world, body)
-
-
-@functools.lru_cache(maxsize=1024)
-def _parsed(text: str, contacts: frozenset[str], world: str, body: str) -> Frame:
-    # Frames come again and again.
     if len(text) > MAX_FRAME_LENGTH:
         raise CommandRefused("frame", "frame_id", text[:40] + "...", f"at most {MAX_FRAME_LENGTH} characters")
     place, *options = text.split(";")
@@ -94,22 +89,20 @@ def _parsed(text: str, contacts: frozenset[str], world: str, body: str) -> Frame
         axes_text, point_part = place.split("@", 1)
         if axes_text not in axes_words:
             raise CommandRefused("frame", "frame_id", text, f"axes {_names(axes_words)} before the @")
-        axes, point = axes_words[axes_text], _parse_point(point_part, text, contacts)
+        axes, point = axes_words[axes_text], _parse_point(point_part, text)
     elif place in axes_words:
         axes, point = axes_words[place], ("com",)
     else:
-        axes, point = "body", _parse_point(place, text, contacts, axes_words)
+        axes, point = "body", _parse_point(place, text, axes_words)
     if axes == "normal" and point == ("com",):
         raise CommandRefused("frame", "frame_id", text, "normal with a point of the surface, such as normal@vertex/0")
     return Frame(axes, point, *_parse_options(options, text))
 
 
-def _parse_point(part: str, text: str, contacts: Collection[str], axes_words: Iterable[str] = ()) -> tuple:
+def _parse_point(part: str, text: str, axes_words: Iterable[str] = ()) -> tuple:
     word, *values = part.split("/")
     if part in FIXED_POINTS:
         return (part,)
-    if part in contacts:
-        return ("contact", part)
     if word == "vertex" and len(values) == 1 and re.fullmatch(r"\d{1,10}", values[0], re.ASCII):
         return ("vertex", int(values[0]))
     if word == "point" and len(values) == 1:
@@ -119,11 +112,19 @@ def _parse_point(part: str, text: str, contacts: Collection[str], axes_words: It
         if not any(direction):
             raise CommandRefused("frame", "frame_id", text, "a ray whose direction isn't zero")
         return ("ray", origin, direction)
+    if CONTACT_NAME.match(part) and part not in RESERVED_WORDS:
+        return ("contact", part)
     accepted = f"{', '.join(axes_words)}{', ' if axes_words else ''}{POINT_FORMS}"
-    if contacts:
-        accepted += f" (contacts: {_names(contacts)})"
-        accepted = "; ".join(filter(None, [accepted, did_you_mean(part, contacts)]))
     raise CommandRefused("frame", "frame_id", text, accepted)
+
+
+def contact_point(name: str, contacts: Mapping[str, Vector]) -> Vector:
+    """Where a contact of the body is, in mesh coordinates; raises CommandRefused (``frame``) naming those it has."""
+    if name not in contacts:
+        known = f"a contact of the body ({_names(contacts)})" if contacts else "the body has no contacts"
+        accepted = "; ".join(filter(None, [f"{known}, or {POINT_FORMS}", did_you_mean(name, [*contacts, *AXES])]))
+        raise CommandRefused("frame", "frame_id", name, accepted)
+    return vector(contacts[name])
 
 
 def _parse_triple(part: str, text: str) -> Vector:

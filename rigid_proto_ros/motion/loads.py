@@ -25,7 +25,7 @@ from ..base.function_pointers import entry_of
 from ..base.rotation import Numbers, Vector, matrix_elements, transposed_times, vector
 from . import body as of_body
 from .body import Body
-from .frames import Frame, point_text
+from .frames import Frame, contact_point, point_text
 from .state import State
 from .surface import Surface
 
@@ -329,7 +329,7 @@ def _mesh_point(
     if word == "origin":
         return (0.0, 0.0, 0.0)
     if word == "contact":
-        return vector(contacts[values[0]])
+        return contact_point(values[0], contacts)
     if word == "point":
         return values[0]
     if surface is None:

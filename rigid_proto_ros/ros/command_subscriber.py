@@ -14,7 +14,8 @@ from std_msgs.msg import Float64MultiArray, String
 
 from ..base.errors import CommandRefused
 from ..live.command_receiver import CommandReceiver
-from ..scene.command_codec import ScriptCommand, of_message
+from ..scene.command_codec import Names, of_message
+from ..simulation.commands import Command, ThrusterCommand
 from .command_queue import CommandQueue, ManualCallbackGroup
 
 QUIET_NS = 4_000_000
@@ -33,10 +34,11 @@ STAMPED = {
 
 
 class CommandSubscriber:
-    """The subscriptions of one node."""
+    """The subscriptions of one node. frames: what it calls the world's and the body's frame."""
 
-    def __init__(self, node: Node, commands: CommandReceiver, has_thrusters: bool) -> None:
+    def __init__(self, node: Node, commands: CommandReceiver, frames: Names, has_thrusters: bool) -> None:
         self._commands = commands
+        self._frames = frames
         self._next_quiet_ns = 0
         group = ManualCallbackGroup()
         self._sources: list[tuple[CommandQueue, Callable[[bytes], None]]] = [
@@ -79,11 +81,11 @@ class CommandSubscriber:
         return wall_ns < max(self._active_until_ns)
 
     def _stamped(self, topic: str, data: bytes) -> None:
-        self._commands.receive(topic.partition("/")[0], lambda: read_stamped(topic, data))
+        self._commands.receive(topic.partition("/")[0], lambda: read_stamped(topic, data, self._frames))
 
     def _thrusters(self, data: bytes) -> None:
-        def read() -> ScriptCommand:
-            return ScriptCommand(0, "thrusters", forces=tuple(read_message(data, Float64MultiArray).data))
+        def read() -> Command:
+            return ThrusterCommand(tuple(read_message(data, Float64MultiArray).data))
 
         self._commands.receive("thrusters", read)
 
@@ -94,15 +96,15 @@ class CommandSubscriber:
 # Messages read from their bytes, without message objects; anything unusual goes through rclpy's own reader
 
 
-def read_stamped(topic: str, data: bytes) -> ScriptCommand:
+def read_stamped(topic: str, data: bytes, frames: Names) -> Command:
     """The command of a message on a topic of STAMPED; raises CommandRefused for bytes that are none of its type."""
     try:
-        return of_message(topic, data)
+        return of_message(topic, data, frames)
     except CommandRefused:
         raise
     except ValueError:
         # As little-endian CDR, however its sender has packed it.
-        return of_message(topic, serialize_message(read_message(data, STAMPED[topic])))
+        return of_message(topic, serialize_message(read_message(data, STAMPED[topic])), frames)
 
 
 def read_message(data: bytes, message_type: type) -> Any:

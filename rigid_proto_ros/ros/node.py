@@ -61,7 +61,7 @@ class RigidBodyNode(Node):
         self._endpoints.states = self.states = StatePublisher(self, *frames, self._specific_force, self.live.stamps)
         self.states.configure(scenario.parameters)
         has_thrusters = bool(scenario.parameters.thrusters)
-        self._endpoints.subscriber = CommandSubscriber(self, self.live.commands, has_thrusters)
+        self._endpoints.subscriber = CommandSubscriber(self, self.live.commands, frames, has_thrusters)
         self._live_parameters = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
         Services(self.live).offer(self)
         self._endpoints.steps = StepService(self, self.live, ManualCallbackGroup())

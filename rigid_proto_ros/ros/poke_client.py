@@ -21,7 +21,7 @@ from ..base.command_line import Parser, complete, completes
 from ..base.errors import InputError
 
 if TYPE_CHECKING:
-    from ..scene.command_codec import ScriptCommand
+    from ..simulation.commands import Command
 
 _ONE_LINE_COMMANDS = ("poke", "wrench")
 
@@ -106,7 +106,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     return args
 
 
-def _script(args: argparse.Namespace) -> list[ScriptCommand]:
+def _script(args: argparse.Namespace) -> list[Command]:
     from ..scene.script import parse_script, read_script
 
     if args.what not in _ONE_LINE_COMMANDS:
@@ -143,20 +143,20 @@ def _point(text: str) -> str | dict:
     return text
 
 
-def _print_plan(script: list[ScriptCommand]) -> None:
+def _print_plan(script: list[Command]) -> None:
     for command in script:
         content = {
             "wrench": lambda c: f"{c.frame_id}  force {list(c.force)}  torque {list(c.torque)}",
             "string_target": lambda c: f"{c.frame_id}  {list(c.point)}",
             "string_attach": lambda c: f"{c.frame_id}  {c.contact or list(c.point)}",
-            "set": lambda c: str(c.changes),
+            "set": lambda c: str(c.content),
         }
         content["poke"] = content["wrench"]
         text = content[command.kind](command) if command.kind in content else ""
-        print(f"{command.t_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
+        print(f"{command.stamp_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 
-def _send(script: list[ScriptCommand], args: argparse.Namespace, argv: list[str]) -> int:
+def _send(script: list[Command], args: argparse.Namespace, argv: list[str]) -> int:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 

@@ -21,12 +21,13 @@ from rosgraph_msgs.msg import Clock
 from ..base.errors import InputError
 from ..messages import cdr
 from ..messages.session_messages import PROJECTIONS, StampedRows
-from ..scene.command_codec import MARKS, ScriptCommand, frame_names, in_words, of_event
+from ..scene.command_codec import frame_names, in_words, of_event
 from ..scene.sensor_noise import sensor_noise
 from ..session.playback import sorted_states
 from ..session.recorded_session import RecordedSession
 from ..session.replay import recorded_parameters
 from ..session.runs import decode_event
+from ..simulation.commands import Change, Command
 from . import qos
 from .script_sender import ScriptSender
 
@@ -66,7 +67,7 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
     return 0 if report.all_in_time else 1
 
 
-def session_commands(session: RecordedSession) -> list[ScriptCommand]:
+def session_commands(session: RecordedSession) -> list[Command]:
     """What moved the body, at the times at which it acted and in frames that a node of any name reads; pauses and steps
     are of the clock alone.
     """
@@ -75,16 +76,16 @@ def session_commands(session: RecordedSession) -> list[ScriptCommand]:
     commands = []
     for number, line in enumerate(session.lines, 1):
         time_ns, kind, content = decode_event(line, number)
-        if kind in MARKS:
-            continue
         try:
-            command = in_words(of_event(time_ns, kind, content), parameters.contacts, frames)
+            command = of_event(kind, content, frames)
         except InputError as error:
             raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
-        if kind == "set":
-            changes = {name: value for name, value in content.items() if name not in NOT_SENT}
-            command = replace(command, changes=changes)
-        if kind != "set" or command.changes:
+        if command is None:
+            continue
+        command = replace(in_words(command), stamp_ns=time_ns)
+        if isinstance(command, Change):
+            command = replace(command, content={name: content[name] for name in content if name not in NOT_SENT})
+        if not isinstance(command, Change) or command.content:
             commands.append(command)
     return commands
 

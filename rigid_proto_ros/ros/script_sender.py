@@ -22,10 +22,11 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
-from ..scene.command_codec import ScriptCommand, outgoing
+from ..scene.command_codec import outgoing, topic_of
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import nanoseconds
 from ..scene.script import with_contacts
+from ..simulation.commands import Command, TieString
 from . import qos
 
 MAX_UNCONFIRMED = 500
@@ -111,7 +112,7 @@ class ScriptSender(Node):
         self.create_subscription(Log, "/rosout", self._on_log, 100)
         self._wait_for_node(timeout_s)
 
-    def send(self, script: list[ScriptCommand], reset: bool = False, lead_s: float = 0.2) -> Report:
+    def send(self, script: list[Command], reset: bool = False, lead_s: float = 0.2) -> Report:
         """Send all commands, each stamped with the simulated time at which it acts, and wait until all have acted."""
         script = with_contacts(script, self._contacts(script))
         before = dict(self._counters)
@@ -141,12 +142,12 @@ class ScriptSender(Node):
             self._topics[message.topic].publish(message.data)
             number += len(message.commands)
             for command in message.commands:
-                sent[command.topic] += 1
+                sent[topic_of(command)] += 1
             self._show(f"sent {number} of {len(script)}")
         self._confirm(len(script))
         if paused:
             self._call(self._pause_client, SetBool.Request(data=False))
-        last_ns = start_ns + (script[-1].t_ns if script else 0)
+        last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
         self._show("")
@@ -161,9 +162,9 @@ class ScriptSender(Node):
         late = int(self._counters["late"]) - int(before["late"])
         return Report(sent, late, refused, reasons, tuple(self._refusals), last_ns, self._reported_ns())
 
-    def _contacts(self, script: list[ScriptCommand]) -> dict[str, tuple]:
+    def _contacts(self, script: list[Command]) -> dict[str, tuple]:
         """The contacts that the script ties strings to, as the node has them."""
-        names = {command.contact for command in script if command.contact}
+        names = {command.contact for command in script if isinstance(command, TieString) and command.contact}
         return {name: tuple(point) for name in names if len(point := self.parameter(f"contacts.{name}") or ()) == 3}
 
     def parameter(self, name: str) -> Any:

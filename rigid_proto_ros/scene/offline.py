@@ -10,8 +10,8 @@ from pathlib import Path
 from ..base.errors import CommandRefused, InputError
 from ..base.progress import Progress
 from ..simulation.checks import check_command
+from ..simulation.commands import Change, Command
 from ..simulation.observer import Observer, Published, Started
-from .command_codec import ScriptCommand, core_command
 from .parameters import is_ros_parameter, parameter_named, with_mass_of_density
 from .scenario import Scenario, make_scenario, publication_ns
 from .scenario_run import ScenarioRun
@@ -74,7 +74,7 @@ class OfflineRun(ScenarioRun):
     """A simulation with its script submitted; ``advance`` takes it from publication to publication."""
 
     def __init__(
-        self, scenario: Scenario, script: list[ScriptCommand] | None = None, observer: Observer | None = None
+        self, scenario: Scenario, script: list[Command] | None = None, observer: Observer | None = None
     ) -> None:
         super().__init__(scenario, observer)
         self._is_observed = observer is not None
@@ -87,15 +87,14 @@ class OfflineRun(ScenarioRun):
         planned = scenario
         for number, command in enumerate(script):
             try:
-                core = core_command(command, command.t_ns, scenario.setup.contacts, self.change)
                 # A command is checked in the scene that the script has made by then.
-                if command.kind == "set":
-                    planned = planned.with_changes(command.changes)
-                checked = (check_command(core, planned.setup), planned.setup)
-                self.simulation.submit(core, command.t_ns, (0, number), checked)
+                if isinstance(command, Change):
+                    planned = planned.with_changes(command.content)
+                checked = (check_command(command, planned.setup), planned.setup)
+                self.simulation.submit(command, command.stamp_ns, (0, number), checked)
             except CommandRefused as refusal:
                 raise InputError(
-                    f"script, command {number + 1} at {command.t_ns / 1e9:g} s", refusal.received, refusal.accepted
+                    f"script, command {number + 1} at {command.stamp_ns / 1e9:g} s", refusal.received, refusal.accepted
                 ) from None
 
     def advance(self, until_ns: int) -> bool:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..mesh.reading import Mesh
+from ..simulation.commands import Change
 from ..simulation.observer import Observer, SceneChanged
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
@@ -20,6 +21,7 @@ class ScenarioRun:
         self.scenario = scenario
         self.observer = observer or Observer()
         self.simulation = Simulation(scenario.setup, observer)
+        self.simulation.setup_of = self.setup_of
         self.ghost: Ghost | None = None
 
     def begin_ghost(self) -> None:
@@ -36,9 +38,11 @@ class ScenarioRun:
         """
         return self.replace(self.scenario.with_changes(changes, mesh, at_hand))
 
-    def change_inertia(self, content: Mapping) -> Setup:
-        """The same for the content of an inertia message's event."""
-        return self.replace(check_inertia(self.scenario, content))
+    def setup_of(self, command: Change) -> Setup:
+        """Put in force what a change says that acts now; returns the setup. Raises InputError."""
+        if command.kind == "inertia":
+            return self.replace(check_inertia(self.scenario, command.content))
+        return self.change(command.content)
 
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force; the ghost follows, and the observer is notified."""

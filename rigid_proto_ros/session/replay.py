@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..mesh.reading import Mesh, load_mesh
-from ..scene.command_codec import command_of_event, frame_names
+from ..scene.command_codec import frame_names, of_event
 from ..scene.parameters import Parameters, convert_all
 from ..scene.scenario import Scenario, make_scenario
 from ..scene.scenario_run import ScenarioRun
@@ -135,15 +135,14 @@ class Resimulation(ScenarioRun):
         try:
             if kind == "set":
                 convert_all(content)
-            return command_of_event(
-                kind, content, self.scenario.setup.contacts, frames, self._change, self.change_inertia
-            )
+            return of_event(kind, content, frames)
         except InputError as error:
             raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
 
-    def _change(self, changes: Mapping) -> Setup:
-        mesh = self._mesh_of(changes["mesh"]) if changes.get("mesh") else None
-        return self.change(changes, mesh)
+    def setup_of(self, command: Change) -> Setup:
+        """Put in force what a change says, with the mesh that was flown then."""
+        mesh = self._mesh_of(command.content["mesh"]) if command.content.get("mesh") else None
+        return super().setup_of(command) if mesh is None else self.change(command.content, mesh)
 
 
 def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:

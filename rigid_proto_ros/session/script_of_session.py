@@ -11,13 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ..base.errors import InputError
+from ..base.rotation import vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load
 from ..scene.command_codec import (
     MARKS,
-    MESH_FRAME,
-    ScriptCommand,
     entry_of,
     frame_names,
     of_event,
@@ -120,21 +119,20 @@ class _Writer(Observer):
             return
         again = self._again
         frames = frame_names(again.scenario.parameters, again.node_name)
-        command = of_event(time_ns, kind, content)
-        if kind in ("wrench", "poke"):
-            self._add(time_ns, _load_entry(command, self._applied, frames))
-        else:
-            if kind == "string_attach":
-                command = replace(command, frame_id=MESH_FRAME, point=self._attach(content))
-            self._add(time_ns, entry_of(command, frames))
+        command = of_event(kind, content, frames)
+        assert command is not None
+        if isinstance(command, WrenchCommand):
+            command = _forward(command, self._applied)
+        elif isinstance(command, TieString):
+            command = replace(command, axes="mesh", point=self._attach(command))
+        self._add(time_ns, entry_of(command))
 
     def _add(self, time_ns: int, entry: dict) -> None:
         self.entries.append({"t": time_ns / 1e9, **entry})
 
-    def _attach(self, content: dict) -> tuple[float, float, float]:
+    def _attach(self, command: TieString) -> tuple[float, float, float]:
         """The point in mesh coordinates, not yet taken onto the surface: that happens again."""
         simulation = self._again.simulation
-        command = TieString(content["axes"], tuple(content["point"]))
         x, y, z = mesh_point(command, simulation.setup.body, simulation.state).tolist()
         return x, y, z
 
@@ -151,10 +149,10 @@ class _Writer(Observer):
         self._add(time_ns, {"set": changes})
 
 
-def _load_entry(command: ScriptCommand, applied: tuple[WrenchCommand, Load, Body], frames: tuple[str, str]) -> dict:
-    its_own, load, body = applied
-    if its_own.frame.axes == "normal" and its_own.frame.impulse:
-        # A script's push is a force: the resolved normal impulse, in body axes, is the same numbers.
-        frame = Frame("body", ("point", load.mesh_point), impulse=True)
-        command = replace(command, frame_id=frame.text, force=tuple(load.own_force(body).tolist()))
-    return entry_of(command, frames)
+def _forward(command: WrenchCommand, applied: tuple[WrenchCommand, Load, Body]) -> WrenchCommand:
+    """The command as an entry can say it: a push is a force, so an impulse along a normal is given in body axes."""
+    _, load, body = applied
+    if command.frame.axes != "normal" or not command.frame.impulse:
+        return command
+    frame = Frame("body", ("point", load.mesh_point), impulse=True)
+    return replace(command, frame=frame, force=vector(load.own_force(body)))

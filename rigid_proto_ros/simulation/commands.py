@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Commands as the simulation takes them, and the order in which equal times act (``order_of``)."""
+"""The commands: one union, as scripts, messages and event lines say them and as the simulation takes them.
+
+``order_of`` says in which order those of equal times act.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 from ..base.errors import CommandRefused
+from ..base.rotation import Vector
 from ..motion.frames import Frame
 from ..motion.loads import Load, load_of_bytes
 from .flight import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
@@ -30,18 +35,28 @@ class Rank(IntEnum):
     POKE = 6
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stamped:
+    """What all commands have.
+
+    stamp_ns: when they act, or as their messages were stamped. entry: of a script that they come from, counted from 1.
+    """
+
+    stamp_ns: int = 0
+    entry: int = field(default=0, compare=False)
+
+
 @dataclass(frozen=True)
-class WrenchCommand:
+class WrenchCommand(Stamped):
     """One message of the wrench topic (``held``) or the poke topic.
 
-    force [N], torque [N m] as sent (N s and N m s for an impulse), frame already read; stamp_ns and frame_id as sent.
+    force [N], torque [N m] as sent (N s and N m s for an impulse), frame_id as sent, and the frame that it says.
     """
 
     held: bool
     frame: Frame
-    force: tuple[float, float, float]
-    torque: tuple[float, float, float]
-    stamp_ns: int
+    force: Vector
+    torque: Vector
     frame_id: str
 
     @property
@@ -90,8 +105,8 @@ class WrenchCommand:
 
 
 @dataclass(frozen=True)
-class ThrusterCommand:
-    """What the thrusters push with [N], in the order of their names."""
+class ThrusterCommand(Stamped):
+    """What the thrusters push with [N], in the alphabetical order of their names."""
 
     forces: tuple[float, ...]
     kind = "thrusters"
@@ -108,7 +123,7 @@ STATE_VALUES = {"position": 3, "orientation_xyzw": 4, "linear_velocity": 3, "ang
 
 
 @dataclass(frozen=True)
-class SetState:
+class SetState(Stamped):
     """Put the body elsewhere at once: any of STATE_VALUES [m, m/s, rad/s, world axes]; the others stay."""
 
     values: Mapping[str, tuple[float, ...]]
@@ -131,7 +146,7 @@ class SetState:
 
 
 @dataclass(frozen=True)
-class ClearWrench:
+class ClearWrench(Stamped):
     """End the held wrench and the running pulses; scheduled commands stay."""
 
     kind = "clear_wrench"
@@ -144,30 +159,36 @@ class ClearWrench:
 
 
 @dataclass(frozen=True)
-class Change:
+class Change(Stamped):
     """A change of parameters (kind ``set``) or of the whole inertia by message (``inertia``).
 
-    content: as the event log keeps it; apply() gives the new Setup from the values in force then, or raises InputError.
+    content: as the event log keeps it. apply() gives the new Setup from the values in force then, or raises InputError;
+    without it the simulation's ``setup_of`` does.
     """
 
-    content: dict
-    apply: Callable
+    content: Mapping[str, Any]
+    apply: Callable[[], Setup] | None = field(default=None, compare=False)
     kind: str = "set"
-    rank: Rank = Rank.CHANGE
+
+    @property
+    def rank(self) -> Rank:
+        """Its place among commands of one time."""
+        return Rank.INERTIA if self.kind == "inertia" else Rank.CHANGE
 
 
 @dataclass(frozen=True)
-class TieString:
+class TieString(Stamped):
     """Where on the body the string is, or will be, tied.
 
     axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto
-    the surface, nearest to it, when the command takes effect. stamp_ns and frame_id as sent.
+    the surface, nearest to it, when the command takes effect. frame_id as sent. contact: the one whose point it is to
+    be, for whoever knows the body's.
     """
 
     axes: str
-    point: tuple[float, float, float]
-    stamp_ns: int = 0
+    point: Vector
     frame_id: str = ""
+    contact: str = ""
     kind = "string_attach"
     rank = Rank.STRING_ATTACH
 
@@ -183,26 +204,25 @@ class TieString:
 
 
 @dataclass(frozen=True)
-class MoveString:
-    """Where the string's free end goes, target (3,) [m, world]; the first one ties the string."""
+class MoveString(Stamped):
+    """Where the string's free end goes, point (3,) [m, world]; the first one ties the string."""
 
-    target: tuple[float, float, float]
-    stamp_ns: int = 0
+    point: Vector
     frame_id: str = ""
     kind = "string_target"
     rank = Rank.STRING_TARGET
 
     def __post_init__(self) -> None:
-        _check_point("string target", self.target)
+        _check_point("string target", self.point)
 
     @property
     def content(self) -> dict:
         """What an event line holds of it."""
-        return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.target)}
+        return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.point)}
 
 
 @dataclass(frozen=True)
-class ReleaseString:
+class ReleaseString(Stamped):
     """Let the string go."""
 
     kind = "string_release"

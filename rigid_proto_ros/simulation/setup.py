@@ -60,8 +60,6 @@ class Setup:
     wrench_timeout_ns: int
     poke_duration_ns: int
     initial: np.ndarray
-    world_frame: str = "world"
-    body_frame: str = "body"
     accuracy: float = 1e-9
     string: StringSettings = StringSettings()
     initial_string_mass: float = 0.0

@@ -8,7 +8,7 @@ commands are constant and an integrator advances the body. ``advance`` is the wh
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from typing import Protocol
 
@@ -71,7 +71,7 @@ class Simulation(Observables):
     Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
     ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place
     of the command that acts at this moment in its list, if it is an entry of one. ``logs_timeouts``: a held wrench that
-    times out is an event.
+    times out is an event. ``setup_of``: gives the setup that a change leads to which doesn't bring its own.
     """
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
@@ -84,6 +84,7 @@ class Simulation(Observables):
         self._arrivals = 0
         self.listed: Listed | None = None
         self.logs_timeouts = True
+        self.setup_of: Callable[[Change], Setup] = _no_change
         check_start(setup)
         self._arrays = FlightArrays(setup)
         self._start_over()
@@ -274,7 +275,7 @@ class Simulation(Observables):
     def _log_command(self, command: Command) -> None:
         # A change that waited in a queue would keep its whole setup, mesh included.
         if self.observer.wants(Logged) or isinstance(command, Change):
-            self.log(command.kind, command.content)
+            self.log(command.kind, dict(command.content))
         else:
             self.events.note(self.time_ns, command)
 
@@ -324,7 +325,7 @@ class Simulation(Observables):
             check_thrust(command.forces, self.setup)
             self._thrust(self.thrusters.command(command.forces, self.time_ns, self.setup.wrench_timeout_ns))
         elif isinstance(command, Change):
-            self._change(command.apply())
+            self._change(command.apply() if command.apply else self.setup_of(command))
         elif isinstance(command, SetState):
             self._arrays.row[:] = self.state.moved(command.values).row
             self.state = self._arrays.state
@@ -419,3 +420,7 @@ class Simulation(Observables):
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
         arrays.finish_segment()
         return self.state
+
+
+def _no_change(command: Change) -> Setup:
+    raise InputError(command.kind, command.content, "a change with a setup of its own: no parameters fly here")

@@ -53,9 +53,9 @@ class StringControl:
         timeout_ns = setup.string.timeout_ns
         if self.tied is None:
             check_rates(setup, self.attach)
-            tied = tie(setup.string, self.attach, command.target, setup.body, state, timeout_ns)
+            tied = tie(setup.string, self.attach, command.point, setup.body, state, timeout_ns)
         else:
-            tied = self.tied.moved(command.target, state.time_ns, timeout_ns)
+            tied = self.tied.moved(command.point, state.time_ns, timeout_ns)
         self.tied = _checked(tied, setup.body, state)
 
     def release(self) -> None:

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
-from ..scene.command_codec import core_command
 from ..scene.offline import OfflineRun, read_scene
 from ..scene.scenario import Scenario, nanoseconds
 from ..scene.script import expand_script, with_contacts
@@ -70,9 +70,8 @@ class Flight:
         start_ns = 0 if "t" in entry else simulation.time_ns
         commands = expand_script([{"t": 0.0, **entry}], "command")
         for command in with_contacts(commands, scene.setup.contacts):
-            time_ns = start_ns + command.t_ns
-            core = core_command(command, time_ns, scene.setup.contacts, self._run.change)
-            simulation.submit(core, time_ns, (0, self._commands))
+            time_ns = start_ns + command.stamp_ns
+            simulation.submit(replace(command, stamp_ns=time_ns), time_ns, (0, self._commands))
             self._commands += 1
 
     def step(self, seconds: float) -> State:

@@ -20,7 +20,6 @@ from ..base.errors import InputError, MeshError
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import ANGULAR_DAMPING
 from ..motion.string import RAMP_NS
-from ..scene.command_codec import ScriptCommand, core_command
 from ..scene.declaration import HUGE, Value
 from ..scene.parameters import Parameters, parameter_named, with_mass_of_density
 from ..scene.scenario import BodyMesh, build_scenario
@@ -29,10 +28,13 @@ from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.checks import check_command, check_start
 from ..simulation.commands import (
+    Change,
     ClearWrench,
+    Command,
     MoveString,
     Pending,
     ReleaseString,
+    SetState,
     ThrusterCommand,
     TieString,
     WrenchCommand,
@@ -158,7 +160,7 @@ class _Plan:
     def moved(self, at_ns: int, command: MoveString) -> Pending:
         """The string's free end goes elsewhere, or the string is tied."""
         knot = (0.0,) * 4 if self.knot is None else (*self.knot, 1.0)
-        row = Pending(at_ns, command, kind=batch.TIE, row=np.array([*command.target, *knot, *[0.0] * 7]).tobytes())
+        row = Pending(at_ns, command, kind=batch.TIE, row=np.array([*command.point, *knot, *[0.0] * 7]).tobytes())
         if self.tied:
             row.kind, row.duration_ns = batch.MOVE, min(at_ns - self.target_ns, RAMP_NS)
         timeout_ns = self.setup.string.timeout_ns
@@ -187,16 +189,15 @@ class _Plan:
         return Timetable(rows, np.array(self.entries, np.int64))
 
 
-def timetable(commands: list[ScriptCommand], setup: Setup, knots: Knots) -> Timetable:
+def timetable(commands: list[Command], setup: Setup, knots: Knots) -> Timetable:
     """What acts of a script's commands, in order of time; raises NotBatchable, InputError."""
     if len(commands) > MAX_COMMANDS:
         raise NotBatchable
     plan = _Plan(setup, knots, ThrusterControl(setup.thrusters), setup.string.attached)
-    for scripted in with_contacts(commands, setup.contacts):
-        if scripted.kind in ("set", "state", "inertia"):
+    for command in with_contacts(commands, setup.contacts):
+        if isinstance(command, Change | SetState):
             raise NotBatchable
-        at_ns, entry = scripted.t_ns, scripted.entry
-        command = core_command(scripted, at_ns, setup.contacts, None)
+        at_ns, entry = command.stamp_ns, command.entry
         row = check_command(command, setup)
         plan.pass_until(at_ns)
         if isinstance(command, WrenchCommand):

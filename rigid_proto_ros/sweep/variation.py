@@ -15,12 +15,12 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.files import output_file
-from ..scene.command_codec import ScriptCommand
 from ..scene.declaration import Value
 from ..scene.parameters import Parameters
 from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh
 from ..scene.script import expand_script
 from ..scene.yaml_text import dump_yaml
+from ..simulation.commands import Command
 from .sampling import VERTEX, Draw
 from .study import Study, script_entries
 
@@ -41,7 +41,7 @@ class Variation:
         return build_scenario(self.parameters, body_mesh_of(self.parameters))
 
     @property
-    def commands(self) -> list[ScriptCommand]:
+    def commands(self) -> list[Command]:
         """The script's commands; raises InputError."""
         return expand_script(self.script, "script")
 

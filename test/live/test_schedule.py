@@ -14,8 +14,8 @@ from rigid_proto_ros.live.endpoints import Endpoints
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.pacing import WorkBudget
 from rigid_proto_ros.scene import scenario
-from rigid_proto_ros.scene.command_codec import ScriptCommand
 from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation import flight_arrays
 from rigid_proto_ros.simulation.observer import BodyChanged, Observer
@@ -65,7 +65,7 @@ def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_th
     rig.tick_until(lambda: loaded_by)
     before = len(rig.published)
     # The mesh isn't there, and the body flies on; what comes by other ways is taken meanwhile.
-    rig.commands.receive("poke", lambda: ScriptCommand(0, "poke", "world;impulse", (1e-3, 0.0, 0.0)))
+    rig.commands.receive("poke", lambda: load_command(False, "world;impulse", (1e-3, 0.0, 0.0), ZERO))
     rig.tick_until(lambda: len(rig.published) >= before + 200 and rig.loop.simulation.events.count)
     assert rig.commands.received["schedule"] == 0
     may_load.set()

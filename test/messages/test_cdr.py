@@ -94,7 +94,7 @@ def test_any_bytes_are_read_or_refused_like_rclpy_does(body):
         read = read_stamped("wrench", data)
     except Exception:  # refused; by us or by rclpy
         return
-    assert isinstance(read.t_ns, int) and isinstance(read.frame_id, str)
+    assert isinstance(read.stamp_ns, int) and isinstance(read.frame_id, str)
     assert len(read.force) == len(read.torque) == 3
     try:
         theirs = deserialize_message(data, WrenchStamped)

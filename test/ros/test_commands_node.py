@@ -34,8 +34,8 @@ def expected_row(scene: dict, commands, time_ns: int) -> np.ndarray:
         if topic == "clear":
             simulation.submit(ClearWrench(), at_ns)
             continue
-        read = parse_frame(frame, set(scenario.setup.contacts))
-        simulation.submit(WrenchCommand(topic == "wrench", read, force, torque, at_ns, frame), at_ns)
+        read = parse_frame(frame)
+        simulation.submit(WrenchCommand(topic == "wrench", read, force, torque, frame, stamp_ns=at_ns), at_ns)
     state = simulation.advance(time_ns)
     return np.concatenate([state.row[:10], state.angular_velocity])
 

@@ -33,8 +33,8 @@ def flown(scene, *commands, seconds: float = 1.0) -> np.ndarray:
     """The state row after commands (time_ns, frame, force, torque, held)."""
     simulation = Simulation(scene.setup)
     for time_ns, frame, force, torque, held in commands:
-        read = parse_frame(frame, set(scene.setup.contacts))
-        simulation.submit(WrenchCommand(held, read, tuple(force), tuple(torque), 0, frame), time_ns)
+        read = parse_frame(frame)
+        simulation.submit(WrenchCommand(held, read, tuple(force), tuple(torque), frame), time_ns)
     row = simulation.advance(round(seconds * SECOND)).row
     assert not simulation.refused
     return row
@@ -119,7 +119,7 @@ def test_a_ray_acts_where_it_first_meets_the_turning_body_and_stays_with_that_po
 def test_a_ray_that_misses_when_it_takes_effect_is_refused_and_the_motion_goes_on(scene):
     simulation = Simulation(scene.setup)
     frame = parse_frame("world@ray/100,100,100/1,0,0")
-    simulation.submit(WrenchCommand(False, frame, FORCE, (0, 0, 0), 0, frame.text), SECOND // 2)
+    simulation.submit(WrenchCommand(False, frame, FORCE, (0, 0, 0), frame.text), SECOND // 2)
     assert not simulation.refused
     end = simulation.advance(SECOND).row
     assert simulation.refused == {"ray_miss": 1}

@@ -73,8 +73,10 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
             offline.simulation.submit(read_string(ns, frame, values[0], *names), ns)
             continue
         force, torque = values
-        read = parse_frame(frame, scenario.setup.contacts)
-        offline.simulation.submit(WrenchCommand(topic == "wrench", read, tuple(force), tuple(torque), ns, frame), ns)
+        read = parse_frame(frame)
+        offline.simulation.submit(
+            WrenchCommand(topic == "wrench", read, tuple(force), tuple(torque), frame, stamp_ns=ns), ns
+        )
     check_states(found, offline, 100)
     assert not offline.simulation.refused
     assert abs(offline.simulation.state.linear_velocity).max() > 1e-3

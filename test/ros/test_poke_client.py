@@ -78,7 +78,7 @@ def test_a_dry_run_prints_every_message_that_would_go_out_and_needs_no_node(scri
 
 
 def times(text: str) -> list[int]:
-    return [c.t_ns for c in parse_script(text)]
+    return [c.stamp_ns for c in parse_script(text)]
 
 
 def test_repeats_come_every_so_often_and_jitter_is_the_same_for_the_same_seed_within_its_bounds():

@@ -57,7 +57,7 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
     scenario = make_scenario({"ghost.integrator": "free_body"})
     simulation = Simulation(scenario.setup, watcher)
     ghost = ghost_of(scenario, simulation, watcher)
-    push = WrenchCommand(False, parse_frame("world@com", frozenset()), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0, "")
+    push = WrenchCommand(False, parse_frame("world@com"), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "")
 
     def fly() -> None:
         simulation.submit(push)

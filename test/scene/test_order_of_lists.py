@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,14 +13,14 @@ from flights import SECOND, EventLines
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.command_codec import core_command, in_words, of_event
+from rigid_proto_ros.scene.command_codec import in_words, of_event
 from rigid_proto_ros.scene.ghost import Ghost
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import expand_script
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.session.runs import decode_event
-from rigid_proto_ros.simulation.commands import Change, Command
+from rigid_proto_ros.simulation.commands import Command
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -45,14 +46,8 @@ def kinds(told: EventLines) -> list[str]:
 
 def commands(entries: list[dict], simulation: Simulation) -> list[Command]:
     scenario = make_scenario(SCENE)
-
-    def change(changes: dict):
-        return scenario.with_changes(changes).setup
-
-    return [
-        core_command(command, SECOND, (), change)
-        for command in expand_script([{"t": 1.0, **entry} for entry in entries])
-    ]
+    simulation.setup_of = lambda change: scenario.with_changes(change.content).setup
+    return expand_script([{"t": 1.0, **entry} for entry in entries])
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -126,8 +121,8 @@ def test_recorded_frames_go_to_a_node_of_any_name() -> None:
     content = {"stamp_ns": 0, "frame_id": "spinning_top@tip;impulse", "force": [1, 0, 0], "torque": [0, 0, 0]}
     knot = {"stamp_ns": 0, "frame_id": "spinning_top/mesh", "axes": "mesh", "point": [0, 0, 1]}
     frames = ("world", "spinning_top")
-    assert in_words(of_event(0, "poke", content), {"tip"}, frames).frame_id == "body@tip;impulse"
-    assert in_words(of_event(0, "string_attach", knot), {"tip"}, frames).frame_id == "body/mesh"
+    assert in_words(of_event("poke", content, frames)).frame_id == "body@tip;impulse"
+    assert in_words(of_event("string_attach", knot, frames)).frame_id == "body/mesh"
 
 
 def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_reads() -> None:
@@ -138,8 +133,7 @@ def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_re
     run = Simulation(make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).setup, lines)
     poke = {"at": "tip", "axes": "body", "impulse": [1e-4, 0.0, 0.0]}
     (command,) = expand_script([{"t": 0.5, **poke}])
-    named = type(command)(**{**command.__dict__, "frame_id": "spinning_top@tip;impulse"})
-    run.submit(core_command(named, 0, {"tip"}, Change, ("world", "spinning_top")), SECOND // 2)
+    run.submit(replace(command, frame_id="spinning_top@tip;impulse"), SECOND // 2)
     run.advance(SECOND)
     scene = make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).text
     events = [(SECOND // 2, line) for line in lines.lines]

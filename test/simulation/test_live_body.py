@@ -10,7 +10,7 @@ from flights import SECOND
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
-from rigid_proto_ros.simulation.commands import Change, Rank
+from rigid_proto_ros.simulation.commands import Change
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SCENE = {
@@ -145,7 +145,7 @@ def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
         flight.scenario = check_inertia(flight.scenario, content)
         return flight.scenario.setup
 
-    flight.simulation.submit(Change(content, apply, "inertia", Rank.INERTIA))
+    flight.simulation.submit(Change(content, apply, "inertia"))
     flight.simulation.advance(WHEN + 1)
     assert not flight.simulation.refused
     new = flight.simulation.setup.body

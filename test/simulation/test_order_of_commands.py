@@ -15,7 +15,6 @@ from rigid_proto_ros.simulation.commands import (
     Change,
     ClearWrench,
     MoveString,
-    Rank,
     ThrusterCommand,
     TieString,
     WrenchCommand,
@@ -152,7 +151,6 @@ def core_commands() -> list:
             {"i": 1},
             lambda: scenario.with_inertia(0.02, (0, 0, 0), (1e-5, 0, 0, 2e-5, 0, 2.5e-5), False).setup,
             "inertia",
-            Rank.INERTIA,
         )
     )
     for _ in range(10):
@@ -161,7 +159,7 @@ def core_commands() -> list:
         commands.append(TieString("mesh", tuple(point)))
         for held, frame in ((True, "world@vertex/3"), (False, "body@vertex/7"), (False, "world;impulse")):
             force = tuple(numbers.uniform(-0.01, 0.01) for _ in range(3))
-            commands.append(WrenchCommand(held, parse_frame(frame), force, (0.0, 0.0, 0.0), 0, frame))
+            commands.append(WrenchCommand(held, parse_frame(frame), force, (0.0, 0.0, 0.0), frame))
     return commands
 
 
@@ -208,7 +206,7 @@ def test_the_total_wrench_does_not_depend_on_who_ended_before():
 
     def poke(force, duration):
         frame = f"body;duration={duration}"
-        return WrenchCommand(False, parse_frame(frame), force, (0.0, 0.0, 0.0), 0, frame)
+        return WrenchCommand(False, parse_frame(frame), force, (0.0, 0.0, 0.0), frame)
 
     for force, duration in (((1e9, 0.1, -3e7), 1e-3), ((0.1, 0.2, 0.3), 2.0), ((-1e9, 7.7, 1e8), 1e-3)):
         with_others.submit(poke(force, duration))

@@ -18,7 +18,7 @@ END_NS = SECOND // 2
 
 
 def command(held: bool, frame: str, force, torque=(0.0, 0.0, 0.0), stamp_ns: int = SECOND // 5) -> WrenchCommand:
-    return WrenchCommand(held, parse_frame(frame, SCENE.setup.contacts), force, torque, stamp_ns, frame)
+    return WrenchCommand(held, parse_frame(frame), force, torque, frame, stamp_ns=stamp_ns)
 
 
 COMMANDS = (

@@ -141,7 +141,7 @@ def test_the_knot_is_the_nearest_point_of_the_surface_as_it_is_then(frame):
     from_com = mesh_point * np.array(SCENE["scale"]) - body.center_of_mass
     points = {"mesh": mesh_point, "body": from_com, "world": state.position + state.rotation @ from_com}
     word = "mesh" if frame.endswith("/mesh") else "body" if "body" in frame else "world"
-    simulation.submit(string_attach(0, frame, points[word].tolist(), "world", "rigid_body"), 300 * MS)
+    simulation.submit(string_attach(frame, points[word].tolist(), ("world", "rigid_body")), 300 * MS)
     simulation.submit(MoveString((0.0, 0.0, 1.0)), 301 * MS)
     simulation.advance(302 * MS)
     surface = scenario.setup.surface

@@ -144,4 +144,4 @@ def test_a_scene_keeps_its_thrusters_and_a_command_its_forces() -> None:
     assert f"thrusters.tail: {yaml_value(numbers)}" in scenario.text
     (command,) = parse_script("[{t: 0.5, thrusters: [1, -2.5]}]")
     assert entry_of(command) == {"thrusters": [1.0, -2.5]}
-    assert of_event(command.t_ns, "thrusters", {"forces": [1.0, -2.5]}).forces == command.forces
+    assert of_event("thrusters", {"forces": [1.0, -2.5]}).forces == command.forces
