@@ -14,6 +14,7 @@ from rigid_proto_ros.live.endpoints import Endpoints
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.pacing import WorkBudget
 from rigid_proto_ros.scene import scenario
+from rigid_proto_ros.scene.command_codec import load_command
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
