@@ -53,8 +53,7 @@ def test_a_wrench_is_the_serialized_message_and_read_back(stamp_ns, frame_id, va
     fill(message.wrench.torque, values[3:])
     packed = cdr.wrench_stamped(stamp_ns, frame_id, values[:3], values[3:])
     assert packed == zero_padded(serialize_message(message), frame_id)
-    read = read_stamped("wrench", packed)
-    assert (read.t_ns, read.frame_id, read.force, read.torque) == (stamp_ns, frame_id, values[:3], values[3:])
+    assert cdr.read_stamped_doubles(packed, 6) == (*divmod(stamp_ns, 10**9), frame_id, values)
 
 
 @settings(deadline=None)
@@ -91,7 +90,7 @@ def test_states_are_the_serialized_messages_for_frames_of_any_length(length):
 def test_any_bytes_are_read_or_refused_like_rclpy_does(body):
     data = b"\x00\x01\x00\x00" + body
     try:
-        read = read_stamped("wrench", data)
+        read = read_stamped("wrench", data, ("world", "body"))
     except Exception:  # refused; by us or by rclpy
         return
     assert isinstance(read.stamp_ns, int) and isinstance(read.frame_id, str)

@@ -244,7 +244,7 @@ def test_every_bundled_scene_is_verified_with_every_script_that_fits(scene, tmp_
     for name, script in scripts.items():
         recorder = McapObserver(tmp_path / f"{name}.mcap", simulated_log=True)
         run = OfflineRun(read_scene(scene, warn=lambda text: None), script, recorder)
-        last_ns = script[-1].t_ns if script else SECOND
+        last_ns = script[-1].stamp_ns if script else SECOND
         assert run.advance(min(last_ns, 9 * SECOND) + SECOND)
         recorder.close()
         (session,) = read_runs(tmp_path / f"{name}.mcap")
