@@ -99,4 +99,4 @@ def test_any_bytes_are_read_or_refused_like_rclpy_does(body):
         theirs = deserialize_message(data, WrenchStamped)
     except Exception:
         return
-    assert theirs.header.stamp.sec * 10**9 + theirs.header.stamp.nanosec == read.t_ns
+    assert theirs.header.stamp.sec * 10**9 + theirs.header.stamp.nanosec == read.stamp_ns
