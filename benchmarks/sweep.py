@@ -28,8 +28,7 @@ sys.path.insert(0, str(HERE.parent))
 from result_table import ResultTable
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.sweep.chunk import run_chunk
-from rigid_proto_ros.sweep.local import cores
-from rigid_proto_ros.sweep.run import run_study
+from rigid_proto_ros.sweep.run import cores, run_study
 from rigid_proto_ros.sweep.study import Study, make_study
 from rigid_proto_ros.sweep.variation import variation
 

@@ -63,7 +63,7 @@ ALLOWED = {
     "pygltflib": ("export.gltf",),
     "pxr": ("export.usd",),
     "scipy": ("mesh.hull", "sweep.sampling", "identify"),
-    "distributed": ("sweep.cluster",),
+    "distributed": ("sweep.run",),
     "matplotlib": ("sweep.plot",),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),

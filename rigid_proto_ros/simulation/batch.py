@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ from . import flight as fl
 from .quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
 from .setup import Setup
 
-_NUMBERS: list[tuple] = [
+_NUMBERS: list[tuple[Any, ...]] = [
     ("scale", np.float64, 3),
     ("mass", np.float64),  # [kg], 0: the density decides
     ("density", np.float64),  # [kg/m³]
@@ -91,6 +92,10 @@ CERTAIN = 0.999
 """Of a limit: nearer to it the simulation decides."""
 
 
+_Side = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Arrays of a batch."""
+
+
 @dataclass
 class Batch:
     """rows (n,) ROW, ballast (k, 4) with masses [kg] above 0 and mesh coordinates, setup of the scene that they vary.
@@ -108,7 +113,7 @@ class Batch:
         return self.setup.integrator.chooses or self.setup.integrator.name == "free_body"
 
     @property
-    def arrays(self) -> tuple:
+    def arrays(self) -> _Side:
         """What the compiled call takes of it."""
         start = self.setup.flight_start
         integrator = self.setup.integrator
@@ -280,7 +285,7 @@ def _pulls_within(flight: np.record, x: float, y: float, z: float) -> bool:
     string = flight.string
     yields = _most_yielding(flight.body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
     x, y, z = _span_to(flight, x, y, z)
-    return string[K] * yields * max(abs(x), abs(y), abs(z)) <= CERTAIN * MAX_ACCELERATION
+    return bool(string[K] * yields * max(abs(x), abs(y), abs(z)) <= CERTAIN * MAX_ACCELERATION)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -331,7 +336,7 @@ def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _advance(
-    own: np.record, flight: np.record, commands: np.ndarray, until_ns: int, methods: np.ndarray, tables: tuple
+    own: np.record, flight: np.record, commands: np.ndarray, until_ns: int, methods: np.ndarray, tables: tuple[Any, ...]
 ) -> bool:
     """Carry the body to ``until_ns``, before what acts at that very time; False when the simulation must do it.
 
@@ -377,7 +382,7 @@ def _fly_row(
     stops: np.ndarray,
     context: np.ndarray,
     flights: np.ndarray,
-    tables: tuple,
+    tables: tuple[Any, ...],
     states: np.ndarray,
 ) -> tuple[int, int]:
     """Row i's flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
@@ -409,16 +414,16 @@ def _fly_row(
 
 @njit(cache=True, nogil=True, error_model="numpy", allocates=False)
 def _fly_rows(
-    own: tuple,
-    references: tuple,
+    own: _Side,
+    references: _Side,
     has_references: bool,
     notes_floors: bool,
     sample_ns: np.ndarray,
     watched: np.ndarray,
     stops: np.ndarray,
     measures: np.ndarray,
-    results: tuple,
-    room: tuple,
+    results: tuple[Any, ...],
+    room: tuple[Any, ...],
 ) -> None:
     """All rows of a batch, each beside that of the references if there are any."""
     own, references = borrowed(own), borrowed(references)

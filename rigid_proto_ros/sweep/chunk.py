@@ -11,6 +11,7 @@ from collections import ChainMap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,10 +89,10 @@ def is_batchable(study: Study, rows: NDArray[np.int64]) -> bool:
 # By the batch
 
 
-def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tuple[tuple, NDArray[np.int64]]]:
+def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tuple[tuple[Any, ...], NDArray[np.int64]]]:
     """Values of what is structural, and the rows that have them."""
     structural = [c for v, c in zip(study.vary, columns, strict=True) if is_structural(v)]
-    members: dict[tuple, list[int]] = {}
+    members: dict[tuple[Any, ...], list[int]] = {}
     for i in range(count if structural else 0):
         values = [plain(c[i]) for c in structural]
         key = tuple(tuple(value) if isinstance(value, list) else value for value in values)
@@ -100,13 +101,13 @@ def _groups(study: Study, columns: list[np.ndarray], count: int) -> Iterator[tup
         yield key, np.array(listed, np.int64)
 
 
-def _sides(study: Study, key: tuple) -> list[Group | None]:
+def _sides(study: Study, key: tuple[Any, ...]) -> list[Group | None]:
     """The group of rows with these values, and that of their references, if the study has any."""
     return [_group(study, key, False)] + ([_group(study, key, True)] if study.reference is not None else [])
 
 
 @lru_cache(maxsize=GROUPS_KEPT)
-def _group(study: Study, key: tuple, with_reference: bool) -> Group | None:
+def _group(study: Study, key: tuple[Any, ...], with_reference: bool) -> Group | None:
     names = [v.target.name for v in study.vary if is_structural(v)]
     structural = dict(zip(names, key, strict=True))
     try:
@@ -115,7 +116,9 @@ def _group(study: Study, key: tuple, with_reference: bool) -> Group | None:
         return None
 
 
-def _fly_group(study: Study, key: tuple, members: NDArray[np.int64], columns: list[np.ndarray], flown: _Rows) -> None:
+def _fly_group(
+    study: Study, key: tuple[Any, ...], members: NDArray[np.int64], columns: list[np.ndarray], flown: _Rows
+) -> None:
     groups = [group for group in _sides(study, key) if group is not None]
     if len(groups) < len(_sides(study, key)):
         return

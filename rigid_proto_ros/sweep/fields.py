@@ -35,7 +35,7 @@ def whole(value: Any, field: str, lower: int, upper: int) -> int:
     return int(value) if isinstance(value, int) else int(x)
 
 
-def mapping(value: Any, field: str, known: Iterable[str], required: Iterable[str] = ()) -> dict:
+def mapping(value: Any, field: str, known: Iterable[str], required: Iterable[str] = ()) -> dict[str, Any]:
     """A mapping with known keys alone; an unknown one is answered with the nearest."""
     known = tuple(known)
     if not isinstance(value, Mapping):

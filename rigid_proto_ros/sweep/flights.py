@@ -25,7 +25,7 @@ from ..scene.offline import OfflineRun, read_scene
 from ..scene.scenario import Scenario, nanoseconds
 from ..scene.script import expand_script, with_contacts
 from ..simulation.observer import Observer
-from .local import cores, in_processes
+from .run import cores, in_processes
 
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""

@@ -310,7 +310,8 @@ class Group:
             _keep(good, within)
             values = np.where(within, column, 0.0)
             # To the nearest nanosecond, halves to even, as round() has it.
-            commands[name][(slice(None), *where)] = (values if name == "load" else np.rint(values * 1e9))[:, None]
+            every: Any = (slice(None), *where)
+            commands[name][every] = (values if name == "load" else np.rint(values * 1e9))[:, None]
         # Stable: equal times act in the order of the script.
         order = np.argsort(commands["at_ns"], axis=1, kind="stable")
         return np.take_along_axis(commands, order, axis=1)

@@ -50,25 +50,23 @@ class Points:
     """Given values. kind: ``grid`` (every combination with other grids) or ``list`` (in step with other lists)."""
 
     kind: str
-    values: tuple
+    values: tuple[Any, ...]
 
     @property
-    def probes(self) -> list:
+    def probes(self) -> list[Any]:
         """Values that stand for all, for a check before the start."""
         every = max(1, len(self.values) // 1000)
         return [*self.values[::every], self.values[-1]]
 
-    def taken(self, indices: np.ndarray) -> np.ndarray:
-        """The values at these indices: numbers as float64 (n,) or (n, k), the rest as objects (n,)."""
-        first = self.values[0]
-        if _is_number(first) and all(map(_is_number, self.values)):
-            return np.array(self.values, dtype=float)[indices]
-        alike = isinstance(first, list) and all(isinstance(v, list) and len(v) == len(first) for v in self.values)
-        if alike and all(_is_number(x) for v in self.values for x in v):
-            return np.array(self.values, dtype=float)[indices]
+    def taken(self, indices: NDArray[np.int64]) -> NDArray[Any]:
+        """The values at these indices (n,): numbers as float64 (n,) or (n, k), the rest as objects (n,)."""
+        rows = [value if isinstance(value, list) else [value] for value in self.values]
+        alike = len({(type(value) is list, len(row)) for value, row in zip(self.values, rows, strict=True)}) == 1
+        if alike and all(isinstance(x, (int, float)) and not isinstance(x, bool) for row in rows for x in row):
+            return np.take(np.array(self.values, dtype=float), indices, axis=0)
         objects = np.empty(len(self.values), dtype=object)
         objects[:] = [tuple(v) if isinstance(v, list) else v for v in self.values]
-        return objects[indices]
+        return np.take(objects, indices)
 
 
 @dataclass(frozen=True)
@@ -86,9 +84,9 @@ class Draw:
         return {_ROTATION: 3, _DIRECTION: 2}.get(self.shape, 1)
 
     @property
-    def probes(self) -> list:
+    def probes(self) -> list[Any]:
         """Values that stand for all."""
-        special: dict[int, list] = {
+        special: dict[int, list[Any]] = {
             _NORMAL: [self.a],
             _ROTATION: [[0.0, 0.0, 0.0, 1.0]],
             _DIRECTION: [[self.a, 0.0, 0.0]],
@@ -131,7 +129,7 @@ def read_form(spec: Any, field: str) -> Points | Draw:
     return Draw(shape, a, b)
 
 
-def _points(value: Any, field: str) -> list:
+def _points(value: Any, field: str) -> list[Any]:
     if isinstance(value, dict):
         spec = mapping(value, field, ("from", "to", "count", "log"), ("from", "to", "count"))
         a, b = number(spec["from"], f"{field}, from"), number(spec["to"], f"{field}, to")
@@ -142,7 +140,7 @@ def _points(value: Any, field: str) -> list:
             if not (a > 0.0 and b > 0.0):
                 raise InputError(field, [a, b], "ends above 0 on a logarithmic grid")
             return _geometric(a, b, count)
-        return np.linspace(a, b, count).tolist()
+        return [float(x) for x in np.linspace(a, b, count)]
     if not isinstance(value, list) or not 0 < len(value) <= MAX_POINTS:
         raise InputError(field, value, f"a list of 1 to {MAX_POINTS} values, or {{from, to, count}}")
     for k, item in enumerate(value, 1):
@@ -163,10 +161,6 @@ def _geometric(a: float, b: float, count: int) -> list[float]:
             value *= ratio
             inner.append(float(value))
     return [a, *inner, b]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def as_text(value: Any) -> str:
@@ -311,7 +305,7 @@ def _ratio(part: int, r: float) -> float:
     for k in range(6, -1, -1):
         above = above * r + _PPND16[2 * part, k]
         below = below * r + _PPND16[2 * part + 1, k]
-    return above / below
+    return float(above / below)
 
 
 @njit(cache=True, error_model="numpy")

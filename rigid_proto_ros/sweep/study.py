@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -75,7 +74,7 @@ class Study:
         return isinstance(other, Study) and self.fingerprint == other.fingerprint
 
     @property
-    def entries(self) -> list:
+    def entries(self) -> list[Any]:
         """The script's entries."""
         return script_entries(self.script)
 
@@ -112,7 +111,7 @@ class Study:
                 found.append(vary.form.taken(index))
         return found
 
-    def _points(self, rows: np.ndarray) -> list:
+    def _points(self, rows: np.ndarray) -> list[Any]:
         """Which point of its grid or list each of ``vary`` has, None for a random one."""
         rest = rows // self.samples
         digits: list[np.ndarray] = []
@@ -131,7 +130,7 @@ class Study:
         return found
 
 
-def script_entries(script: Any) -> list:
+def script_entries(script: Any) -> list[Any]:
     """The list of entries in a script as YAML gives it."""
     return (script["script"] if isinstance(script, dict) else script) or []
 
@@ -179,7 +178,7 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool 
     watch = number(spec.get("watch", 50.0), f"{name}, watch", 1e-6, 1e6)
     measures = read_measures(spec.get("measure"), spec.get("stop"), watch, duration_s, f"{name}, measure")
     vary = _vary(spec["vary"], name, base.parameters, script_entries(script))
-    reference = _reference(spec.get("reference"), f"{name}, reference", base)
+    reference = _reference(spec.get("reference"), f"{name}, reference")
     if measures.needs_reference and reference is None:
         raise InputError(f"{name}, reference", None, "parameters of a reference, as a difference is measured")
     samples = _samples(spec.get("samples"), f"{name}, samples", vary, sampler)
@@ -188,23 +187,17 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool 
     )
     _check_rows(study, f"{name}, samples", yes)
     _check_flyable(study, base)
-    content = json.dumps(_with_text_keys([spec, base.parameters.named(), script]), sort_keys=True, default=str)
+    # In the order of the file: that of what varies decides which row is which.
+    content = repr([spec, base.parameters.named(), script])
     return replace(study, fingerprint=hashlib.sha256(content.encode()).hexdigest())
 
 
-def _with_text_keys(value: Any) -> Any:
-    """The same for numbers and nothing as keys, which have no order among text."""
-    if isinstance(value, dict):
-        return {str(key): _with_text_keys(inner) for key, inner in value.items()}
-    return [_with_text_keys(inner) for inner in value] if isinstance(value, list) else value
-
-
-def _settings(spec: Any, field: str) -> dict:
+def _settings(spec: Any, field: str) -> dict[str, Any]:
     if spec is None:
         return {}
     if not isinstance(spec, dict):
         raise InputError(field, spec, "{parameter: value, ...}")
-    found: dict = {}
+    found: dict[str, Any] = {}
     for key, value in spec.items():
         if isinstance(value, dict):
             found.update(_settings({f"{key}.{k}": v for k, v in value.items()}, field))
@@ -231,7 +224,7 @@ def _script(spec: Any, folder: Path, field: str) -> Any:
     return spec
 
 
-def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[Vary, ...]:
+def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> tuple[Vary, ...]:
     if not isinstance(spec, dict) or not spec:
         raise InputError(f"{name}, vary", spec, "{name: how, ...} with at least one entry")
     found = []
@@ -252,7 +245,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list) -> tuple[
     return tuple(found)
 
 
-def _check_value(target: Target, value: Any, field: str, values: Mapping[str, Value], entries: list) -> None:
+def _check_value(target: Target, value: Any, field: str, values: Mapping[str, Value], entries: list[Any]) -> None:
     """Put a value where it will stand, and see whether that is accepted there."""
     changed, copied = dict(values), copy.deepcopy(entries)
     try:
@@ -266,7 +259,7 @@ def _check_value(target: Target, value: Any, field: str, values: Mapping[str, Va
         raise InputError(field, value, f"a value that fits {target.name}") from None
 
 
-def _reference(spec: Any, field: str, _base: Scenario) -> dict | None:
+def _reference(spec: Any, field: str) -> dict[str, Any] | None:
     if spec is None:
         return None
     changes = _settings(spec, field)

@@ -15,7 +15,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -74,7 +74,7 @@ class Parts:
             raise InputError("-o", str(file), f"a place that can be written to ({error.strerror})") from None
 
     @property
-    def _manifest(self) -> dict:
+    def _manifest(self) -> dict[str, Any]:
         return {"fingerprint": self.study.fingerprint, "rows": self.study.rows, "chunk_rows": self.chunk_rows}
 
     def _continue(self, manifest: dict, resume: bool) -> None:
@@ -129,7 +129,7 @@ class Parts:
         with pa.OSFile(str(self._path(k)), "rb") as source:
             return pa.ipc.open_file(source).read_all()
 
-    def join(self) -> dict:
+    def join(self) -> dict[str, Any]:
         """Write FILE from the parts there are, and remove them once all were there; returns the file's metadata."""
         pa, pq = arrow()
         finished = self.finished()
@@ -137,7 +137,7 @@ class Parts:
             return self._metadata(0, 0, 0)
         rows = sum(last - first for first, last in map(self.bounds, finished))
         beside = self.file.with_name(self.file.name + ".tmp")
-        gathered: list = []
+        gathered: list[Any] = []
         simulated = failed = 0
         schema = self._read(finished[0]).schema.remove_metadata()
         text = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.string()]
@@ -157,7 +157,7 @@ class Parts:
             shutil.rmtree(self.folder)
         return metadata
 
-    def _metadata(self, rows: int, simulated: int, failed: int) -> dict:
+    def _metadata(self, rows: int, simulated: int, failed: int) -> dict[str, Any]:
         study = self.study
         return {
             "study": study.name,
@@ -176,11 +176,11 @@ class Parts:
         }
 
 
-def metadata_of(file: Path) -> dict:
+def metadata_of(file: Path) -> dict[str, Any]:
     """What a table says of itself; empty for a file that no sweep wrote."""
     _, pq = arrow()
     try:
-        return json.loads((pq.read_metadata(file).metadata or {}).get(KEY, b"{}"))
+        return dict(json.loads((pq.read_metadata(file).metadata or {}).get(KEY, b"{}")))
     except (OSError, ValueError):
         return {}
 

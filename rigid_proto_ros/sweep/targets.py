@@ -31,7 +31,7 @@ class Target:
     name: str
     parameter: str = ""
     entry: int = 0
-    path: tuple = ()
+    path: tuple[Any, ...] = ()
 
     def put(self, values: MutableMapping[str, Value], entries: list, value: Any) -> None:
         """Set the varied value in parameters (complete ones) or in the script's entries."""
@@ -69,14 +69,14 @@ def component_labels(parameter: str, count: int) -> list[str]:
     return _COMPONENTS[count].split() if count in _COMPONENTS else [str(k) for k in range(count)]
 
 
-def _with_component(vector: Value, k: int, value: Any) -> list:
+def _with_component(vector: Value, k: int, value: Any) -> list[Any]:
     given = vector if isinstance(vector, list) else [vector]
     vector = list(given) * (3 if len(given) == 1 else 1)
     vector[k] = value
     return vector
 
 
-def read_target(name: str, field: str, values: Mapping[str, Value], entries: list) -> Target:
+def read_target(name: str, field: str, values: Mapping[str, Value], entries: list[Any]) -> Target:
     """The target of a name, given the scene's values and the script's entries; raises InputError with the
     nearest name.
     """
@@ -108,7 +108,7 @@ def _component(declared: Parameter, component: str, field: str) -> int:
     return labels.index(component)
 
 
-def _script_target(name: str, field: str, entries: list) -> Target:
+def _script_target(name: str, field: str, entries: list[Any]) -> Target:
     _, _, rest = name.partition(".")
     number, *keys = rest.split(".")
     accepted = f"script.<entry>.<field>, entries 1 to {len(entries)}"

@@ -56,7 +56,7 @@ def variation(study: Study, row: int) -> Variation:
     return apply(study, [column[0] for column in study.columns(np.array([row], np.int64))])
 
 
-def apply(study: Study, chosen: list) -> Variation:
+def apply(study: Study, chosen: list[Any]) -> Variation:
     """The variation with these values of what varies."""
     changes: dict[str, Value] = {}
     values, script = ChainMap(changes, study.parameters.named()), copy.deepcopy(study.script)
@@ -101,7 +101,7 @@ def _body_mesh(mesh: str, repair: bool | str, fallback: str, model: str) -> Body
     return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback, inertia_model=model))
 
 
-def write_scene(study: Study, row: Variation, file: Path, time: float | None) -> dict:
+def write_scene(study: Study, row: Variation, file: Path, time: float | None) -> dict[str, Any]:
     """Write the row as a scene, its script beside it as NAME_script.yaml; returns the files and the
     command that flies them.
     """

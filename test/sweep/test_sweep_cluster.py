@@ -39,7 +39,7 @@ def test_a_worker_killed_in_mid_run_costs_no_row(tmp_path) -> None:
 
 
 def test_a_scheduler_that_isnt_there_is_refused(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr("rigid_proto_ros.sweep.cluster.CONNECT_S", 0.3)
+    monkeypatch.setattr("rigid_proto_ros.sweep.run.CONNECT_S", 0.3)
     out = str(tmp_path / "t.parquet")
     assert main(["sweep", "box_tensor", "-o", out, "--dask", "tcp://127.0.0.1:9"]) == 2
     assert "--dask" in capsys.readouterr().err

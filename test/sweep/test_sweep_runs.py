@@ -16,8 +16,7 @@ from sweep_studies import POKES, PULLED, study
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.sweep.chunk import run_chunk
-from rigid_proto_ros.sweep.local import chunk_rows
-from rigid_proto_ros.sweep.run import run_study
+from rigid_proto_ros.sweep.run import chunk_rows, run_study
 from rigid_proto_ros.sweep.table import metadata_of
 
 pq = pytest.importorskip("pyarrow.parquet")
