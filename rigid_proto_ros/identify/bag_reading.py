@@ -36,8 +36,8 @@ STEADY = 0.5
 """Gaps between messages that differ from the usual one by less than this part of it are of one rate."""
 FEWEST_SAMPLED = 20
 """Messages of a wrench that is called sampled."""
-CHANGED, MOST_CHANGES = 0.1, 16
-"""A sampled load's change counts where it is more than this part of the largest force or torque, and so many do."""
+LEAST_JUMP, MOST_CHANGES = 0.03, 16
+"""A sampled load's jump counts where it is more than this part of the largest force or torque, and so many do."""
 
 
 @dataclass(frozen=True)
@@ -300,15 +300,21 @@ def _load_history(topic: _Topic, chosen: dict[str, _Topic]) -> ms.LoadHistory:
             load = Load(axes, where, vector(numbers[k, :3]), vector(numbers[k, 3:]))
             rows.append((int(begins[k]), int(ends[k]), load.row))
         which[k] = len(rows) - 1
-    largest = np.maximum(
-        [np.linalg.norm(numbers[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6))], 1e-300
-    )
-    steps = np.diff(numbers, axis=0, prepend=numbers[:1])
-    sizes = np.linalg.norm(steps[:, :3], axis=1) / largest[0] + np.linalg.norm(steps[:, 3:], axis=1) / largest[1]
-    counted = np.argsort(-np.where(sds_s > 0.0, sizes, 0.0))[:MOST_CHANGES]
-    counted = np.sort(counted[(sizes[counted] > CHANGED) & (sds_s[counted] > 0.0)])
+    sds_s *= _sharpness(numbers)
+    counted = np.sort(np.argsort(-sds_s)[:MOST_CHANGES])
+    counted = counted[sds_s[counted] > 0.0]
     changes = ms.SampledChanges(before[counted], which[counted], sds_s[counted])
     return replace(ms.load_history(rows), topic=topic.name, changes=changes)
+
+
+def _sharpness(numbers: np.ndarray) -> np.ndarray:
+    """Which part of each change to the loads (m, 6) is a jump (m,): what changes steadily is known in between."""
+    forces, torques = numbers[:, :3], numbers[:, 3:]
+    parts = [part / max(float(np.linalg.norm(part, axis=1).max()), 1e-300) for part in (forces, torques)]
+    steps = np.diff(np.hstack(parts), axis=0, prepend=np.hstack(parts)[:1])
+    around = 0.5 * (np.vstack([steps[1:], steps[-1:]]) + np.vstack([steps[:1], steps[:-1]]))
+    sizes, sharp = np.linalg.norm(steps, axis=1), np.linalg.norm(steps - around, axis=1)
+    return np.where((sizes > 0.0) & (sharp > LEAST_JUMP), np.minimum(sharp / np.maximum(sizes, 1e-300), 1.0), 0.0)
 
 
 def _begins(times_ns: np.ndarray, acts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

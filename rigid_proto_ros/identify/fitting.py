@@ -20,7 +20,6 @@ from .measurements import MeasuredFlight
 from .psd_projection import is_possible, possible_step
 from .unknowns import Unknowns, Values, possible_tensor
 
-CANNOT_FLY = "the estimate can't be simulated"
 LEAST_NOISE = 1e-4
 """Part of what a series shows that is taken for noise at first: a simulated flight leaves nothing at the end."""
 HUBER = 1.5
@@ -52,6 +51,13 @@ LENGTHENING = (4.0, 2.0)
 """Segments become so many times longer from stage to stage: the second where the first leaves more than noise."""
 GROWN = 1.5
 """Residuals of longer segments so many times those of shorter ones are no noise."""
+
+
+class CannotFlyError(InputError):
+    """An estimate with which a flight can't be simulated."""
+
+    def __init__(self, cause: str = "--from and --to exclude parts that are no free flight") -> None:
+        super().__init__("identify", f"the estimate can't be simulated; {cause}")
 
 
 @dataclass(frozen=True)
@@ -120,6 +126,7 @@ class _Fit:
         self.series = [one for flight in flights for one in flight.series]
         self.sigmas = {one.name: max(noise_by_differences(one), LEAST_NOISE * spread(one)) for one in self.series}
         self.weights = {id(one): np.ones(len(one.times_ns)) for one in self.series}
+        self.near = {one.name: NEAR * spread(one) for one in self.series}
         every = {}
         for flight in flights:
             enough = max(ENOUGH_SAMPLES, round(ENOUGH_IN_A_RADIAN * high_rate(flight) * flight.duration_s))
@@ -145,7 +152,7 @@ class _Fit:
         problem = Problem(segments, self.values, self.unknowns)
         found = best_unknowns(problem, starts, most, tolerance)
         if found is None:
-            raise InputError("identify", CANNOT_FLY)
+            raise CannotFlyError
         numbers, starts = found
         self.values = problem.values(numbers)
         is_inside = is_possible(self.values.inertia)
@@ -159,7 +166,7 @@ class _Fit:
             problem = Problem(segments, self.values, self.unknowns)
             here = problem.linear(np.zeros(len(self.unknowns)), starts)
             if here is None:
-                raise InputError("identify", CANNOT_FLY)
+                raise CannotFlyError
             step = possible_step(here.jacobian, here.residuals, slice(first, first + 6), self.values.inertia)
             self.values, starts = possible(problem.values(step)), here.starts_for(step)
             if np.linalg.norm(here.jacobian @ step) < SMALL_STEP:
@@ -194,7 +201,7 @@ def residuals_of(segment: sh.Segment, start: np.ndarray, values: Values) -> list
     """Measured minus shown of each piece (m, 3), in its own unit; raises InputError where it can't be flown."""
     found = sh.segment_residuals(segment, start, values)
     if found is None:
-        raise InputError("identify", CANNOT_FLY)
+        raise CannotFlyError
     return found
 
 
@@ -209,20 +216,37 @@ def residuals_by_series(
     }
 
 
-def _approached(fit: _Fit) -> list[np.ndarray]:
-    """Bring ``fit`` near the truth by ever longer segments; returns starts of whole flights."""
+def short_misfit(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> float:
+    """How much larger the residuals of short segments are than any noise, at most 1 where they fit; infinite where they
+    can't be flown.
+    """
+    try:
+        return _short(_Fit(flights, unknowns, values), FIRST_ANGLES[-1:])[3]
+    except CannotFlyError:
+        return np.inf
+
+
+def _short(
+    fit: _Fit, angles: Sequence[float] = FIRST_ANGLES
+) -> tuple[float, list[sh.Segment], list[np.ndarray], float]:
+    """Bring ``fit`` near the truth by short segments: their length [s], they, their starts, and their misfit."""
     sigmas = fit.sigmas
     initial = initial_values(fit.flights, fit.unknowns, fit.values)
-    near = {series.name: NEAR * spread(series) for series in fit.series}
-    for angle in FIRST_ANGLES:
+    for angle in angles:
         fit.values, fit.sigmas = initial, sigmas
         length = _first_length(fit.flights, angle)
         segments = fit.cut(length, is_thin=True)
-        starts = _starts(segments)
-        starts = fit.improve(segments, starts, 12, 1e-2)
+        starts = fit.improve(segments, _starts(segments), 12, 1e-2)
         fit.sigmas = fit.noise_left(segments, starts)
-        if all(fit.sigmas[key] < max(FITS * sigmas[key], near[key]) for key in sigmas):
+        misfit = max(fit.sigmas[key] / max(FITS * sigmas[key], fit.near[key]) for key in sigmas)
+        if misfit <= 1.0:
             break
+    return length, segments, starts, misfit
+
+
+def _approached(fit: _Fit) -> list[np.ndarray]:
+    """Bring ``fit`` near the truth by ever longer segments; returns starts of whole flights."""
+    length, segments, starts, _ = _short(fit)
     while len(segments) > len(fit.flights):
         values, sigmas = fit.values, fit.sigmas
         for factor in LENGTHENING:
@@ -230,7 +254,7 @@ def _approached(fit: _Fit) -> list[np.ndarray]:
             longer = fit.cut(factor * length, is_thin=True)
             joined = fit.improve(longer, _starts(longer, segments, starts), 12, 1e-2)
             fit.sigmas = fit.noise_left(longer, joined)
-            if all(fit.sigmas[key] <= GROWN * max(sigmas[key], near[key]) for key in sigmas):
+            if all(fit.sigmas[key] <= GROWN * max(sigmas[key], fit.near[key]) for key in sigmas):
                 break
         length, segments, starts = factor * length, longer, joined
     return [segment.begin(start) for segment, start in zip(fit.cut(math.inf), starts, strict=True)]
@@ -274,7 +298,7 @@ def _estimate(fit: _Fit, segments: list[sh.Segment], starts: list[np.ndarray]) -
         for segment, start in zip(segments, starts, strict=True):
             columns = sh.linearized(segment, start, variations)
             if columns is None:
-                raise InputError("identify", CANNOT_FLY)
+                raise CannotFlyError
             triangle = sh.compressed(columns, segment, start, is_held=False)
             # Rows that are left when the start has taken all that it can.
             own = len(columns) - 1 - len(fit.unknowns)

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..base.errors import InputError
 from .comparison import Candidate, compare
-from .fitting import fit_flights
+from .conversions import likely_cause
+from .fitting import CannotFlyError, fit_flights
 from .measurements import ACCELERATION, MeasuredFlight, topics_of
 from .report import Identification
 from .residual_checks import check_residuals
@@ -47,7 +48,12 @@ def identify(
     _check(flights)
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
     unknowns = make_unknowns(fit, topics_of(flights))
-    estimate = fit_flights(flights, unknowns, _first_values(flights[0], known), robust)
+    first = _first_values(flights[0], known)
+    try:
+        estimate = fit_flights(flights, unknowns, first, robust)
+    except CannotFlyError:
+        cause = likely_cause(flights, unknowns, first)
+        raise CannotFlyError(cause) if cause else CannotFlyError() from None
     identifiability = Identifiability(estimate, known.length)
     compared = []
     if candidates:
@@ -56,7 +62,9 @@ def identify(
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
-    return Identification(flights, estimate, identifiability, checks, compared, _assumed(flights, known, fit), guessed)
+    cause = "" if all(check.is_noise for check in checks) else likely_cause(flights, unknowns, first)
+    assumed = _assumed(flights, known, fit)
+    return Identification(flights, estimate, identifiability, checks, compared, assumed, guessed, cause)
 
 
 def _check(flights: Sequence[MeasuredFlight]) -> None:
@@ -93,4 +101,7 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
         lines.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
     if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
         lines.append("the IMU stands at the tracked frame's origin, its axes those of the frame")
+    for history in {flight.load_history.topic: flight.load_history for flight in flights}.values():
+        if len(history.changes):
+            lines.append(f"{history.topic} was sampled: it changed between messages, and the errors count that")
     return lines

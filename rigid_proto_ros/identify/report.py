@@ -37,6 +37,8 @@ class Identification:
     assumed: Sequence[str]
     guessed: frozenset[str] = frozenset()
     """Of ``mass``, ``com`` and ``inertia`` what was neither asked for nor given: it has no number."""
+    cause: str = ""
+    """What may be the cause where the residuals are no noise."""
 
     @property
     def unidentified(self) -> list[Unidentified]:
@@ -128,7 +130,7 @@ class Identification:
     @property
     def remarks(self) -> list[str]:
         """On the residuals."""
-        return remarks(self.checks)
+        return [*([self.cause] if self.cause else []), *remarks(self.checks)]
 
 
 def as_json(found: Identification) -> dict:

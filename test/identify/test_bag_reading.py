@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import calibration_study as study
 import foreign_bags as fb
 import measured_flights as mf
 import numpy as np
@@ -122,6 +123,50 @@ def test_poses_and_twists_in_either_axes_say_the_same(tmp_path: Path) -> None:
         shapes.append([one.value for one in identify([bag_flight(bag, Choice())]).shape])
     assert shapes[0] == pytest.approx(shapes[1], abs=1e-8)
     assert shapes[0][3] == pytest.approx(1.0 / 3.0, abs=1e-8)
+
+
+def _pushed(tmp_path: Path, seed: int, shape: str, clock_s: float = 0.0) -> tuple[Path, Choice]:
+    """A throw with a push of .05 s that was sampled at 500 Hz, by a clock that is behind."""
+    rng = np.random.default_rng(seed)
+    point, begin = "0.05,0.02,0.0", 0.4 + 0.002 * rng.random()
+
+    def force(seconds: np.ndarray) -> np.ndarray:
+        part = (seconds - begin) / 0.05
+        strength = np.sin(np.pi * part) if shape == "half a sine" else 1.0
+        return np.where((part > 0.0) & (part < 1.0), strength, 0.0)[:, None] * np.array(FORCE)
+
+    steps = begin + 1e-4 * np.arange(500)
+    pokes = [
+        (t, 1e-4, "world", (0.05, 0.02, 0.0), f, (0, 0, 0)) for t, f in zip(steps, force(steps + 5e-5), strict=True)
+    ]
+    position, attitude = mf.mocap(_truth(), mf.tumbling(), rng, 1.0, load=mf.load_history(*pokes)).series
+    stamps = np.arange(0.0, 1.0, 0.002)
+    wrenches = [(round(1e9 * t), f) for t, f in zip(stamps - clock_s + 0.1, force(stamps), strict=True)]
+    samples = zip(position.times_ns + 10**8, position.values, attitude.values, strict=True)
+    topics = {
+        "/pose": ("geometry_msgs/msg/PoseStamped", [(t, fb.pose(t, p, q)) for t, p, q in samples]),
+        "/w": ("geometry_msgs/msg/WrenchStamped", [(t, fb.wrench(t, f, (0, 0, 0), "map")) for t, f in wrenches]),
+    }
+    return fb.write(tmp_path / "pushed.mcap", topics), Choice({"pose": "/pose", "wrench": f"/w@world@point/{point}"})
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "half a sine"])
+def test_a_sampled_push_is_no_more_certain_than_its_samples(tmp_path: Path, shape: str) -> None:
+    errors = []
+    for seed in range(4):
+        found = identify([bag_flight(*_pushed(tmp_path, seed, shape))])
+        assert found.fits
+        assert any(line.startswith("/w was sampled") for line in found.assumed)
+        errors.append(study.normalised_errors(found, _truth()))
+    assert np.mean(np.square(errors)) < 2.0  # .7; 30 as commands that hold from their stamps on
+
+
+def test_the_clock_of_a_wrench_is_estimated_like_that_of_a_sensor(tmp_path: Path) -> None:
+    found = identify(
+        [bag_flight(*_pushed(tmp_path, 1, "rectangle", clock_s=0.03))], ("mass", "com", "inertia", "offset")
+    )
+    _near(found)
+    assert abs(found.others["offset of /w"].value - 0.03) < 4.0 * found.others["offset of /w"].sd < 0.01
 
 
 def _poses(tmp_path: Path, count: int = 50, topic: str = "/pose", shift_s: float = 0.0, **others) -> Path:

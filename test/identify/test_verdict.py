@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import measured_flights as mf
 import numpy as np
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.identify import measurements as ms
 from rigid_proto_ros.identify.comparison import Candidate
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.report import as_json, as_text, as_urdf
@@ -86,3 +89,29 @@ def test_what_cannot_be_seen_is_null_and_no_urdf() -> None:
 def test_without_a_clue_of_gravity_a_throw_says_what_it_assumed() -> None:
     found = _identified((0.4, 6.0, 0.3))
     assert any(line.startswith("gravity") for line in found.assumed)
+
+
+def _with(flight, kinds, convert):
+    series = [replace(one, values=convert(one.values)) if one.kind in kinds else one for one in flight.series]
+    return replace(flight, series=tuple(series))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "convert", "gravity", "cause"),
+    [
+        ((ms.POSITION,), lambda v: 1e3 * v, (0.0, 0.0, -9.81), "positions are in mm"),
+        ((ms.RATE,), np.degrees, (0.0, 0.0, -9.81), "rates are in degrees"),
+        ((ms.ACCELERATION,), lambda v: v / 9.80665, (0.0, 0.0, -9.81), "accelerations are in g"),
+        ((), None, (0.0, -9.81, 0.0), "gravity is 0 0 -9.81"),
+        ((ms.ATTITUDE,), lambda q: np.roll(q, 1, axis=1), (0.0, 0.0, -9.81), "quaternions begin with w"),
+    ],
+)
+def test_a_unit_or_an_axis_that_was_taken_for_another_is_named(kinds, convert, gravity, cause) -> None:
+    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
+    rng = np.random.default_rng(1)
+    flight = mf.with_imu(truth, mf.tumbling((1.0, 6.0, 2.0)), rng, 1.0, mf.load_history(POKE), bias=(0.02, 0.1))
+    fit = ("mass", "com", "inertia", "gyro_bias", "accel_bias")
+    flight = replace(_with(flight, kinds, convert), gravity=gravity)
+    found = identify([flight], fit)
+    assert not found.fits
+    assert cause in found.remarks[0]
