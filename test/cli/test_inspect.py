@@ -228,21 +228,25 @@ def test_trimesh_and_rerun_are_not_imported_for_an_obj():
     assert done.returncode == 0, done.stderr
 
 
-def test_the_picture_holds_mesh_axes_boxes_and_differences(capsys, tmp_path):
+def test_the_picture_holds_mesh_axes_shapes_and_the_report(capsys, tmp_path):
     pytest.importorskip("rerun")
     from rerun.chunk import RrdReader
 
     target = tmp_path / "hammer.rrd"
     report(capsys, "hammer", "--record", str(target), "--scale", "1", "1", "-1")
-    chunks = {chunk.entity_path.strip("/"): chunk.to_record_batch() for chunk in RrdReader(target).stream()}
-    shapes = ("center_of_mass", "principal_axes", "bounding_box", "equimomental_box", "equimomental_ellipsoid")
-    for name in ("world/mesh", *(f"world/{shape}" for shape in shapes), "report", "differences"):
-        assert name in chunks
-    vectors = chunks["world/principal_axes"].column("Arrows3D:vectors")[0].as_py()
+    chunks = [(chunk.entity_path.strip("/"), chunk.to_record_batch()) for chunk in RrdReader(target).stream()]
+    shapes = ("mesh", "principal_axes", "bounding_box", "equimomental_box", "equimomental_ellipsoid")
+    assert {"report", *(f"world/body/{shape}" for shape in shapes)} <= {name for name, _ in chunks}
+    (drawn_axes,) = [
+        batch
+        for name, batch in chunks
+        if name == "world/body/principal_axes" and "Arrows3D:vectors" in batch.schema.names
+    ]
+    vectors = drawn_axes.column("Arrows3D:vectors")[0].as_py()
     axes = np.array(report(capsys, "hammer", "--scale", "1", "1", "-1")["principal_axes"])
     drawn = np.array(vectors).T
     assert drawn / np.linalg.norm(drawn, axis=0) == pytest.approx(axes, abs=1e-6)
-    text = chunks["report"].column("TextDocument:text")[0].as_py()[0]
+    text = dict(chunks)["report"].column("TextDocument:text")[0].as_py()[0]
     found = report(capsys, "hammer")
     solid = np.array(found["models"]["solid"]["inertia"])
     for name, label in (("shell", "shell"), ("points", "vertices"), ("bounding_box", "bounding box")):
