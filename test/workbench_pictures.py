@@ -2,7 +2,7 @@
 """The page's own pictures, drawn anew in headless Chromium: ``python test/workbench_pictures.py docs`` writes flight.gif,
 workbench.png and true_against_box.png there; ``--lessons FOLDER`` one picture of each lesson.
 
-Time stands between two pictures of the moving one: it is as long on a slow machine as on a fast one.
+Time goes so slowly meanwhile that a browser without a graphics card keeps up.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ from pathlib import Path
 from PIL import Image
 from workbench_page import SOFTWARE_GL, Browser, Flown, chromium
 
+from rigid_proto_ros.rerun_view.ports import any_free_port
 from rigid_proto_ros.scene.lessons import Lesson, lesson, lessons
 
 SIZE, MOVING_SIZE = (1400, 800), (800, 450)
 RATE = 10
 """[1/s] Pictures of the moving one, and of simulated time, which is shown as fast as it is."""
-COLOURS = 96
+COLOURS = 128
+
+SLOW = 0.015
+"""Simulated seconds per second."""
 
 
 def main() -> None:
@@ -30,7 +34,7 @@ def main() -> None:
     parser.add_argument("--lessons", action="store_true")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
-    flown = Flown("t_handle")
+    flown = Flown("t_handle", port=any_free_port())
     try:
         with chromium(SOFTWARE_GL) as started:
             if args.lessons:
@@ -38,60 +42,59 @@ def main() -> None:
                 for each in lessons():
                     begin(page, each)
                     page.page.screenshot(path=args.folder / f"{each.name}_asked.png")
-                    play(page, 2.0)
+                    hurry(page, 1.0)
                     page.page.screenshot(path=args.folder / f"{each.name}.png")
                 return
             page = Browser(started, flown, MOVING_SIZE)
             draw_moving(page, args.folder / "flight.gif")
             page.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
             begin(page, lesson("true_or_box_tensor"))
-            play(page, 3.0)
+            hurry(page, 3.0)
             page.page.screenshot(path=args.folder / "true_against_box.png")
             begin(page, lesson("t_handle"))
-            play(page, 3.4)
-            pull(page, steps=4)
+            hurry(page, 3.4)
+            pull(page, steps=3)
             page.page.screenshot(path=args.folder / "workbench.png")
     finally:
         flown.end()
 
 
-def begin(page: Browser, shown: Lesson) -> None:
-    """A lesson with its question; time stands."""
+def begin(page: Browser, shown: Lesson, ghost: str = "") -> None:
+    """A lesson with its question, slow; then it is played from its beginning. ghost: its inertia model."""
     flown = page.flown
     flown.page.lessons.name(shown.name)
     asyncio.run_coroutine_threadsafe(flown.page.lessons.begin(), flown.page.loop).result(60.0)
     page.until(lambda: shown.question in page.text, "question")
+    flown.live.set_parameters(
+        {"real_time_factor": SLOW, "ghost.inertia_model": ghost} if ghost else {"real_time_factor": SLOW}
+    )
+    flown.live.reset()
     time.sleep(1.0)
     page.drawn()
 
 
-def play(page: Browser, seconds: float, at_once: bool = True) -> list[Image.Image]:
-    """Let time go on so far; the pictures on the way, or only the last."""
+def play(page: Browser, seconds: float) -> list[Image.Image]:
+    """Let time go on so far; the pictures on the way."""
     flown, pictures = page.flown, []
     flown.page.loop.call_soon_threadsafe(flown.page.lessons.answer, None)
-    time.sleep(0.3)
-    flown.live.pause(True)
-    rate = float(flown.live.scenario.parameters.publish_rate)
-    count = 1 if at_once else round(seconds * RATE)
-    for _ in range(count):
-        flown.live.step(round(rate * seconds / count))
-        show(page)
-        if not at_once:
-            pictures.append(picture(page))
+    start_s = flown.live.state.time_ns * 1e-9
+    for k in range(1, round(seconds * RATE) + 1):
+        page.until(lambda due_s=start_s + k / RATE: flown.page.state.time_ns * 1e-9 >= due_s, "time that goes on")
+        page.drawn()
+        with Image.open(io.BytesIO(page.page.screenshot())) as image:
+            pictures.append(image.convert("RGB"))
+        print(f"{flown.live.state.time_ns * 1e-9:.2f} s", flush=True)
     return pictures
 
 
-def show(page: Browser) -> None:
-    """Wait until the browser has drawn the present state."""
+def hurry(page: Browser, seconds: float) -> None:
+    """Go on so far without pictures."""
     flown = page.flown
-    page.until(lambda: flown.page.state.time_ns == flown.live.state.time_ns, "state on the page")
+    flown.page.loop.call_soon_threadsafe(flown.page.lessons.answer, None)
+    flown.live.set_parameters({"real_time_factor": 0.3})
+    page.until(lambda: flown.page.state.time_ns * 1e-9 >= seconds, "time that goes on")
+    flown.live.set_parameters({"real_time_factor": SLOW})
     page.drawn()
-    print(f"{flown.live.state.time_ns * 1e-9:.2f} s", flush=True)
-
-
-def picture(page: Browser) -> Image.Image:
-    with Image.open(io.BytesIO(page.page.screenshot())) as image:
-        return image.convert("RGB")
 
 
 def com(page: Browser) -> tuple[float, float]:
@@ -106,26 +109,26 @@ def pull(page: Browser, steps: int) -> list[Image.Image]:
     page.page.mouse.down()
     pictures = []
     for k in range(1, steps + 1):
-        page.page.mouse.move(x - 160.0 * k / steps, y - 70.0 * k / steps)
-        time.sleep(0.15)
-        pictures += play(page, 1.0 / RATE, at_once=False)
+        page.page.mouse.move(x - 130.0 * k / steps, y - 60.0 * k / steps)
+        pictures += play(page, 1.0 / RATE)
     return pictures
 
 
 def draw_moving(page: Browser, file: Path) -> None:
     """The T-handle turns over, its ghost with the box's tensor doesn't; then a poke, and a pull on the string."""
-    begin(page, lesson("t_handle"))
-    page.flown.live.set_parameters({"ghost.inertia_model": "bounding_box"})
-    pictures = play(page, 2.8, at_once=False)
+    begin(page, lesson("t_handle"), "bounding_box")
+    pictures = play(page, 2.6)
     page.click(*com(page))
-    time.sleep(0.3)
-    pictures += play(page, 1.0, at_once=False)
-    pictures += pull(page, steps=15)
-    pictures += play(page, 0.5, at_once=False)
+    pictures += play(page, 0.8)
+    pictures += pull(page, steps=12)
     page.release()
-    time.sleep(0.3)
-    pictures += play(page, 0.7, at_once=False)
-    palette = pictures[len(pictures) // 2].quantize(COLOURS)
+    pictures += play(page, 0.7)
+    width, height = pictures[0].size
+    # Colours of all that is seen at some time.
+    sheet = Image.new("RGB", (width, height * len(pictures)))
+    for k, each in enumerate(pictures):
+        sheet.paste(each, (0, k * height))
+    palette = sheet.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
     frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=round(1000 / RATE), loop=0, optimize=True)
 

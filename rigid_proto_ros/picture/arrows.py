@@ -108,15 +108,6 @@ class Loads:
         kinds = {acting.load.kind for acting in self._acting.values()}
         return [kind for kind in LOAD_COLOURS if kind in kinds]
 
-    def disturbed(self, times_ns: np.ndarray, before_ns: int) -> np.ndarray:
-        """At which of the times (n,) a load acts or has acted since the time before, ``before_ns`` for the first."""
-        since = np.concatenate([[before_ns], times_ns[:-1]])
-        found = np.zeros(len(times_ns), dtype=bool)
-        for acting in (*self._acting.values(), *self._ended):
-            end_ns = acting.begin_ns + 1 if acting.load.kind == "impulse" else acting.end_ns
-            found |= (times_ns >= acting.begin_ns) & (since < end_ns)
-        return found
-
     def rows(
         self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray, scales: ArrowScales, size: float, weight: float
     ) -> dict[tuple[str, str], LoadArrowRows]:

@@ -157,7 +157,6 @@ class Picture:
     def restart(self) -> None:
         """A new run: simulated time starts again at 0; mesh, body and scales stay."""
         self.redraw()
-        self._drawn_ns = -1
         self._trail, self._com_trail = Trail(), Trail()
         self._plots = Plots()
         self._poinsot = PoinsotPicture()
@@ -209,7 +208,6 @@ class Picture:
         self.body = body
         self.shape = Shape(self._vertices, body)
         self._poinsot.set_body(self.shape.moments, self.shape.axes)
-        self._plots.body_changed()
         self.backend.begin(np.array([time_ns]))
         if self.shape.size != size:
             self.backend.resize(self.shape.size)
@@ -316,18 +314,15 @@ class Picture:
         self._draw_motion(spin, L)
         self._draw_trails(times_ns, rows, R)
         string = self.string.rows(times_ns, rows, R) if self.string.was_tied else None
-        disturbed = self.loads.disturbed(times_ns, self._drawn_ns)
         self._draw_loads(times_ns, rows, R)
         string_energy = None
         if string is not None:
-            disturbed |= string.tied
             string_energy = np.zeros(len(rows))
             string_energy[string.tied] = string.energies
             self._draw_string(string, rows)
             self.string.forget_before(int(times_ns[-1]))
         if self._wanted("plots"):
-            self._plots.draw(backend, rows, L, rows[:, 10:13] @ shape.axes, body, disturbed, string_energy)
-        self._drawn_ns = int(times_ns[-1])
+            self._plots.draw(backend, rows, L, rows[:, 10:13] @ shape.axes, body, string_energy)
 
     def _draw_motion(self, spin: np.ndarray, L: np.ndarray) -> None:
         """Arrows of ω and L at the COM (n, 3)."""

@@ -31,15 +31,10 @@ def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 class Plots:
-    """Remembers the run's start, and the last moment from which nothing has acted on the body."""
+    """Remembers the run's start."""
 
     def __init__(self) -> None:
         self._momentum_at_start: np.ndarray | None = None
-        self._free_from: tuple[float, np.ndarray] | None = None
-
-    def body_changed(self) -> None:
-        """Drift counts anew from the next state."""
-        self._free_from = None
 
     def draw(
         self,
@@ -48,13 +43,11 @@ class Plots:
         L: np.ndarray,
         w_principal: np.ndarray,
         body: BodySnapshot,
-        disturbed: np.ndarray,
         string_energy: np.ndarray | None,
     ) -> None:
         """Plot states (n, 13) with their angular momenta (n, 3) in world axes and spins (n, 3) in principal ones.
 
-        disturbed (n,) says at which a load acts or has acted since the state before; string_energy (n,) [J] is None as
-        long as the run has had no string.
+        string_energy (n,) [J] is None as long as the run has had no string.
         """
         own = energies(rows, body)
         total = own.sum(axis=1) if string_energy is None else own.sum(axis=1) + string_energy
@@ -62,34 +55,12 @@ class Plots:
             self._momentum_at_start = L[0].copy()
         shown = [own, total] if string_energy is None else [own, total, string_energy]
         backend.scalars(style.ENERGY, np.column_stack(shown))
-        backend.scalars(style.DRIFT, self._drift(total, np.abs(own).sum(axis=1), L, disturbed))
         backend.scalars(style.ANGULAR_MOMENTUM, np.column_stack([L, np.linalg.norm(L, axis=1)]))
         angle = np.degrees(angle_to(self._momentum_at_start, L))
         backend.scalars(style.ANGULAR_MOMENTUM_ANGLE, angle[:, np.newaxis])
         backend.scalars(style.ANGULAR_VELOCITY_PRINCIPAL, w_principal)
         if np.any(body.gravity) or rows[:, 7:10].any():
             backend.scalars(style.POSITION, rows[:, 0:3])
-
-    def _drift(self, total: np.ndarray, size: np.ndarray, L: np.ndarray, disturbed: np.ndarray) -> np.ndarray:
-        """Relative change (n, 2) of the total energy and of L since the last disturbance; 0 while there is one."""
-        drift = np.zeros((len(L), 2))
-        borders = [0, *(np.flatnonzero(np.diff(disturbed)) + 1).tolist(), len(L)]
-        for begin, end in zip(borders[:-1], borders[1:], strict=True):
-            if disturbed[begin]:
-                self._free_from = (float(total[end - 1]), L[end - 1].copy())
-                continue
-            if self._free_from is None:
-                self._free_from = (float(total[begin]), L[begin].copy())
-            energy, momentum = self._free_from
-            own = slice(begin, end)
-            drift[own, 0] = _relative(total[own] - energy, size[own])
-            norms = np.full(end - begin, np.linalg.norm(momentum))
-            drift[own, 1] = _relative(np.linalg.norm(L[own] - momentum, axis=1), norms)
-        return drift
-
-
-def _relative(difference: np.ndarray, size: np.ndarray) -> np.ndarray:
-    return np.divide(difference, size, out=np.zeros(len(difference)), where=size > 0.0)
 
 
 # Axes

@@ -65,7 +65,6 @@ TITLES = {
     style.POSITION: "Position of the COM [m]",
     style.STRING_TENSION: "Tension of the string [N]",
     style.STRING_LINE_DISTANCE: "Distance of the COM from the string's line [m]",
-    style.DRIFT: "Drift since the last command",
     style.EFFORT: "Effort per simulated second",
 }
 

@@ -37,9 +37,6 @@ NOTICE_GONE_S = 6.0
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
 
-FORMER_NAMES = {"flight": "motion"}
-"""Of views, for those who still ask for them."""
-
 STAGES = 4
 """Of a picture: read, viewer started, recording loaded, drawn."""
 
@@ -213,7 +210,6 @@ def bring_to_front(client: Any, name: str) -> str | None:
     views = {f"view/{view.view_id}": view.name for view in client.get_state().views}
     found = _walk(blueprint, f"container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}", views, ())
     wanted = name.strip().lower()
-    wanted = FORMER_NAMES.get(wanted, wanted)
     path = next((path for path, called in found if called.lower() == wanted), None)
     if path is None:
         raise InputError("--view", name, one_of(name, sorted({called for _, called in found})))

@@ -101,7 +101,6 @@ COURSES = {
     "true_or_box_tensor": Course(
         (("watch 2",), ("set inertia_model", "reset", ALONE), (ALONE,)),
         (GHOST_ANGLE, SPIN, SPINS, ENERGY, DRIFT),
-        labels=(style.BODY, style.GHOST, style.MOMENTUM),
     ),
     "weigh_by_throwing": Course(
         (("set density", "reset", "watch 2"), ("poke", "watch 0.5"), ("set density", "reset", "poke")),

@@ -266,22 +266,6 @@ def test_an_impulse_is_shown_from_its_instant_for_a_moment():
     assert len(shown) == 15 and not len(rows[250_000_000])
 
 
-def test_drift_counts_from_the_last_command_and_is_zero_while_one_acts():
-    rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 2], (50, 1))
-    # Spin that grows by a millionth a state, in mid-air and under the poke alike.
-    rows[:, 12] *= 1.0 + 1e-6 * np.arange(50)
-    picture, drawn = pictured(WEIGHTLESS)
-    picture.draw(times(10), rows[:10])
-    picture.load_began(200_000_001, 1, flight.POKE)
-    picture.load_ended(250_000_005, 1)
-    picture.draw(times(40, 10), rows[10:])
-    momentum = np.array([own[1] for own in drawn.rows(style.DRIFT).values()])
-    since = np.concatenate([np.arange(21), np.zeros(6), np.arange(1, 24)])
-    assert np.allclose(momentum, 1e-6 * since, rtol=1e-4, atol=1e-15)
-    L = 0.4 * rows[:, 12]
-    assert np.isclose(momentum[20], (L[20] - L[0]) / L[0], rtol=1e-9)
-
-
 def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let_go():
     rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (60, 1))
     # The body rises towards the hand at 1 m/s: 0.4 m long, the string goes slack half-way.

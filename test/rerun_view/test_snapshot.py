@@ -54,7 +54,7 @@ def test_the_body_is_in_the_middle_of_the_flight_view(tmp_path):
     # Without gravity: of a body that falls the path is shown, and the body where it has come to.
     flight.fly(observer, flight.rows(60), dataclasses.replace(flight.BODY, gravity=np.zeros(3)))
     observer.close()
-    take(str(recording), "--at", "0.3", "-o", str(picture), "--view", "flight")
+    take(str(recording), "--at", "0.3", "-o", str(picture), "--view", "motion")
     with Image.open(picture) as image:
         pixels = np.asarray(image.convert("RGB"), dtype=float)
     drawn = np.abs(pixels - pixels[2, -3]).sum(axis=2) > 60
