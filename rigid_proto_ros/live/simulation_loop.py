@@ -9,14 +9,14 @@ import time
 from collections.abc import Callable, Iterator
 
 from ..base.errors import InputError
-from ..scene.scenario import BodyMesh, Scenario, nanoseconds
+from ..scene.scenario import BodyMesh, Scenario
 from ..scene.scenario_run import ScenarioRun
 from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
 from .endpoints import Endpoints
-from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Stamps, Timekeeping, WorkBudget, publications_until
+from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Stamps, Timekeeping, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
 """Between publications at most this often, while commands come in [ns of wall time]."""
@@ -161,12 +161,7 @@ class SimulationLoop(ScenarioRun):
     @property
     def periods_of_a_step(self) -> int:
         """How many publications a step makes, as the parameters say."""
-        parameters = self.scenario.parameters
-        reached, last = (
-            publications_until(time_ns, parameters.publish_rate)
-            for time_ns in (self.simulation.time_ns, nanoseconds(parameters.step_until))
-        )
-        return last - reached if last > reached else parameters.step_periods
+        return self.scenario.parameters.step_periods
 
     def steps(self, periods: int) -> Iterator[None]:
         """While paused, advance over so many publications; yields while the thread's ticks make them.

@@ -34,6 +34,7 @@ Quaternion = tuple[float, float, float, float]
 PointMass = tuple[float, float, float, float]
 ThrusterNumbers = tuple[float, ...]
 Tensor = tuple[float, float, float, float, float, float]
+Profile = tuple[float, ...]
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -112,51 +113,29 @@ class StringParameters:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class ImuNoise:
-    """What ~/imu errs: of gyroscope and accelerometer density, bias, its walk, range and resolution."""
+PROFILE = (
+    "density of its white noise; where wanted, density of the random walk of its bias, and standard deviation of the "
+    "bias that it begins with"
+)
 
-    gyroscope_density: float = number(
-        0.0, "White noise of ~/imu's angular velocity.", "rad/s/√Hz", lower=0.0, upper=HUGE
-    )
-    gyroscope_bias: Vector = numbers(ZERO, "Constant bias of it, body axes.", "rad/s")
-    gyroscope_bias_walk: float = number(0.0, "Random walk of its bias.", "rad/s²/√Hz", lower=0.0, upper=HUGE)
-    gyroscope_range: float = number(0.0, "Largest that an axis shows; 0 for any.", "rad/s", lower=0.0, upper=HUGE)
-    gyroscope_resolution: float = number(0.0, "Step of what it shows; 0 for none.", "rad/s", lower=0.0, upper=HUGE)
-    accelerometer_density: float = number(
-        0.0, "White noise of ~/imu's specific force.", "m/s²/√Hz", lower=0.0, upper=HUGE
-    )
-    accelerometer_bias: Vector = numbers(ZERO, "Constant bias of it, body axes.", "m/s²")
-    accelerometer_bias_walk: float = number(0.0, "Random walk of its bias.", "m/s³/√Hz", lower=0.0, upper=HUGE)
-    accelerometer_range: float = number(0.0, "Largest that an axis shows; 0 for any.", "m/s²", lower=0.0, upper=HUGE)
-    accelerometer_resolution: float = number(0.0, "Step of what it shows; 0 for none.", "m/s²", lower=0.0, upper=HUGE)
+
+def profile(description: str, unit: str) -> Any:
+    """A sensor's noise: density of its white noise, of its bias' random walk, and standard deviation of its bias."""
+    return numbers((0.0,), f"{description}: {PROFILE}.", unit, lower=0.0, lengths=(1, 2, 3))
 
 
 @dataclass(frozen=True, slots=True)
-class PoseNoise:
-    """What ~/pose, ~/twist, ~/odom and the attitude of ~/imu err."""
+class NoiseParameters:
+    """What published messages err, by sensor; the motion stays exact. Units: densities per √Hz, walks per s and √Hz."""
 
-    position_density: float = number(
-        0.0, "White noise of the position in ~/pose and ~/odom.", "m/√Hz", lower=0.0, upper=HUGE
-    )
-    position_bias: Vector = numbers(ZERO, "Constant bias of it, world axes.", "m")
-    position_bias_walk: float = number(0.0, "Random walk of its bias.", "m/s/√Hz", lower=0.0, upper=HUGE)
-    position_range: float = number(0.0, "Largest that an axis shows; 0 for any.", "m", lower=0.0, upper=HUGE)
-    position_resolution: float = number(0.0, "Step of what it shows; 0 for none.", "m", lower=0.0, upper=HUGE)
-    orientation_density: float = number(
-        0.0,
-        "White noise of the attitude in ~/pose, ~/odom and ~/imu, about each body axis.",
-        "rad/√Hz",
-        lower=0.0,
-        upper=1.0,
-    )
-    orientation_bias: Vector = numbers(ZERO, "Constant bias of it, a rotation vector in body axes.", "rad")
-    orientation_bias_walk: float = number(0.0, "Random walk of its bias.", "rad/s/√Hz", lower=0.0, upper=1.0)
-    linear_velocity_density: float = number(
-        0.0, "White noise of the velocity in ~/twist and ~/odom.", "m/s/√Hz", lower=0.0, upper=HUGE
-    )
-    angular_velocity_density: float = number(
-        0.0, "White noise of the angular velocity in ~/twist and ~/odom.", "rad/s/√Hz", lower=0.0, upper=HUGE
+    gyroscope: Profile = profile("Angular velocity in ~/imu", "rad/s")
+    accelerometer: Profile = profile("Specific force in ~/imu", "m/s²")
+    position: Profile = profile("Position in ~/pose and ~/odom, world axes", "m")
+    orientation: Profile = profile("Attitude in ~/pose, ~/odom and ~/imu, about each body axis", "rad")
+    linear_velocity: Profile = profile("Velocity in ~/twist and ~/odom", "m/s")
+    angular_velocity: Profile = profile("Angular velocity in ~/twist and ~/odom", "rad/s")
+    seed: int = whole(
+        0, "Seed of the noise: the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
     )
 
 
@@ -260,13 +239,6 @@ class Parameters:
         1.0, "Simulated seconds per second of the wall clock; 0 runs as fast as possible.", lower=0.0, upper=1e6
     )
     step_periods: int = whole(1, "Publication periods that ~/step advances by.", lower=1, upper=1_000_000)
-    step_until: float = number(
-        0.0,
-        "~/step advances to the last publication up to this simulated time, where one lies ahead.",
-        "s",
-        lower=0.0,
-        upper=1e9,
-    )
     lockstep: bool = switch(
         False,
         "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; "
@@ -288,11 +260,7 @@ class Parameters:
     publish_clock: bool = switch(False, "Publish simulated time on /clock.")
     publish_tf: bool = switch(False, "Publish the body's frame on /tf (where tf2_msgs is installed).")
     imu_contact: str = text("", "Contact at which ~/imu measures; empty means the centre of mass.")
-    imu_noise: ImuNoise = ImuNoise()
-    pose_noise: PoseNoise = PoseNoise()
-    noise_seed: int = whole(
-        0, "Seed of the noise: the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
-    )
+    noise: NoiseParameters = NoiseParameters()
     ghost: GhostParameters = GhostParameters()
     frames: str = text(
         "own",
@@ -391,10 +359,31 @@ PATTERNS: dict[str, Parameter] = {
 """Parameters with a name of the user's choice."""
 
 
+_PROFILES = "noise.gyroscope, accelerometer, position, orientation, linear_velocity and angular_velocity"
+GONE = {
+    "imu_noise.": _PROFILES,
+    "pose_noise.": _PROFILES,
+    "noise_seed": "noise.seed",
+    "step_until": "step_periods",
+    "initial.flight": "replay --at T --as-scene writes a scene and a script",
+}
+"""Parameters of earlier versions, and what takes their place; a name ending in a dot is a prefix."""
+
+
+def instead_of(name: str) -> str:
+    """What takes the place of a parameter of an earlier version; empty for any other name."""
+    for gone, instead in GONE.items():
+        if name == gone or (gone.endswith(".") and name.startswith(gone)):
+            return instead
+    return ""
+
+
 def parameter_named(name: str) -> Parameter:
     """The declaration behind a name; raises InputError with the nearest known name."""
     if name in PARAMETERS:
         return PARAMETERS[name]
+    if instead := instead_of(name):
+        raise InputError(name, f"it was a parameter of an earlier version; use {instead}")
     for prefix, pattern in PATTERNS.items():
         own = name.removeprefix(prefix)
         if own != name and "." not in own:

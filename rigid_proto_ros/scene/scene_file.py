@@ -17,12 +17,8 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
+from .parameters import instead_of
 from .yaml_text import compose_yaml, read_text, scalar
-
-DROPPED: dict[str, object] = {"initial.flight": ""}
-"""Parameters of earlier versions, which recordings hold, and their defaults: a scene that names one with any other
-value is refused.
-"""
 
 
 def scene_file(name: str) -> Path:
@@ -89,9 +85,11 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
         scene.values.update(values)
         if name != "/**":
             named |= values.keys()
-    for name in DROPPED.keys() & scene.values.keys():
-        if scene.values.pop(name) != DROPPED[name]:
-            raise InputError(f"{path}, {name}", "it was a parameter of earlier versions, and has no successor")
+    for name in [name for name in scene.values if instead_of(name)]:
+        value = scene.values.pop(name)
+        # A recorded scene holds all parameters of its version: what had no effect is left out.
+        if any(value) if isinstance(value, list) else value:
+            raise InputError(f"{path}, {name}", f"it was a parameter of an earlier version; use {instead_of(name)}")
     scene.wildcard = scene.values.keys() - named
     return scene
 

@@ -92,7 +92,7 @@ def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, tm
 
 
 def test_states_go_out_with_the_noise_that_the_node_gave_them_and_their_stamps_on_the_clock(ros_environment, tmp_path):
-    noise = {"pose_noise.position_density": 1e-3, "pose_noise.angular_velocity_density": 1e-2}
+    noise = {"noise.position": [1e-3], "noise.angular_velocity": [1e-2]}
     session = flown_session(tmp_path, *(word for name, value in noise.items() for word in ("--set", f"{name}={value}")))
     (exact,) = read_runs(session)
     own = sensor_noise(Parameters().replaced(noise))

@@ -11,7 +11,7 @@ from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.scene.declaration import READ_ONLY, Parameter
-from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.scene.offline import read_scene, scene_values
 from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 
 NUMERIC = [p for p in (*PARAMETERS.values(), *PATTERNS.values()) if p.type in ("double", "doubles")]
@@ -122,3 +122,17 @@ def test_the_node_takes_every_spelling_from_files_the_command_line_and_services(
             for spelling in (value, str(value), str(mixed(value)) if isinstance(value, list) else mixed(value)):
                 assert client.set_named({parameter.name: spelling}) == [[True, ""]], (parameter.name, spelling)
                 assert client.get(parameter.name) == {parameter.name: parameter.convert(value)}
+
+
+def test_a_parameter_of_an_earlier_version_is_left_out_without_effect_and_refused_by_name_with_one(tmp_path) -> None:
+    scene = tmp_path / "old.yaml"
+    head = "rigid_body:\n  ros__parameters:\n    "
+    scene.write_text(f"{head}imu_noise: {{gyroscope_bias: [0.0, 0.0, 0.0]}}\n    step_until: 0.0\n    mass: 2.0\n")
+    assert scene_values(scene) == {"mass": 2.0}
+    for name, value, instead in (
+        ("imu_noise.gyroscope_range", 1.0, "noise.gyroscope"),
+        ("noise_seed", 3, "noise.seed"),
+    ):
+        scene.write_text(f"{head}{name}: {value}\n")
+        with pytest.raises(InputError, match=f"{name}.*earlier version; use {instead}"):
+            scene_values(scene)

@@ -86,14 +86,11 @@ BY_AUTO = {
 }
 
 NOISY = {
-    "noise_seed": 3,
-    "imu_noise.gyroscope_density": 0.01,
-    "imu_noise.gyroscope_bias_walk": 0.001,
-    "imu_noise.accelerometer_resolution": 0.01,
-    "pose_noise.position_density": 0.001,
-    "pose_noise.orientation_density": 0.001,
-    "pose_noise.orientation_bias_walk": 0.001,
-    "pose_noise.angular_velocity_density": 0.01,
+    "noise.seed": 3,
+    "noise.gyroscope": [0.01, 0.001, 0.1],
+    "noise.position": [0.001],
+    "noise.orientation": [0.001, 0.001],
+    "noise.angular_velocity": [0.01],
 }
 
 DRAWN = {
@@ -213,7 +210,7 @@ def rows(sampler: str) -> str:
 
 
 def noise() -> str:
-    """Hash of what the sensors tell of a state, by white noise, walk, range and resolution."""
+    """Hash of what the sensors tell of a state, by white noise, bias and walk."""
     parameters = Parameters().replaced(NOISY)
     sensors = sensor_noise(parameters)
     row = [0.1, -0.2, 0.3, 0.1, -0.2, 0.3, 0.9273618495495704, 1.0, 2.0, 3.0, -1.0, 0.5, 2.5]
