@@ -21,6 +21,7 @@ from .declaration import (
     Parameter,
     Value,
     declared,
+    instead_of,
     number,
     numbers,
     port,
@@ -357,25 +358,6 @@ PATTERNS: dict[str, Parameter] = {
     ),
 }
 """Parameters with a name of the user's choice."""
-
-
-_PROFILES = "noise.gyroscope, accelerometer, position, orientation, linear_velocity and angular_velocity"
-GONE = {
-    "imu_noise.": _PROFILES,
-    "pose_noise.": _PROFILES,
-    "noise_seed": "noise.seed",
-    "step_until": "step_periods",
-    "initial.flight": "replay --at T --as-scene writes a scene and a script",
-}
-"""Parameters of earlier versions, and what takes their place; a name ending in a dot is a prefix."""
-
-
-def instead_of(name: str) -> str:
-    """What takes the place of a parameter of an earlier version; empty for any other name."""
-    for gone, instead in GONE.items():
-        if name == gone or (gone.endswith(".") and name.startswith(gone)):
-            return instead
-    return ""
 
 
 def parameter_named(name: str) -> Parameter:

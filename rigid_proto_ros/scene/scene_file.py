@@ -17,7 +17,7 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
-from .parameters import instead_of
+from .declaration import instead_of
 from .yaml_text import compose_yaml, read_text, scalar
 
 
