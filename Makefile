@@ -36,7 +36,7 @@ workbench: $(FOR_WORKBENCH) ## node and interactive page; stays until Ctrl-C
 
 # A wait that has run out says that the machine was busy or that a process wasn't discovered, and nothing about values: such a
 # test, and no other, is tried once more, and the report says which.
-AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rR
+AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rRs
 
 # Hundreds of processes are started: none of them should read our source anew.
 test: export PYTHONDONTWRITEBYTECODE :=

@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     if importlib.util.find_spec("viser") is None:
         raise InputError("workbench", is_missing("viser", "workbench"))
-    from ..live.shutdown import Shutdown
+    from ..live.shutdown import Shutdown, leave
     from ..rerun_view.ports import LOOPBACK
     from ..scene.offline import read_scene
     from ..scene.parameters import Parameters
@@ -44,4 +44,5 @@ def run(args: argparse.Namespace) -> int:
     name = "" if args.mesh else scene
     with Shutdown() as shutdown:
         number = serve(scenario, name, port, args.host or LOOPBACK, not args.no_browser, shutdown.wait)
-    return 128 + number
+        # The interpreter would wait for a kernel that is being compiled.
+        leave(128 + number)

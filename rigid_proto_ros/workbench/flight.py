@@ -150,21 +150,20 @@ class Flight:
 
     async def _ask(self, doing: str, function: Callable[[], Result]) -> Result | None:
         """Run a function on the worker thread; a refusal is said, and gives None."""
-        if doing:
-            self._busy(doing)
-
-        def work() -> Result:
-            with notify_when_compiling(lambda: self._busy(COMPILING)):
-                return function()
-
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._worker, work)
+            return await asyncio.get_running_loop().run_in_executor(self._worker, self._work, doing, function)
         except InputError as error:
             self._say(f"Refused: {error}")
             return None
+
+    def _work(self, doing: str, function: Callable[[], Result]) -> Result:
+        """On the worker thread: who has asked for something else meanwhile sees what is being waited for."""
+        self._busy(doing)
+        try:
+            with notify_when_compiling(lambda: self._busy(COMPILING)):
+                return function()
         finally:
-            if doing:
-                self._busy("")
+            self._busy("")
 
     def _soon(self, asked: Awaitable[object]) -> None:
         task = asyncio.ensure_future(asked)
@@ -191,9 +190,7 @@ class Flight:
         """Compile what the body needs, then let its time begin; from any thread."""
 
         def work() -> None:
-            with notify_when_compiling(lambda: self._busy(COMPILING)):
-                warm_up()
-            self._busy("")
+            self._work("", warm_up)
             start()
 
         self._worker.submit(work)

@@ -52,7 +52,7 @@ def test_the_actions_step_judges_the_files_that_match(robots, files, status):
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     step = action["runs"]["steps"][-1]
     if shutil.which("rigid_proto", path=(scripts := os.path.dirname(__import__("sys").executable))) is None:
-        pytest.skip("rigid_proto isn't installed")
+        pytest.skip("rigid_proto is not installed beside this Python: make setup")
     environment = {**os.environ, "PATH": f"{scripts}:{os.environ['PATH']}", "FILES": files, "ARGUMENTS": ""}
     done = subprocess.run(
         ["bash", "-e", "-c", step["run"]], env=environment, capture_output=True, text=True, check=False

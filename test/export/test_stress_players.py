@@ -135,7 +135,7 @@ def page(modules):
     sync_api = pytest.importorskip("playwright.sync_api")
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if chromium is None:
-        pytest.skip("Chromium is not installed")
+        pytest.skip("there is no browser to drive: sudo apt install chromium")
     (modules / "index.html").write_text(PAGE)
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(modules)))
     threading.Thread(target=server.serve_forever, daemon=True).start()

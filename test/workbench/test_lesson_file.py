@@ -50,7 +50,7 @@ def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tm
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if chromium is None:
-        pytest.skip("Chromium is not installed")
+        pytest.skip("there is no browser to drive: sudo apt install chromium")
     file = tmp_path / "lesson.html"
     assert main(["lesson", "t_handle", "--html", str(file), "--duration", "4"]) == 0
     flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
